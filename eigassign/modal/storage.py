@@ -20,6 +20,7 @@ from scipy import sparse
 from eigassign.errors import UsageError
 from eigassign.modal.expansion import Cluster, Expansion
 from eigassign.modal.reduced.added_mass import AddedMass
+from eigassign.modal.reduced.design_stiffness import DesignStiffness
 from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.residual import JointCorrection, ResidualTerms
@@ -28,11 +29,11 @@ from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
-FORMAT = "reduced model 7"  # raise it whenever what the arrays of a reduced model mean changes
+FORMAT = "reduced model 8"  # raise it whenever what the arrays of a reduced model mean changes
 CLASSES: dict[str, Any] = {
     made.__name__: made
     for made in (
-        *(ReducedModel, ErrorTerms, AddedMass, ResidualTerms, JointCorrection),
+        *(ReducedModel, ErrorTerms, AddedMass, ResidualTerms, JointCorrection, DesignStiffness),
         *(Program, Instruction, ImplicitFunction),
     )
 }

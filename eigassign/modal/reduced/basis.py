@@ -154,13 +154,13 @@ def orthonormal(K: sparse.csc_array | Floats, vectors: Floats) -> Floats:
 def mean_theta(pencil: Pencil, points: Floats) -> Floats:
     """Mean θ (n_theta,) over quarter turns of all angles from ``points`` (n_points, n_x).
 
-    Loops are not turned: where they close at all, a passive carriage may have left its beam, whose
-    stiffness is then not one.
+    The design is that of the first point. Loops are not turned: where they close at all, a passive
+    carriage may have left its beam, whose stiffness is then not one.
     """
-    if pencil.program.is_implicit:
-        return np.asarray(pencil.theta(points).mean(axis=1))
     z = points @ pencil.to_program.T + pencil.shift
     n = pencil.n_joints
+    if pencil.program.is_implicit:
+        return np.asarray(pencil.theta(points[(z[:, n:] == z[0, n:]).all(axis=1)]).mean(axis=1))
     z[:, n:] = z[0, n:]
     turns = np.zeros(len(pencil.shift))
     turns[:n] = [_is_angle(pencil, z[0], k) for k in range(n)]

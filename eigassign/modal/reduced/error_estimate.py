@@ -12,8 +12,9 @@ i-th largest of all μ̂_j + ε_j bounds μ_i, so that a pair that might overtak
 f ∝ μ^{−1/2}, the relative error in frequency is √((μ̂ + ε)/μ̂) − 1, and the round-off on top.
 
 The residual is known in K_E(q, y0)⁻¹ (see `residual`). Where design parameters soften links to α of
-their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y), and ‖ρ‖²/α is a bound. Where they add mass, ν grows
-by what that mass adds to the modes beside the basis (see `added_mass`).
+their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y) (see `design_stiffness`), and ‖ρ‖²/α is a bound.
+Where they add mass, ν grows by what that mass adds to the modes beside the basis (see
+`added_mass`).
 
 The estimate is infinite, that is, the answer is refused, where a pair stands for no mode any more,
 or where a mode that the basis does not hold may lie below it.
@@ -31,6 +32,7 @@ from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.roundoff import rounding_weights
 from eigassign.modal.reduced.added_mass import AddedMass, added_mass
 from eigassign.modal.reduced.basis import RitzBasis
+from eigassign.modal.reduced.design_stiffness import DesignStiffness, design_stiffness
 from eigassign.modal.reduced.pencil import ReducedPencil, ritz_pairs
 from eigassign.modal.reduced.residual import (
     JointCorrection,
@@ -60,8 +62,7 @@ class ErrorTerms:
 
     residual: ResidualTerms
     joints: JointCorrection
-    material_terms: Ints  # indices of θ with a stiffness term that no joint coordinate enters
-    material: Floats  # their values at the first expansion point
+    stiffness: DesignStiffness
     added: AddedMass
     anchors: Floats  # (n_points, c + 1): the largest μ at each point, one more than are represented
     first_design: Flags  # (n_points,): those of the first point's y, which growth is relative to
@@ -78,20 +79,26 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     count = min(terms.anchors.shape[1] - 1, all_mu.shape[1])
     mu, z = all_mu[:, :count], all_z[:, :, :count]
     wide = np.concatenate([z, -coupling @ z], axis=1)
-    softest, hardest = _scaling(terms, theta)
     n = reduced.n_q - reduced.n_loads  # loads belong to the design
     y0 = reduced.points[0, n:]
     turned, closes = _with_design(reduced, x, np.broadcast_to(y0, (len(x), len(y0))))
+    scaled, stays = _with_design(reduced, x, terms.stiffness.scaling(x[:, n:], y0), theta)
+    ratio = terms.stiffness.ratio(theta, scaled, turned)
+    softest = np.maximum(ratio.min(axis=0, initial=1.0), 1e-300)
     gram = residual_gram(terms.residual, terms.joints, theta, turned, mu, wide)
     gram = gram / softest[:, None, None]
     heavy, posed = _with_design(reduced, x, terms.added.heaviest(x[:, n:], y0), theta)
-    outside = largest_outside(terms, mu, softest / terms.added.factor(theta))
-    outside += terms.added.lifted(heavy, turned) / softest
+    # Beside the basis the pose moves modes as well; as a design reorders them, that counts with it
+    beside = np.maximum(softest / RANGE, softest**2)
+    outside = largest_outside(terms, mu, beside / terms.added.factor(theta))
+    outside += terms.added.lifted(heavy, turned) / beside
     error = frequency_error(mu, gram, outside, terms.anchors)
-    error[~(closes & posed)] = np.inf
+    error[~(closes & posed & stays)] = np.inf
     shares = _mass_shares(terms, M_c, all_mu, all_z)
-    heavier = terms.added.heavier_shapes(theta, turned) / softest[:, None]
-    error[mode_missing(all_mu, gram, shares, terms.anchors, heavier)] = np.inf
+    heavier = terms.added.heavier_shapes(theta, turned)
+    most, own = (heavier / each for each in terms.stiffness.softer_shapes(ratio))
+    error[mode_missing(all_mu, gram, shares, terms.anchors, most, own)] = np.inf
+    hardest = ratio.max(axis=0, initial=1.0)
     return np.asarray(error + _rounding(reduced, terms, theta, mu, wide, hardest))
 
 
@@ -160,7 +167,12 @@ def largest_outside(terms: ErrorTerms, mu: Floats, softest: Floats) -> Floats:
 
 
 def mode_missing(
-    mu: Floats, gram: Floats, shares: Floats, anchors: Floats, heavier: Floats | float = 1.0
+    mu: Floats,
+    gram: Floats,
+    shares: Floats,
+    anchors: Floats,
+    most: Floats | float = 1.0,
+    own: Floats | float = 1.0,
 ) -> Flags:
     """Pairs (n, c) beside or below which a mode of every expansion point is missing.
 
@@ -168,17 +180,19 @@ def mode_missing(
     point. A shape with less than half of it in pairs that may stand for a mode has changed or left:
     it has left where there are also fewer pairs within RANGE than there were modes. Beyond the
     first c the residuals are not known: such a pair may stand for a shape only within RANGE.
-    ``heavier`` (n_points, n, c) is by how much designs made the shapes heavier and links softer.
+    Designs raised μ of each shape by a factor of at ``most`` (n_points, n, c), and of the shape as
+    it was by a factor of its ``own``.
     """
     c = gram.shape[1]
     sure = np.ones(mu.shape, dtype=bool)
     sure[:, :c] = np.sqrt(SAFETY * np.einsum("nii->ni", gram)) < LOST * mu[:, :c]
     was = anchors[:, None, :-1, None]
     reach = np.where(np.arange(mu.shape[1]) < c, RANGE**2, RANGE)
-    like = sure[None, :, None, :] & ((mu * reach)[None, :, None, :] >= was)
+    now = was * np.atleast_1d(own)[..., None]
+    like = sure[None, :, None, :] & ((mu * reach)[None, :, None, :] >= now)
     weak = (shares * like).sum(axis=3) < HELD
     pair = mu[:, :c]
-    grown = np.maximum(np.atleast_1d(heavier) / MARGIN, 1.0)  # RANGE allows for the rest
+    grown = np.maximum(np.atleast_1d(most) / MARGIN, 1.0)  # RANGE allows for the rest
     within = was * RANGE * grown[..., None] >= pair[None, :, None, :]
     found = (sure[:, None, :] & (mu[:, None, :] * RANGE >= pair[:, :, None])).sum(axis=2)
     fewer = within.sum(axis=2) > found
@@ -199,18 +213,7 @@ def _mass_shares(terms: ErrorTerms, M_c: Floats, mu: Floats, z: Floats) -> Float
     return np.array(shares)
 
 
-# --- The stiffness that the residual is measured in, and round-off
-
-
-def _scaling(terms: ErrorTerms, theta: Floats) -> tuple[Floats, Floats]:
-    """Least and largest stiffness of a link relative to x0, (n,): α ≤ 1 ≤ β.
-
-    α K(q, y0) ≤ K(q, y) ≤ β K(q, y0), so that ‖ρ‖²/α is a bound in K(q, y)⁻¹.
-    """
-    if not len(terms.material_terms):
-        return np.ones(theta.shape[1]), np.ones(theta.shape[1])
-    ratio = theta[terms.material_terms] / terms.material[:, None]
-    return np.clip(ratio.min(axis=0), 1e-300, 1.0), np.maximum(ratio.max(axis=0), 1.0)
+# --- Designs, and round-off
 
 
 def _with_design(
@@ -252,7 +255,7 @@ def _rounding(
     strains far more than a mode in another: |z|ᵀ|K̂||z| ≫ zᵀK̂z), and the eigensolver's.
     """
     k, size = reduced.size, np.abs(wide)
-    K, M = (np.abs(matrix) for matrix in reduced.uncondensed(theta))
+    K, M = reduced.magnitudes(theta)
     strain = hardest[:, None] * _forms(terms.stiffness_rounding, wide[:, :k]) + _forms(
         K, size[:, :k]
     )
@@ -280,15 +283,10 @@ def error_terms(basis: RitzBasis) -> ErrorTerms:
     following = 1.0 / basis.lam[:, count : count + 1]
     if not following.size:
         following = np.zeros((len(basis.lam), 1))
-    # Stiffness terms that loads or design parameters scale and no joint enters
-    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_joints].any(axis=1))
-    stiff = np.flatnonzero(np.diff(pencil.by_term[0].indptr)).tolist()
-    material = np.array([t for t in stiff if t and jointless[t - 1] and theta0[t]], dtype=np.intp)
     return ErrorTerms(
         residual=residual_terms(pencil, basis.K0, factor, wide),
         joints=joint_correction(pencil, factor, basis.theta_mean, wide),
-        material_terms=material,
-        material=theta0[material],
+        stiffness=design_stiffness(pencil, basis.points, basis.represented),
         added=added_mass(pencil, factor, basis.points[0], basis.V, basis.represented),
         anchors=np.hstack([1.0 / basis.lam[:, :count], following]),
         first_design=(basis.points == basis.points[0])[:, pencil.n_joints :].all(axis=1),

@@ -72,11 +72,15 @@ class ReducedPencil:
             for part in chunks(np.arange(len(outer)), self.mass[0].size):
                 yield self.at(theta[:, part])
 
-    def uncondensed(self, theta: Floats) -> tuple[Floats, Floats]:
-        """K̂ (n, k, k) and M̂ (n, k + f, k + f)."""
+    def magnitudes(self, theta: Floats) -> tuple[Floats, Floats]:
+        """Σ_j |θ_j K̂_j| (n, k, k) and Σ_j |θ_j M̂_j| (n, k + f, k + f): what cancels in the sums."""
         stiff, heavy = self.terms
         every = slice(None)
-        return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
+        size = np.abs(theta)
+        return (
+            stiff.block(size[stiff.terms].T @ np.abs(stiff.triangles), every, every),
+            heavy.block(size[heavy.terms].T @ np.abs(heavy.triangles), every, every),
+        )
 
     @cached_property
     def terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:
