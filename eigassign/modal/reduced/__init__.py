@@ -2,13 +2,13 @@
 
 It takes Taylor vectors as a basis and knows nothing of expansions. In reading order:
 
-    pencil          the pencil projected on a basis, and its Ritz pairs
-    basis           Taylor vectors, guards and probes, made K-orthonormal
-    residual        the norm of a Ritz pair's residual by small arrays only
-    added_mass      how far added mass may bring down modes beside the basis
+    pencil            the pencil projected on a basis, and its Ritz pairs
+    basis             Taylor vectors, guards and probes, made K-orthonormal
+    residual          the norm of a Ritz pair's residual by small arrays only
+    added_mass        how far added mass may bring down modes beside the basis
     design_stiffness  how far a design softens each part
-    error_estimate  from residuals to the error in frequency, and when an answer is refused
-    model           frequencies and their error estimate
-    compression     a smaller basis for a known region
-    reduce          the one function that builds it all
+    error_estimate    from residuals to the error in frequency, and when an answer is refused
+    model             frequencies and their error estimate
+    compression       a smaller basis for a known region
+    reduce            the one function that builds it all
 """
