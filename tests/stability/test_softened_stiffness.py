@@ -34,9 +34,9 @@ def check(seeds: range, samples: int, refused: float) -> None:
 
 
 def test_no_estimate_is_below_the_error_of_a_softer_design():
-    check(range(24), 4, 0.3)
+    check(range(24), 4, 0.4)
 
 
 @pytest.mark.slow
 def test_no_estimate_is_below_the_error_of_twenty_thousand_softer_designs():
-    check(range(100, 900), 16, 0.2)
+    check(range(100, 900), 16, 0.4)
