@@ -23,7 +23,7 @@ from eigassign.study.results import RunResults
 
 _GAP = 2  # columns that rich leaves between two columns of a table
 _COLOURS = {
-    "green": {"reached", "met", "ok", "proved", "fitted"},
+    "green": {"reached", "met", "ok", "checked", "fitted"},
     "yellow": {"improved", "unfinished"},
     "red": {
         *("unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),

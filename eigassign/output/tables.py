@@ -219,7 +219,7 @@ def _violation(worst: float) -> str:
 
 
 def clearances(results: RunResults) -> Table:
-    """Bands to keep out of: how many modes are below each, and whether that is proved."""
+    """Bands to keep out of: how many modes are below each, and whether that was checked."""
     rows = results.assignment.clearances if results.assignment else ()
     caption = (
         "Of all modes at every sample, and between the samples. Room is the distance to the "

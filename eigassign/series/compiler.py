@@ -80,6 +80,29 @@ class Program:
         """(n_faces, n_variables): every atom is a sum of functions of one face's variables each."""
         return faces(self)
 
+    def is_affine(self, variables: NDArray[np.bool_]) -> bool:
+        """True where no output is of a degree above 1 in these ``variables`` (n_variables,).
+
+        Read off the form: a square that something else takes away again counts.
+        """
+        degree = np.zeros(self.n_atoms)
+        degree[self.inputs] = variables[self.input_variables]
+        for step in self.steps:
+            a = degree[step.left]
+            if step.kind == "product":
+                found = a + degree[step.right]
+            elif step.matrix is not None:
+                found, (rows, columns) = np.zeros(len(step.targets)), step.matrix.nonzero()
+                np.maximum.at(found, rows, a[columns])
+            elif step.kind == "power":
+                whole = (step.numbers >= 0.0) & (step.numbers == np.round(step.numbers))
+                found = np.where(a == 0.0, 0.0, np.where(whole, step.numbers * a, np.inf))
+            else:
+                met = a.any() or (step.kind == "solve" and degree[step.right].any())
+                found = np.full(len(step.targets), np.inf if met else 0.0)
+            degree[step.targets] = found
+        return bool(degree[self.outputs].max(initial=0.0) <= 1.0)
+
     def run(self, algebra: Algebra, variables: Floats) -> Floats:
         """Outputs as rows, from the variables as rows (n_variables, …) of the algebra."""
         values = np.empty((self.n_atoms, variables.shape[1]))

@@ -326,7 +326,7 @@ class LimitRow:
 
 @dataclass(frozen=True)
 class ClearanceRow:
-    """Whether a band is proved clear along a trajectory with ``below`` modes under it.
+    """Whether a band is clear, as checked, along a trajectory with ``below`` modes under it.
 
     ``room`` is the least distance of a mode relative to the edge, less what it may deviate between
     the points looked at, and less ``raised``: how much too high the mode above may be for mesh and

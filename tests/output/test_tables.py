@@ -43,7 +43,7 @@ def searched() -> RunResults:
     return replace(results, assignment=row, targets=(limit,), design=design)
 
 
-def test_bands_say_how_many_modes_are_below_and_whether_that_is_proved() -> None:
+def test_bands_say_how_many_modes_are_below_and_whether_that_is_checked() -> None:
     results = make_results()
     assert table(results, "Clearance") is None
     assert results.assignment is not None
@@ -56,7 +56,7 @@ def test_bands_say_how_many_modes_are_below_and_whether_that_is_proved() -> None
     )
     assert found is not None
     assert found.rows == (
-        ("a band", "2", "1.30 %", "0.200 %", "proved"),
+        ("a band", "2", "1.30 %", "0.200 %", "checked"),
         ("b", "0", "0.00 %", "not bounded", "NO"),
     )
 

@@ -130,6 +130,41 @@ def test_what_a_tree_does_not_depend_on_structurally_does_not_change_it(tree: Tr
     np.testing.assert_array_equal(before, after)
 
 
+@given(trees, st.lists(st.booleans(), min_size=N, max_size=N))
+def test_what_is_affine_by_its_form_has_no_higher_coefficients(
+    tree: Tree, chosen: list[bool]
+) -> None:
+    recorder = Recorder()
+    recorded = value(tree, [recorder.variable(i) for i in range(N)], sin, cos)
+    program = compile_table(recorder, [recorded], N).program
+    variables = np.zeros((N, len(SPACE)))
+    variables[:, 0] = AT[0]
+    variables[:, SPACE.units] = np.eye(N)
+    higher = SPACE.indices[:, np.array(chosen)].sum(axis=1) > 1
+    found = program.run(Truncated(SPACE), variables)
+    if program.is_affine(np.array(chosen)):
+        assert not found[:, higher].any()
+
+
+def test_a_form_is_affine_where_each_output_is_of_degree_one() -> None:
+    recorder = Recorder()
+    x, y, z = (recorder.variable(i) for i in range(3))
+    forms = {"sin(x) y": sin(x) * y, "y z": y * z, "1 / y": y**-1.0, "y²": y**2.0, "exp(x)": exp(x)}
+
+    def affine(name: str, *of: int) -> bool:
+        program = compile_program(recorder, [forms[name].single()[1]], 3)
+        return program.is_affine(np.isin(np.arange(3), of))
+
+    assert affine("sin(x) y", 1)
+    assert affine("y z", 1)
+    assert affine("exp(x)", 1, 2)
+    assert not affine("sin(x) y", 0)
+    assert not affine("y z", 1, 2)
+    assert not affine("1 / y", 1)
+    assert not affine("y²", 1)
+    assert not affine("exp(x)", 0)
+
+
 @given(st.lists(trees, min_size=1, max_size=3))
 def test_series_have_no_coefficients_off_the_faces(several: list[Tree]) -> None:
     recorder = Recorder()

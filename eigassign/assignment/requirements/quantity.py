@@ -12,6 +12,7 @@ from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.requirement import Quantity, Requirement
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
+from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.modal.model import Model
 
 _MASS = "design.mass"
@@ -21,7 +22,6 @@ class LimitedQuantity(Requirement):
     """low ≤ quantity(y) ≤ high, in SI units; no kind of target, for it belongs to no mode."""
 
     is_goal = False
-    is_convex = True  # the set of designs that it allows, where the quantity is affine
     unit: ClassVar[str] = ""  # SI, that its amounts are said in
     extreme: ClassVar[tuple[str, str]] = ("the least is", "the most is")
 
@@ -35,6 +35,11 @@ class LimitedQuantity(Requirement):
         """The limits, infinite without one, of a quantity that has one value for all samples."""
         lower, upper = np.array([low]), np.array([high])
         return cls(label, place, ((quantity, 1.0),), slice(0, 1), lower, upper)
+
+    @property
+    def is_convex(self) -> bool:
+        """True where it allows a convex set of designs."""
+        return True
 
     # --- Amounts in words
 
@@ -101,6 +106,12 @@ class MassLimit(LimitedQuantity):
         """Yield the limits of the mass, if there are any."""
         if (given := file.design.mass) is not None:
             yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
+
+    @property
+    def is_convex(self) -> bool:
+        """True where the mass is affine in the design."""
+        mass = self.terms[0][0]
+        return isinstance(mass, TotalMass) and mass.is_affine
 
     @property
     def in_words(self) -> str:

@@ -97,6 +97,11 @@ class Pencil(Brief):
         """Mask of the variables z that anything depends on: expansions drop the others."""
         return np.asarray(self.program.dependence.any(axis=0))
 
+    @property
+    def is_affine(self) -> bool:
+        """True where K and M are of degree 1 in y at most, by their form."""
+        return self.program.is_affine((self.to_program[:, self.n_q :] != 0.0).any(axis=1))
+
     @cached_property
     def elastic(self) -> Ints:
         """The dofs that are not rigid-body coordinates: u and held coordinates."""

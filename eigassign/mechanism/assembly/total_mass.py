@@ -32,6 +32,11 @@ class TotalMass:
     at: Floats  # z = (s, y) (n_z,) where the mechanism can be put together
     n_y: int
 
+    @property
+    def is_affine(self) -> bool:
+        """True where it is of degree 1 in y at most, by its form."""
+        return self.table.program.is_affine(np.arange(len(self.at)) >= len(self.at) - self.n_y)
+
     def __call__(self, y: Floats) -> tuple[float, Floats]:
         """The mass in kg of a design y (n_y,), and its slope (n_y,) in kg per SI unit of y."""
         first = len(self.at) - self.n_y

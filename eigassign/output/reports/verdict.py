@@ -144,7 +144,7 @@ def _trust(results: RunResults) -> Iterator[str]:
     if not row.finished:
         yield "The search was ended before it was done."
     for clear in row.clearances:
-        proof = "proved clear" if clear.clear else "NOT proved clear"
+        proof = "checked clear" if clear.clear else "NOT clear"
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
         yield f"{capital(clear.label)}: {proof}, {below} below."
     found = results.meaning.tolerance

@@ -72,7 +72,7 @@ def assignment_row(
             doubts=() if trusted else (UNTRUSTED,),
             unproved=(
                 *((_too_coarse(raised, largest),) if coarse else ()),
-                *((f"not proved clear along the motion: {'; '.join(unproved)}",) * bool(unproved)),
+                *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=unreachable,
             conflict=_in_words(scene, answer, optimality.kind == "proved"),

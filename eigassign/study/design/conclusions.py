@@ -25,7 +25,7 @@ from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
 from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
 from eigassign.assignment.requirements.quantity import LimitedQuantity
-from eigassign.assignment.requirements.requirement import Frequencies, Requirement
+from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import PosedProblem
@@ -33,7 +33,6 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MOST = 12  # limits of which the smallest contradiction is looked for
-AFFINE = 1e-10  # relative change of a slope over the bounds that is round-off
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
 SAME = 1e-9  # of the merit: a design this little worse is as good
 
@@ -64,23 +63,7 @@ def _are_convex(scene: Scene, asked: Requirements) -> bool:
     limits = [one for one in asked.limits if one.constraint is None]
     if not all(one.is_convex for one in limits):
         return False
-    return not limits or (scene.model.n_rigid == 0 and _is_affine(scene, limits))
-
-
-def _is_affine(scene: Scene, limits: Sequence[Requirement]) -> bool:
-    """True where K, M and limited quantities have the same slopes in y all over the bounds."""
-    lower, upper = scene.bounds
-    pencil, n_q = scene.model.pencil, scene.path.q.shape[1]
-    along = n_q + np.arange(len(lower))
-    designs = lower + np.random.default_rng(0).random((6, len(lower))) * (upper - lower)
-    for q in scene.path.q[:: max(1, len(scene.path.q) // 4)]:
-        found = pencil.theta_slopes(scene.model.x(np.tile(q, (6, 1)), designs), along)
-        size = np.abs(found).max(axis=2, keepdims=True)
-        if (np.abs(found - found[..., :1]) > AFFINE * size).any():
-            return False
-    quantities = (term for one in limits for term, _ in one.terms if not isinstance(term, int))
-    each = (np.array([quantity(y)[1] for y in designs]) for quantity in quantities)
-    return all((np.ptp(s, axis=0) <= AFFINE * np.abs(s).max(axis=0)).all() for s in each)
+    return not limits or (scene.model.n_rigid == 0 and scene.model.pencil.is_affine)
 
 
 # --- Contradictions
@@ -193,7 +176,7 @@ def least_changed(found: Found, initial: Floats) -> Found:
     """
     problem, best = found.variant.problem, found.best
     settled = found.chosen is not None or found.variant.requirements.least_change is not None
-    if settled or found.clearances:  # a band is proved clear at this very design
+    if settled or found.clearances:  # a band is checked at this very design
         return found
     free = np.flatnonzero(problem.upper > problem.lower)
     width = (problem.upper - problem.lower)[free]

@@ -21,7 +21,7 @@ from eigassign.assignment.exact.sequential import End, Optimum, worth
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import InfeasibleError
-from eigassign.study.design.clearance import prove_clear, wanting
+from eigassign.study.design.clearance import check_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
@@ -69,9 +69,9 @@ def find_optimum(
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
 
-    Bands to keep out of are proved clear (`clearance`): where modes come too near between the
-    samples, the limits at the samples are drawn in by what is lacking, and the answer is sought
-    anew from where it was.
+    Bands to keep out of are checked (`clearance`): where modes come too near between the samples,
+    the limits at the samples are drawn in by what is lacking, and the answer is sought anew from
+    where it was.
     """
     seconds, margin = scene.file.assignment.seconds, MARGIN
     deadline = np.inf if seconds is None else monotonic() + seconds
@@ -155,7 +155,7 @@ def _search_catalogues(
 def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[ClearanceRow]:
     q = task.scene.path.at(y)[0]
     for band, (_, below) in zip(task.bands, variant.below, strict=True):
-        yield prove_clear(task.scene.model, band, below, q[band.rows], y)
+        yield check_clear(task.scene.model, band, below, q[band.rows], y)
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:

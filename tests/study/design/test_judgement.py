@@ -78,8 +78,8 @@ def test_the_first_that_holds_is_the_word() -> None:
 def test_reached_is_every_target_met_every_limit_kept_and_nothing_unproved() -> None:
     met = replace(missed("frequency", ErrorRow(0.08, 0.04), ErrorRow(0.01, 0.01)), satisfied=True)
     assert judged(met, 1.0, 0.5) == Verdict("reached", "every target is met", None)
-    unproved = judged(met, 1.0, 0.5, unproved=["not proved clear"])
-    assert (unproved.word, unproved.reason) == ("do_not_use", "not proved clear")
+    unproved = judged(met, 1.0, 0.5, unproved=["not clear"])
+    assert (unproved.word, unproved.reason) == ("do_not_use", "not clear")
     kept = LimitRow("a", "a at most 1", "", None, 1.0, 0.5, 0.5, True, 0.0, 0.0, None, "")
     assert judged(met, 1.0, 0.5, limits=[kept]).word == "reached"
     broken = replace(kept, optimal=2.0, satisfied=False, violation=1.0, stated="a 2, at most 1")
