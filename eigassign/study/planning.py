@@ -288,6 +288,7 @@ def settle_mesh(
         lambda found: partial(_mesh_error, build(found.elements), modes_at),
         lambda worst: f"at most {100.0 * worst:.2g} % too high",
         *(accuracy, file, seen, every),
+        firm=True,
     )
 
 
@@ -306,18 +307,20 @@ def confirmed(
     seen: DesignSamples,
     every: DesignSamples,
     looks: float = np.inf,
+    firm: bool = False,
 ) -> R:
     """The cheapest rung at the samples ``seen`` that holds at ``every`` one, and at worse designs.
 
     Where one errs there, by what ``judge`` makes its errors at x (n, n_x), it is chosen anew at all
-    that was looked at; after `ATTEMPTS` of that it is taken. Raises AccuracyError where the ladder
-    has none, or more than so many ``looks`` are needed.
+    that was looked at; after `ATTEMPTS` of that it is taken, or where it is to be ``firm`` holds at
+    worse designs, too. Raises AccuracyError where the ladder has none that does, or more than so
+    many ``looks`` are needed.
     """
     reasons: list[str] = []
     for attempt in range(1 + ATTEMPTS):
         found: R = cheapest(ladder(seen, looks), accuracy)
         reasons += found.reasons
-        if attempt == ATTEMPTS:
+        if attempt == ATTEMPTS and not firm:
             break
         every, errors = with_worse_designs(every, judge(found), file)
         worst = float(errors.max())
@@ -326,6 +329,8 @@ def confirmed(
             found = replace(found, error=np.full_like(found.error, worst))
             reasons.append(line)
             break
+        if attempt == ATTEMPTS:
+            raise AccuracyError(f"nothing was found that leaves {accuracy:.1e}: {line}")
         reasons.append(f"{line}, chosen anew")
         seen, looks = every, looks - found.looks
         if len(seen.x) > looks:
