@@ -8,9 +8,9 @@ them, so that they read back to the last bit.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from eigassign.facts import OF_ROW, Curve, Fact, Seconds, Share, written
 from eigassign.files import plain
 from eigassign.study.results import (
     AssignmentRow,
-    Comparison,
     DesignRow,
     ErrorSummary,
     FollowedRow,
     MassRow,
     MeshError,
+    ModeStudy,
     OtherModes,
     RangeRow,
     RelaxedRow,
@@ -38,6 +38,7 @@ from eigassign.study.results import (
 )
 from eigassign.study.updating.fit import UpdateResults
 
+T = TypeVar("T")
 Floats = NDArray[np.float64]
 SCHEMA = 1  # of results.json: raised when a field goes or means something else
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
@@ -203,60 +204,51 @@ class RunDocument(Document):
 # --- What a run puts there
 
 
+def filled(document: type[T], *sources: object, **own: Any) -> T:
+    """A document whose facts are its ``own``, or else those of that name in the first source."""
+    names = [field.name for field in fields(document)]  # type: ignore[arg-type]
+    found = {k: getattr(s, k) for s in reversed(sources) for k in names if hasattr(s, k)}
+    return document(**found | own)
+
+
 def run_document(results: RunResults) -> RunDocument:
     """``frequencies`` is of the first target, ``error`` of all."""
-    first = results.targets[0] if results.targets else None
-    found, time_s = results.meaning, results.time_s
-    units = {row.parameter: row.unit for row in found.sensitivity}
+    targets = [_target(results, target) for target in results.targets]
+    meaning, slopes = results.meaning, results.meaning.sensitivity
     coordinates = zip(results.q_names, results.q_units, results.q.T, strict=True)
     motion = {name: CoordinateDocument(unit, values) for name, unit, values in coordinates}
-    return RunDocument(
-        **vars(beginning(results)),
+    return filled(
+        RunDocument,
+        beginning(results),
+        results,
         design={row.name: row for row in results.design},
-        mass=results.mass,
-        price=results.price,
-        error=results.error,
-        frequencies=_curves(results, first) if first else None,
-        targets=[_target(results, target) for target in results.targets],
-        assignment=results.assignment,
+        frequencies=targets[0].frequencies if targets else None,
+        targets=targets,
         sensitivity={
-            name: SensitivityDocument(unit, [r for r in found.sensitivity if r.parameter == name])
-            for name, unit in units.items()
+            name: SensitivityDocument(unit, [row for row in slopes if row.parameter == name])
+            for name, unit in dict.fromkeys((row.parameter, row.unit) for row in slopes)
         },
-        relaxed=found.relaxed,
-        reach=found.reach,
-        unreachable=found.unreachable,
-        tolerance=found.tolerance,
-        trade_off=found.trade_off,
+        relaxed=meaning.relaxed,
+        reach=meaning.reach,
+        unreachable=meaning.unreachable,
+        tolerance=meaning.tolerance,
+        trade_off=meaning.trade_off,
         other_modes=_modes(results.others),
-        discretisation=results.discretisation,
         approximation=[
-            StudyDocument(
-                *(one.mode, one.order, one.q0, one.y0),
-                {
-                    "over_time": _worst(one.over_time),
-                    "over_q": _worst(one.over_q.values if one.over_q else None),
-                    "over_design": _worst(one.over_design.values if one.over_design else None),
-                },
-            )
-            for one in results.studies
+            filled(StudyDocument, study, max_relative=dict(_worst(study)))
+            for study in results.studies
         ],
-        trajectory=MotionDocument(time_s, _named(results, slice(None)), motion),
+        trajectory=MotionDocument(results.time_s, _named(results, slice(None)), motion),
         trajectories=[
-            TrajectoryDocument(
-                row.name,
-                row.rows.stop - row.rows.start,
-                row.duration_s,
-                row.weight,
-                row.loads or None,
-                results.error_along(row.name),
+            filled(
+                TrajectoryDocument,
+                row,
+                samples=row.rows.stop - row.rows.start,
+                set=row.loads or None,
+                error=results.error_along(row.name),
             )
             for row in results.trajectories
         ],
-        solver=results.solver,
-        warnings=results.warnings,
-        notes=results.notes,
-        timing_s=results.timing_s,
     )
 
 
@@ -267,37 +259,28 @@ def beginning(results: RunResults | UpdateResults) -> Document:
     return Document(SCHEMA, results.version, case)
 
 
-def _curves(results: RunResults, target: TargetStudy) -> CurvesDocument:
-    asked = target.asked
-    curves = CurvesDocument(
-        results.time_s[asked.rows],
-        _named(results, asked.rows),
-        target.target_hz,
-        target.initial_hz,
-        target.one_shot_hz,
-        target.predicted_hz,
-        target.exact_hz,
-    )
-    if asked.is_goal:
-        return curves
-    edges = (hz if np.isfinite(hz).all() else None for hz in (asked.lower, asked.upper))
-    return LimitDocument(*vars(curves).values(), *edges)
-
-
 def _target(results: RunResults, target: TargetStudy) -> TargetDocument:
     asked = target.asked
-    return TargetDocument(
-        asked.kind,
-        asked.label,
-        asked.mode if target.followed is None else None,
-        asked.modes,
-        target.followed,
-        target.satisfied,
-        target.error.exact.max_relative,
-        asked.trajectory,
-        target.error,
-        _curves(results, target),
-        None if target.near is None else _modes(target.near),
+    edges = {
+        f"{side}_hz": hz if np.isfinite(hz).all() else None
+        for side, hz in (("lower", asked.lower), ("upper", asked.upper))
+        if not asked.is_goal
+    }
+    curves = filled(
+        LimitDocument if edges else CurvesDocument,
+        target,
+        time_s=results.time_s[asked.rows],
+        trajectory=_named(results, asked.rows),
+        **edges,
+    )
+    return filled(
+        TargetDocument,
+        target,
+        asked,
+        mode=asked.mode if target.followed is None else None,
+        worst=target.error.exact.max_relative,
+        frequencies=curves,
+        near=None if target.near is None else _modes(target.near),
     )
 
 
@@ -318,8 +301,13 @@ def _modes(others: OtherModes | None) -> Sequence[ModeDocument]:
     return [ModeDocument(*column) for column in columns]
 
 
-def _worst(found: Comparison | None) -> WorstDocument | None:
-    return WorstDocument(found.worst_taylor, found.worst_linearised) if found else None
+def _worst(study: ModeStudy) -> Iterator[tuple[str, WorstDocument | None]]:
+    """The largest errors by where they were looked for."""
+    maps = {"over_q": study.over_q, "over_design": study.over_design}
+    places = {"over_time": study.over_time, **{k: m and m.values for k, m in maps.items()}}
+    for where, values in places.items():
+        found = values and WorstDocument(values.worst_taylor, values.worst_linearised)
+        yield where, found or None
 
 
 # --- As JSON

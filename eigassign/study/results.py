@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from eigassign.facts import Curve, Fact, Hertz, InUnit, Key, Residual, Share, po
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=".6g")]
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
@@ -193,14 +194,6 @@ class FollowedRow(Brief):
     initial_numbers: Annotated[Numbers, Fact("at each sample, before", name="initial_modes")]
     exact_numbers: Annotated[Numbers, Fact("at each sample of the answer", name="exact_modes")]
 
-    def part(self, rows: slice) -> FollowedRow:
-        """The same at some of the samples."""
-        return replace(
-            self,
-            initial_numbers=self.initial_numbers[rows],
-            exact_numbers=self.exact_numbers[rows],
-        )
-
 
 @dataclass(frozen=True, repr=False)
 class OtherModes(Brief):
@@ -209,10 +202,6 @@ class OtherModes(Brief):
     modes: tuple[int, ...]
     initial_hz: Floats
     optimal_hz: Floats
-
-    def part(self, rows: slice) -> OtherModes:
-        """The same curves at these rows only."""
-        return OtherModes(self.modes, self.initial_hz[rows], self.optimal_hz[rows])
 
 
 @dataclass(frozen=True, repr=False)
@@ -624,14 +613,15 @@ class RunResults(Brief):
     trajectories: tuple[TrajectoryRow, ...]
     poses: DrawnPoses
     studies: tuple[ModeStudy, ...]
-    design: tuple[DesignRow, ...]
-    targets: tuple[TargetStudy, ...]
-    others: OtherModes | None
-    solver: SolverRow | None
-    assignment: AssignmentRow | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
+    # of an answer:
+    design: tuple[DesignRow, ...] = ()
+    targets: tuple[TargetStudy, ...] = ()
+    others: OtherModes | None = None
+    solver: SolverRow | None = None
+    assignment: AssignmentRow | None = None
     case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
     mass: MassRow | None = None
@@ -736,7 +726,7 @@ def along_each(results: RunResults) -> tuple[RunResults, ...]:
 
 
 def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
-    rows, others = row.rows, results.others
+    rows = row.rows
     targets = (_target(target, row) for target in results.targets)
     return replace(
         results,
@@ -744,19 +734,21 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         time_s=results.time_s[rows],
         q=results.q[rows],
         trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
-        studies=tuple(_study(study, rows) for study in results.studies),
+        studies=tuple(
+            replace(study, over_time=_part(study.over_time, rows)) for study in results.studies
+        ),
         targets=tuple(target for target in targets if target is not None),
-        others=None if others is None else others.part(rows),
-        spectrum=None if results.spectrum is None else results.spectrum.part(rows),
+        others=_part(results.others, rows),
+        spectrum=_part(results.spectrum, rows),
     )
 
 
-def _study(study: ModeStudy, rows: slice) -> ModeStudy:
-    over = study.over_time
-    if over is None:
-        return study
-    parts = (over.exact_hz, over.taylor_hz, over.linearised_hz)
-    return replace(study, over_time=Comparison(*(part[rows] for part in parts)))
+def _part(row: Row, rows: slice) -> Row:
+    """The same row at some of the samples: of each array those; None of None."""
+    if row is None:
+        return row
+    arrays = {k: v[rows] for k, v in vars(row).items() if isinstance(v, np.ndarray)}
+    return replace(row, **arrays)  # type: ignore[type-var]
 
 
 def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
@@ -767,14 +759,10 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
     rows, asked = along.rows, target.asked.part(along.name, along.rows)
     first, length = asked.rows.start - row.rows.start, rows.stop - rows.start
     return replace(
-        target,
+        _part(target, rows),
         asked=replace(asked, rows=slice(first, first + length)),
-        initial_hz=target.initial_hz[rows],
-        exact_hz=target.exact_hz[rows],
-        predicted_hz=None if target.predicted_hz is None else target.predicted_hz[rows],
-        one_shot_hz=None if target.one_shot_hz is None else target.one_shot_hz[rows],
         error=along.error,
-        followed=None if target.followed is None else target.followed.part(rows),
+        followed=_part(target.followed, rows),
         along=(replace(along, rows=slice(0, length)),),
-        near=None if target.near is None else target.near.part(rows),
+        near=_part(target.near, rows),
     )

@@ -137,18 +137,12 @@ class UpdateDocument(Document):
 
 def document(results: UpdateResults) -> dict[str, Any]:
     """Plain values in a fixed order; what is not identified has no deviation (null)."""
-    made = UpdateDocument(
-        **vars(documents.beginning(results)),
-        verdict=results.verdict,
+    made = documents.filled(
+        UpdateDocument,
+        documents.beginning(results),
+        results,
         headline=headline(results),
         parameters={row.name: row for row in results.parameters},
-        covariance=results.covariance,
-        correlation=results.correlation,
         not_identified=results.unidentified,
-        fit=results.fit,
-        measurements=results.measurements,
-        warnings=results.warnings,
-        notes=results.notes,
-        timing_s=results.timing_s,
     )
     return dict(documents.document(made))
