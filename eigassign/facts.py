@@ -93,13 +93,6 @@ def fact(row: Any, name: str) -> Fact:
     return Fact(**told)
 
 
-def value_of(row: Any, name: str) -> Any:
-    """The value of a fact; None where there is nothing to have it."""
-    for own in name.split("."):
-        row = None if row is None else getattr(row, own)
-    return row
-
-
 def _parts(kind: Any) -> Iterator[Any]:
     """What an optional or annotated type is made of, declarations too, the innermost first."""
     if get_origin(kind) in (Annotated, Union, UnionType):

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _DRAWING = ("out", "force", "figures", "allow_outside")
 LEFT_BY = ("run", "update", "batch", "chart")
-_STATED = ("discretisation_error", "truncation_error")  # where there are such
 
 
 @click.command(
@@ -192,9 +191,9 @@ def modes(
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:
-        names = ("rigid_modes", "frequencies_hz", "round_off", *_STATED)
-        values = {name: getattr(answer, name) for name in names}
-        print_json({k: v for k, v in values.items() if v is not None})  # infinite ones are null
+        from eigassign.output.documents import document
+
+        print_json(document(answer))
     else:
         _show_modes(answer, folder)
     return 0

@@ -8,7 +8,7 @@ them, so that they read back to the last bit.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Annotated, Any, TypeVar
 
@@ -124,14 +124,6 @@ class SensitivityDocument:
 
 
 @dataclass(frozen=True)
-class WorstDocument:
-    """The largest error of both expansions."""
-
-    taylor: Annotated[Share, Fact("of the full expansion")]
-    linearised: Annotated[Share, Fact("of the partially linearised one")]
-
-
-@dataclass(frozen=True)
 class StudyDocument:
     """The accuracy of the expansion of one mode, at (q0, y0), against exact frequencies."""
 
@@ -140,7 +132,8 @@ class StudyDocument:
     q0: Floats
     y0: Floats
     max_relative: Annotated[
-        Mapping[str, WorstDocument | None], Fact("over_time, over_q, over_design", may_lack=True)
+        Mapping[str, Mapping[str, Share] | None],
+        Fact("over_time, over_q, over_design; of each taylor and linearised", may_lack=True),
     ]
 
 
@@ -235,8 +228,7 @@ def run_document(results: RunResults) -> RunDocument:
         trade_off=meaning.trade_off,
         other_modes=_modes(results.others),
         approximation=[
-            filled(StudyDocument, study, max_relative=dict(_worst(study)))
-            for study in results.studies
+            filled(StudyDocument, study, max_relative=_worst(study)) for study in results.studies
         ],
         trajectory=MotionDocument(results.time_s, _named(results, slice(None)), motion),
         trajectories=[
@@ -301,13 +293,14 @@ def _modes(others: OtherModes | None) -> Sequence[ModeDocument]:
     return [ModeDocument(*column) for column in columns]
 
 
-def _worst(study: ModeStudy) -> Iterator[tuple[str, WorstDocument | None]]:
-    """The largest errors by where they were looked for."""
-    maps = {"over_q": study.over_q, "over_design": study.over_design}
-    places = {"over_time": study.over_time, **{k: m and m.values for k, m in maps.items()}}
-    for where, values in places.items():
-        found = values and WorstDocument(values.worst_taylor, values.worst_linearised)
-        yield where, found or None
+def _worst(study: ModeStudy) -> dict[str, dict[str, float] | None]:
+    """The largest errors of both expansions by where they were looked for."""
+    maps = (("over_q", study.over_q), ("over_design", study.over_design))
+    places = {"over_time": study.over_time, **{k: m.values if m else None for k, m in maps}}
+    return {
+        k: {"taylor": at.worst_taylor, "linearised": at.worst_linearised} if at else None
+        for k, at in places.items()
+    }
 
 
 # --- As JSON

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import is_bare
-from eigassign.facts import OF_ROW, Fact, capital, fact, number, percent, seconds, value_of
+from eigassign.facts import OF_ROW, Fact, capital, fact, number, percent, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,
@@ -68,16 +68,19 @@ def facts_table(
     that are called something else here.
     """
     kind: Any = type(rows[0]) if rows else None
-    told = [(name, fact(kind, name)) for name in names.split() if rows]
-    cells = [[one.text(_value(row, name, one)) for row in rows] for name, one in told]
-    shown = [k for k, column in enumerate(cells) if any(column)]
-    columns = tuple(headings.get(told[k][0], told[k][1].column) for k in shown)
-    return Table(title, columns, tuple(zip(*(cells[k] for k in shown), strict=True)), caption)
+    facts = {name: fact(kind, name) for name in names.split() if rows}
+    cells = {k: [one.text(_value(row, k, one)) for row in rows] for k, one in facts.items()}
+    shown = {name: column for name, column in cells.items() if any(column)}
+    columns = tuple(headings.get(name, facts[name].column) for name in shown)
+    return Table(title, columns, tuple(zip(*shown.values(), strict=True)), caption)
 
 
 def _value(row: Any, name: str, one: Fact) -> Any:
-    found = value_of(row, name)
-    return found / row.handy[1] if one.unit == OF_ROW and found is not None else found
+    """The value of a fact in its row; None where there is nothing to have it."""
+    size, found = row.handy[1] if one.unit == OF_ROW else 1.0, row
+    for own in name.split("."):
+        found = None if found is None else getattr(found, own)
+    return found if size == 1.0 or found is None else found / size
 
 
 def run_tables(results: RunResults) -> tuple[Table, ...]:

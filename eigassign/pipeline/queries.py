@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.modal.exact.roundoff import rounding_error
@@ -32,18 +34,22 @@ from eigassign.study.updating.measured import read_measurements
 Floats = NDArray[np.float64]
 
 
+Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
+TooHigh = Annotated[list[Share] | None, Fact("at most", optional=True, may_lack=True)]
+
+
 @dataclass(frozen=True)
 class ModesAnswer:
     """Exact frequencies (Hz) of the lowest elastic modes; rigid-body modes are only counted."""
 
     rigid_modes: int
-    frequencies_hz: list[float]
-    q: tuple[tuple[str, float], ...]  # where: name and value, SI
-    y: tuple[tuple[str, float], ...]
-    where: str  # "q1 = 1.8 rad, m1 = 0.125 kg"
-    truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
-    discretisation_error: list[float] | None = None  # of the mesh: likewise; infinite: too coarse
-    round_off: float = 0.0  # of all of these, relative, at most; infinite: not known
+    frequencies_hz: list[Hertz]
+    q: Where  # name and value, SI
+    y: Where
+    where: Key  # "q1 = 1.8 rad, m1 = 0.125 kg"
+    round_off: Annotated[Share, Fact("at most; infinite: not known", may_lack=True)] = 0.0
+    discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
+    truncation_error: TooHigh = None  # of reduced links
 
 
 @dataclass(frozen=True)
@@ -158,9 +164,9 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         tuple(zip(model.q_names, q.tolist(), strict=True)),
         tuple(zip(model.y_names, y.tolist(), strict=True)),
         ", ".join(shown_point(*point) for point in named if point[0]),
-        None if lost is None else lost.tolist(),
-        None if coarse is None else coarse.tolist(),
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
+        None if coarse is None else coarse.tolist(),
+        None if lost is None else lost.tolist(),
     )
 
 

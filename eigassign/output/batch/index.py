@@ -11,14 +11,13 @@ from typing import Any
 from urllib.parse import quote
 
 from eigassign._version import __version__
-from eigassign.facts import number, percent, seconds
+from eigassign.facts import fact, number
 from eigassign.output.batch.columns import quantity
 from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.pages import TEMPLATES, inside, page_of
 
 _STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
 _TAIL = re.compile(r"(?<![^.])(?:[0-9]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")  # in linear time
-_ERRORS = {"worst before": "initial_max_relative", "worst after": "exact_max_relative"}
 
 
 class Index:
@@ -74,17 +73,11 @@ def _columns(
     several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
     short = {key if tail in several else tail: key for key, tail in tails.items()}
     found: list[tuple[str, Callable[[CaseOutcome], Cell]]] = [
-        ("case", lambda row: row.name),
+        _fact("name"),
         *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in short.items()),
-        ("status", lambda row: row.status),
-        ("verdict", lambda row: row.verdict.replace("_", " ")),
-        *(
-            (name, lambda row, of=of: _cell(getattr(row, of), percent))
-            for name, of in _ERRORS.items()
-        ),
-        ("message", lambda row: row.message),
+        *map(_fact, ("status", "verdict", "initial_max_relative", "exact_max_relative", "message")),
         *((n, lambda row, n=n: _cell(dict(row.design).get(n), number)) for n in designs),
-        ("time", lambda row: (seconds(row.seconds), row.seconds)),
+        _fact("seconds"),
     ]
     kept = ("case", "status")
     return [
@@ -102,8 +95,15 @@ def _value(value: Any) -> Cell:
     return str(value) if amount is None else (str(value), amount)
 
 
-def _cell(value: float | None, words: Callable[[float], str]) -> Cell:
-    return ("", None) if value is None else (words(value), value)
+def _fact(name: str) -> tuple[str, Callable[[CaseOutcome], Cell]]:
+    one = fact(CaseOutcome, name)
+    return one.heading, lambda row: _cell(getattr(row, name), one.text)
+
+
+def _cell(value: float | str | None, words: Callable[[Any], str]) -> Cell:
+    if value is None or isinstance(value, str):
+        return ("", None) if value is None else words(value)
+    return words(value), value
 
 
 def _links(row: CaseOutcome, folder: Path) -> list[str]:

@@ -42,7 +42,7 @@ class CaseOutcome:
     exact_max_relative: Annotated[Share | None, Fact(heading="worst after")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
     frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
-    verdict: str = ""
+    verdict: Annotated[str, Fact(digits=lambda word: word.replace("_", " "))] = ""
     values: Mapping[str, Any] = field(default_factory=dict)
     index: Annotated[int, Fact("place in the batch")] = 0
     key: Annotated[str, Fact("of what was computed")] = ""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import handy_unit
 from eigassign.facts import capital, percent
 from eigassign.output.tables import violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
@@ -158,7 +157,7 @@ def _trust(results: RunResults) -> Iterator[str]:
 def _bars(results: RunResults) -> Iterator[Bar]:
     for row in results.design:
         width = row.upper - row.lower or 1.0
-        unit, size = handy_unit(row.unit, row.lower, row.upper, row.initial, row.optimal)
+        unit, size = row.handy
         start, end = (
             min(max((value - row.lower) / width, 0.0), 1.0) for value in (row.initial, row.optimal)
         )
