@@ -26,7 +26,7 @@ OF_ROW = "that of the row"  # the unit of numbers whose row has a field for it
 class Fact:
     """What is declared of a fact; of several in one type the outer ones say what they say.
 
-    ``words`` say what it is beyond its name, ``heading`` heads its column, ``unit`` is that of its
+    ``words`` say what its name does not, ``heading`` heads its column, ``unit`` is that of its
     numbers. ``digits`` is a format, or makes the text of a cell, which ``says_unit`` or does not;
     ``absent`` is that of None. In files it has another ``name`` where one is given; there None is
     left out of what is ``optional``, a number that is not finite is null where it ``may_lack``, and
@@ -147,11 +147,6 @@ def duration(value: float) -> str:
     return f"{value:.2g} s"
 
 
-def residual(value: float) -> str:
-    """Two digits and a power of ten: ``3.1e-17``."""
-    return f"{value:.1e}"
-
-
 def positive_percent(fraction: float) -> str:
     """The same of what counts above zero only."""
     return percent(max(fraction, 0.0))
@@ -163,6 +158,6 @@ Key = Annotated[str, Fact(is_key=True)]
 Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
 Hertz = Annotated[float, Fact(unit="Hz", digits=".6g")]
 Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]
-Residual = Annotated[float, Fact(digits=residual)]
+Residual = Annotated[float, Fact(digits=".1e")]
 InUnit = Annotated[float, Fact(unit=OF_ROW, digits=".6g")]
 Curve = Annotated[NDArray[np.float64], Fact(unit="Hz")]

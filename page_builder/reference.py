@@ -363,7 +363,7 @@ def held(node: Node) -> Iterator[str]:
     kinds = node.get("type", ())
     for kind in [kinds] if isinstance(kinds, str) else kinds:
         inner = [node.get("items", node.get("additionalProperties", {}))]
-        each = [word for one in node.get("prefixItems", inner) for word in held(one)]
+        each = [w for one in node.get("prefixItems", inner) for w in held(one) if w != "null"]
         of = f" of {', '.join(dict.fromkeys(each))}" if each else ""
         yield f"{PLURALS[kind]}{of}" if kind in PLURALS else WORDS.get(kind, kind)
 

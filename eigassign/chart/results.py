@@ -115,7 +115,7 @@ class ChartPoint:
     online: Annotated[Timing, Fact("one evaluation out of a large batch", "one evaluation")]
     solves: Annotated[int, Fact("exact eigensolves of the set-up")]
     solves_online: Annotated[float, Fact("exact eigensolves of one evaluation")]
-    everywhere: Errors
+    everywhere: Annotated[Errors, Fact("random and along the trajectory")]
     random: Annotated[Errors | None, Fact("over random samples of trajectory × design box")]
     trajectory: Annotated[Errors | None, Fact("at several designs", "worst along the trajectory")]
     break_even: Annotated[float | None, Fact(_BREAK_EVEN, "pays from", "", ",.0f", "never")]
@@ -158,27 +158,27 @@ class AutoTakes:
     """
 
     method: str | None = None
-    worst_relative: float | None = None
-    total_s: float | None = None
-    choosing_s: float = 0.0
-    refused: str = ""
+    worst_relative: RelativeError | None = None
+    total_s: Seconds | None = None
+    choosing_s: Seconds = 0.0
+    refused: Annotated[str, Fact("why it refuses")] = ""
 
 
 @dataclass(frozen=True)
 class Advice:
     """The cheapest method for an accuracy, or the most accurate for a budget."""
 
-    asked: str  # "accuracy" | "budget"
-    accuracy: float | None  # worst relative error in Hz
-    budget_s: float | None
+    asked: Annotated[str, Fact("accuracy or budget")]
+    accuracy: Annotated[Share | None, Fact("the worst relative error in Hz")]
+    budget_s: Seconds | None
     evaluations: float
-    method: str | None = None  # None: no charted method does it
+    method: Annotated[str | None, Fact("null: no charted method does it")] = None
     parameters: Mapping[str, Any] | None = None
-    worst_relative: float | None = None
-    total_s: float | None = None
-    words: str = ""
+    worst_relative: RelativeError | None = None
+    total_s: Annotated[Seconds | None, Fact("set-up and all evaluations")] = None
+    words: Annotated[str, Fact("the same in words")] = ""
     is_below_round_off: bool = False
-    auto: AutoTakes | None = None  # None: not looked at
+    auto: Annotated[AutoTakes | None, Fact("null: not looked at")] = None
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class DesignRun:
     objective: Annotated[float, Fact(digits=".6e")]
     max_relative: Annotated[Share, Fact("distance to the target in Hz, exact", "worst")]
     rms_relative: Annotated[Share, Fact(heading="rms")]
-    excess: Annotated[float, Fact("see `excess_over`", "above best", digits=".1e")]
+    excess: Annotated[float, Fact("over the best, relative", "above best", digits=".1e")]
     trace: Annotated[tuple[tuple[float, float], ...], Fact("seconds, the best F so far")] = ()
     note: str = ""
 
@@ -218,15 +218,15 @@ class Asked:
 
     modes: tuple[int, ...]
     n_dof: int
-    features: tuple[str, ...]  # what surrogates and grids are functions of
+    features: Annotated[tuple[str, ...], Fact("what surrogates and grids are functions of")]
     random_points: int
     designs: int
     samples_per_design: int
     trajectory_samples: int
-    evaluations: float  # what was asked for: the samples of one trajectory if nothing else
+    evaluations: Annotated[float, Fact("of one trajectory if nothing else is asked for")]
     seed: int
-    typical_hz: float
-    floor_hz: float  # what round-off does to exact answers: no error below it means anything
+    typical_hz: Hertz
+    floor_hz: Annotated[Hertz, Fact("round-off of exact answers: no error below it counts")]
 
 
 @dataclass(frozen=True)
@@ -239,17 +239,17 @@ class Chart:
     reference: str | None
     version: str
     quick: bool
-    machine: Mapping[str, Any]  # that the times were measured on
+    machine: Annotated[Mapping[str, Any], Fact("that the times were measured on")]
     asked: Asked
     points: tuple[ChartPoint, ...]
-    skipped: tuple[tuple[str, str], ...]  # method, why
+    skipped: Annotated[tuple[tuple[str, str], ...], Fact("method, why")]
     fronts: tuple[Front, ...]
     advice: tuple[Advice, ...]
     mesh: tuple[MeshRow, ...] = ()
     designs: tuple[DesignRun, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    seconds: float = 0.0
+    seconds: Annotated[Seconds, Fact("that the chart took")] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

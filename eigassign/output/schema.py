@@ -66,7 +66,7 @@ def _row(row: Any, may_lack: bool, found: dict[str, Any]) -> dict[str, Any]:
         properties["type"] = "object"
         properties["properties"] = {
             one.name or field: {
-                "description": one.words or one.heading,
+                "description": one.words or (one.name or field).replace("_", " "),
                 **({"unit": one.unit} if one.unit else {}),
                 **_schema(hints(row)[field], may_lack or one.may_lack, found),
             }

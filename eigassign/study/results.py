@@ -325,7 +325,7 @@ class ClearanceRow:
     label: Annotated[str, Fact("the band in words", "band")]
     below: Annotated[int, Fact("modes under it", "modes below")]
     clear: Annotated[bool, Fact(digits=lambda clear: "checked" if clear else "NO")]
-    room: Annotated[Share, Fact(heading="room at least", digits=positive_percent)]
+    room: Annotated[Share, Fact("relative to the edge", "room at least", digits=positive_percent)]
     counted: Annotated[bool, Fact("inertia confirmed the modes below at every sample")]
     raised: Annotated[Share | None, Fact(heading="model too high by", absent="not bounded")]
 

@@ -26,6 +26,8 @@ ROW = CaseOutcome(
     "arm", "arm.yaml", "ok", 0.1, frequencies=(("mode 1", 180.0, 190.0, 200.0),), verdict="reached"
 )
 
+UPDATED = b'{"schema": 1, "case": {"name": "arm"}, "parameters": {}, "not_identified": []}'
+
 
 def summary(path, *rows):
     cases = ", ".join(map(to_line, rows))
@@ -85,6 +87,17 @@ def test_a_run_compares_with_its_own_results_and_a_folder_of_runs_with_each(tmp_
         found = compared(place, now, 0.0)
         assert found.moves == []
         assert "compared: 2, new ones: 0" in found.table().caption
+
+
+def test_an_update_in_a_folder_of_runs_has_no_answer_to_compare(tmp_path):
+    results = make_results()
+    for name, data in (("arm", to_json(results)), ("arm_update", UPDATED)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "results.json").write_bytes(data)
+    found = compared(tmp_path, Known(results.case_name, frequency_ranges(results)))
+    assert found.moves == []
+    with pytest.raises(UsageError, match="has no frequencies"):
+        EarlierResult(tmp_path / "arm_update", "answers", 0.01)
 
 
 def validated(results, hz):

@@ -31,15 +31,15 @@ class CaseOutcome:
     target has along the trajectory at the answer.
     """
 
-    name: Annotated[str, Fact(heading="case")]
+    name: Annotated[str, Fact("of the case, and of its variant", "case")]
     path: Annotated[str, Fact("of the case file")]
     status: Status
     seconds: Annotated[Seconds, Fact(heading="time")]
     message: str = ""
     run_folder: Annotated[str | None, Fact("as seen from the folder of the batch")] = None
-    initial_max_relative: Annotated[Share | None, Fact(heading="worst before")] = None
+    initial_max_relative: Annotated[Share | None, Fact("largest error", "worst before")] = None
     predicted_max_relative: Share | None = None
-    exact_max_relative: Annotated[Share | None, Fact(heading="worst after")] = None
+    exact_max_relative: Annotated[Share | None, Fact("largest error", "worst after")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
     frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
     verdict: Annotated[str, Fact(digits=lambda word: word.replace("_", " "))] = ""

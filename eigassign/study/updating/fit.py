@@ -37,7 +37,10 @@ OUTLIER = 3.0  # standard deviations
 # --- Results
 
 Residual = Annotated[float, Fact("in standard deviations", digits="+.2f", name="residual")]
-Outlier = Annotated[bool, Fact(heading="remark", digits=lambda n: "outlier" * n, name="outlier")]
+Outlier = Annotated[
+    bool,
+    Fact("over three deviations", "remark", digits=lambda far: "outlier" * far, name="outlier"),
+]
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class UpdatedParameter:
     name: Key
     parameter: Annotated[str, Fact("its key path in the case file")]
     unit: str
-    initial: Annotated[InUnit, Fact(heading="before")]
+    initial: Annotated[InUnit, Fact("as the case file says", "before")]
     value: Annotated[InUnit, Fact("the one found", "after")]
     deviation: Annotated[InUnit | None, Fact("standard, while bounds hold", digits=".3g")]
     low: Annotated[InUnit, Fact("where its interval begins", "95 % from")]
@@ -78,15 +81,15 @@ class UpdatedParameter:
 class ExplainedMeasurement:
     """One measurement, and the model's frequency before and after, in Hz."""
 
-    label: Annotated[str, Fact(heading="measurement")]
+    label: Annotated[str, Fact("where it is written", "measurement")]
     trajectory: str | None
     time_s: Seconds | None
     q: tuple[float, ...]
     mode: int
     measured_hz: Hertz
     deviation_hz: Annotated[Hertz, Fact("standard", "±", digits=".3g")]
-    initial_hz: Annotated[Hertz, Fact(heading="before", digits=".5g")]
-    updated_hz: Annotated[Hertz, Fact(heading="after", digits=".5g")]
+    initial_hz: Annotated[Hertz, Fact("of the model", "before", digits=".5g")]
+    updated_hz: Annotated[Hertz, Fact("of the updated model", "after", digits=".5g")]
 
     @property
     def residual(self) -> Residual:
@@ -111,8 +114,8 @@ class UnidentifiedDirection:
 class FitRow:
     """The fit: χ² is the sum of squared residuals in standard deviations."""
 
-    initial_chi_squared: Annotated[float, Fact(heading="χ² before", digits=".4g")]
-    chi_squared: Annotated[float, Fact(heading="χ² after", digits=".4g")]
+    initial_chi_squared: Annotated[float, Fact("of the start", "χ² before", digits=".4g")]
+    chi_squared: Annotated[float, Fact("of the answer", "χ² after", digits=".4g")]
     degrees: Annotated[int, Fact(heading="degrees of freedom", name="degrees_of_freedom")]
     p_value: Annotated[float | None, Fact("chance of so large a χ²", "p", "", ".3g", "none")]
     steps: int
