@@ -54,14 +54,10 @@ class SummaryCsv:
     def add(self, row: CaseOutcome) -> None:
         """Write one line."""
         design = "; ".join([f"{name}={amount!r}" for name, amount in row.design])
-        line = (
-            cell(row.name),
-            *[cell(row.values.get(key)) for key in self._keys],
-            *(row.status, row.verdict, row.seconds),
-            *(row.initial_max_relative, row.predicted_max_relative, row.exact_max_relative),
-            *(cell(design), cell(row.message), cell(row.path), cell(row.run_folder)),
-        )
-        self._writer.writerow(line)  # floats as repr writes them, None as nothing
+        values = {**vars(row), "design": design}
+        first, *others = (cell(values[name]) for name in COLUMNS)
+        swept = (cell(row.values.get(key)) for key in self._keys)
+        self._writer.writerow((first, *swept, *others))  # floats as repr writes them, None as ""
 
 
 def cell(value: object) -> object:

@@ -252,17 +252,12 @@ def collect_update(
         covariance=found.covariance,
         measurements=tuple(
             ExplainedMeasurement(
-                each.label,
-                each.trajectory,
-                each.time_s,
-                tuple(each.q.tolist()),
-                each.mode,
-                each.hz,
-                each.deviation_hz,
-                float(found.initial_hz[k]),
-                float(found.hz[k]),
+                *(each.label, each.trajectory, each.time_s, tuple(each.q.tolist())),
+                *(each.mode, each.hz, each.deviation_hz, *hz),
             )
-            for k, each in enumerate(problem.measured)
+            for each, *hz in zip(
+                problem.measured, found.initial_hz.tolist(), found.hz.tolist(), strict=True
+            )
         ),
         unidentified=directions,
         fit=FitRow(
