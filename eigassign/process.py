@@ -59,7 +59,9 @@ def failure_of(error: BaseException) -> Failure:
             named = f"{error.filename}: {reason}" if error.filename else reason
             return Failure(STORAGE, f"error: {named}")
         case MemoryError():
-            return Failure(STORAGE, "error: out of memory")
+            return Failure(
+                STORAGE, "error: out of memory: fewer samples, modes or elements take less"
+            )
         case _:
             return Failure(BUG, _internal(error))
 

@@ -315,6 +315,8 @@ def limits(results: RunResults) -> Table:
 def reach(results: RunResults) -> Table:
     """The range of each target's curve within the bounds, over all samples."""
     caption = "Over all designs within the bounds, at any sample; proved."
+    if any(row.how == "bounded" for row in results.meaning.reach):
+        caption += " Distances of two modes lie between these, and need not reach them."
     rows, names = results.meaning.reach, "label lowest_hz highest_hz error"
     return facts_table("Reach", rows, names, caption, error="least error")
 

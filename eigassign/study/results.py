@@ -421,7 +421,8 @@ class RelaxedRow:
 class RangeRow:
     """Between what values (n,) in Hz a target's curve lies over some designs; ``error`` over them.
 
-    ``how``: proved (nothing lies outside), sampled, or followed (a followed mode at the corners).
+    ``how``: proved (nothing lies outside, both ends are reached), bounded (nothing lies outside),
+    sampled, or followed (a followed mode at the corners).
     """
 
     label: Annotated[str, Fact("the target in words", "target")]

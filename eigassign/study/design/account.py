@@ -12,6 +12,7 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.answer import MAX_ERROR, Answer
+from eigassign.study.design.clearance import error_between
 from eigassign.study.design.conclusions import extreme, is_proved
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.design.verdict import Facts, verdict
@@ -31,6 +32,7 @@ from eigassign.study.results import (
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+LIMIT = 1e-4  # of a limit, by which it may be missed between samples
 UNTRUSTED = "the expansion is further from exact than validation.max_error allows"
 FINER = "give the links more elements, raise reduce_to, or write auto"
 
@@ -72,6 +74,7 @@ def assignment_row(
             doubts=() if trusted else (UNTRUSTED,),
             unproved=(
                 *((_too_coarse(raised, largest),) if coarse else ()),
+                *_missed_between(scene, answer.y, targets, largest),
                 *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=unreachable,
@@ -113,6 +116,20 @@ def assignment_row(
         limits=limits,
         shortcoming=said.shortcoming,
     )
+
+
+def _missed_between(
+    scene: Scene, y: Floats, targets: Sequence[TargetStudy], accepted: float
+) -> Iterator[str]:
+    """Say which targets are missed between samples that are far apart, by how much at worst."""
+    q = scene.path.at(y)[0]
+    for one in (target.asked for target in targets if target.satisfied):
+        error = error_between(scene.model, one, q, y)
+        if error > (accepted if one.is_goal else LIMIT):
+            yield (
+                f"{one.label} is missed by {100 * error:.3g} % between the samples, which are far "
+                "apart: give the trajectory more of them"
+            )
 
 
 def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
@@ -244,6 +261,8 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     count = len(found.optima)
     which = f"best of {count} local optima" if count > 1 else "only local optimum"
     words = f"the {which} from {many}"
+    if found.untried:
+        words += f"; {found.untried} choices of the numbers of modes below the bands were not tried"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
     return OptimalityRow("local", best.stationarity, None, words)

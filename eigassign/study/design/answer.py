@@ -31,6 +31,7 @@ from eigassign.study.design.optimum import Found, find_optimum
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+SAID = 5  # choices of the numbers of modes below the bands whose outcome is told
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 
@@ -95,7 +96,8 @@ def find_answer(
         search = one_shot.search
         starts = [one_shot.y] if search is None else [one.y for one in search.best]
     found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
-    contradiction = conflict(found, catalogues(scene.file), scene.file.assignment.steps)
+    steps = scene.file.assignment.steps
+    contradiction = conflict(found, catalogues(scene.file), steps, scene.limits)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
     notes += _band_notes(found)
     if found.lost:
@@ -106,7 +108,12 @@ def find_answer(
 
 def _band_notes(found: Found) -> Iterator[str]:
     """Say what came of each number of modes below the bands, where there was a choice."""
-    for one in found.variants if len(found.variants) > 1 else ():
+    if found.untried:
+        yield (
+            f"of {len(found.variants) + found.untried} choices of the numbers of modes below the "
+            f"bands the {len(found.variants)} likeliest were tried"
+        )
+    for one in found.variants[:SAID] if len(found.variants) > 1 else ():
         choice = ", ".join(f"{band} with {k} below it" for band, k in one.variant.below)
         best, missed = one.optima[0], one.optima[0].seen.violation
         how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {best.objective:.6g}"

@@ -33,6 +33,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MOST = 12  # limits of which the smallest contradiction is looked for
+ENOUGH = 100  # steps of a search that nobody has asked to end sooner; most take under 20
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
 SAME = 1e-9  # of the merit: a design this little worse is as good
 
@@ -47,6 +48,8 @@ def is_proved(scene: Scene, found: Found) -> bool:
     minimised then, from the answer.
     """
     best, asked = found.best, found.variant.requirements
+    if found.variant.below:  # bands leave a choice, and what is convex is so for each alone
+        return False
     if best.seen.violation <= MET:
         return best.stationarity <= OPTIMAL and not asked.goals and _are_convex(scene, asked)
     if not _are_convex(scene, asked):
@@ -80,26 +83,41 @@ class Conflict:
     smallest: bool
 
 
-def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Conflict | None:
+def conflict(
+    found: Found,
+    listed: Sequence[ListedValues],
+    steps: int,
+    of_design: Sequence[LimitedQuantity],
+) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
-    Each trial starts at the compromise, and searches the catalogues ``listed``.
+    Each trial starts at the compromise, and searches the catalogues ``listed``, for each choice of
+    the numbers of modes below the bands. Of a search that was ended, or that left out some of these
+    choices, nothing but limits that need no frequency can be said to contradict.
     """
     best, asked = found.best, found.variant.requirements
-    if best.seen.violation <= MET or best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
+    if best.seen.violation <= MET:
         return None
     owners = [asked.owner(int(k))[0] for k in np.flatnonzero(best.seen.excess > MET)]
     missed = tuple(dict.fromkeys(owners))
-    names = found.variant.limit_names
-    if len(names) > MOST:
+    names, steps = found.variant.limit_names, max(steps, ENOUGH)
+    open_ = found.untried or best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED)
+    if open_:
+        names = tuple(one.name for one in of_design if one.name in names)
+    elif len(names) > MOST:
         return Conflict(missed, False)
     answers: list[bool | None] = []
 
-    def contradict(rest: list[str]) -> bool:
-        met = not rest or _can_be_met(found.variant.with_limits(rest), listed, best.y, steps)
+    def contradict(rest: Sequence[str]) -> bool:
+        bands = {one.name for one in asked.limits if one.part_of}.intersection(rest)
+        variants = [one.variant for one in found.variants] if bands else [found.variant]
+        each = (_can_be_met(one.with_limits(rest), listed, best.y, steps) for one in variants)
+        met = not rest or next((told for told in each if told is not False), False)
         answers.append(met)
         return met is False
 
+    if open_ and not contradict(names):
+        return None
     needed = smallest(names, contradict)
     return Conflict(missed, False) if None in answers else Conflict(tuple(needed), True)
 
@@ -115,7 +133,7 @@ def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
     alone, none = Requirements((limit,), np.ones(1)), np.zeros((1, 0))
     unasked = Frequencies(none, np.zeros((1, 0, n)))
     problem = DesignProblem(lambda y: alone.appraise(y, unasked), lower, upper)
-    best = minimise(problem, y, scene.file.assignment.steps)
+    best = minimise(problem, y, max(scene.file.assignment.steps, ENOUGH))
     return None if best.seen.violation <= MET else limit.amount(best.y)
 
 

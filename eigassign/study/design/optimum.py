@@ -5,7 +5,6 @@ Every problem that the targets make (`variants`) is tried from several starts, a
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import monotonic
@@ -31,7 +30,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-VARIANTS = 24  # at most, the likeliest
+VARIANTS = 24  # tried at most, the likeliest: of more it is said how many were left out
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,7 @@ class Found:
     exact_solves: int
     chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
     lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
+    untried: int = 0  # choices of the numbers of modes below the bands
 
     @property
     def best(self) -> Optimum:
@@ -77,11 +77,14 @@ def find_optimum(
     deadline = np.inf if seconds is None else monotonic() + seconds
     designs = [scene.initial, *starts][: most_starts(scene.file)]
     models = None if followed_modes(scene.file) else reduced_models(scene)
+    found: Found | None = None
     for _ in range(5):  # each time drawn in by twice the room that was lacking
         task = Task(scene, tuple(wanted), margin)
-        found = _best_variant(task, coarse_to_fine(task, models), designs, deadline, progress)
-        lacking = wanting(found.clearances)
-        met = found.best.seen.violation <= MET
+        other = _best_variant(task, coarse_to_fine(task, models), designs, deadline, progress)
+        met = other.best.seen.violation <= MET
+        if found is not None and not met:  # of limits that are drawn in: they may be met as asked
+            break
+        found, lacking = other, wanting(other.clearances)
         if lacking == 0.0 or not met or found.best.end in (End.SECONDS, End.INTERRUPTED):
             break
         designs, margin = [found.best.y], margin + 2.0 * lacking + MARGIN
@@ -101,9 +104,9 @@ def _best_variant(
     one that misses them least, relative to the limits.
     """
     scene, listed = task.scene, catalogues(task.scene.file)
-    counts = (possible_counts(scene, band) for band in task.bands)
+    choices = possible_counts(scene, task.bands)
     tried: list[Searched] = []
-    for below in itertools.islice(itertools.product(*counts), VARIANTS):
+    for below in choices[:VARIANTS]:
         if listed:
             tried.append(_search_catalogues(task, below, listed, starts, deadline, progress))
         else:
@@ -123,6 +126,7 @@ def _best_variant(
         exact_solves=sum(one.exact_solves for one in tried) + len(scene.path.q),
         chosen=variants[0].chosen,
         lost=tuple(dict.fromkeys(line for one in tried for line in one.lost)),
+        untried=len(choices) - len(tried),
     )
 
 

@@ -7,7 +7,8 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import itertools
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,6 +30,7 @@ from eigassign.study.design.response import DesignResponse, ReducedModels, respo
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them in order
 
 
 @dataclass(frozen=True)
@@ -151,23 +153,36 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     return PosedProblem(tuple(named), requirements, problem, response)
 
 
-def possible_counts(scene: Scene, band: ForbiddenBand) -> list[int]:
-    """Each k that may be, from the fewest modes below the band to the most, at designs all over.
+def possible_counts(scene: Scene, bands: Sequence[ForbiddenBand]) -> list[tuple[int, ...]]:
+    """Each choice of k for all bands that may be, by designs all over the bounds.
 
-    The likeliest comes first.
+    Of a band every k from the fewest modes below it to the most. The likeliest choices come first:
+    those that designs are nearest to, then the others by their distance from these.
     """
+    if not bands:
+        return [()]
     lower, upper = scene.bounds
     designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
     if len(lower):
         designs += list(spread_designs(scene, 8, 1))
-    found = []
+    ranges, medians = [], []
     for y in designs:
         with suppress(EigassignError):
-            q = scene.path.at(y)[0][band.rows]
-            found.append(band.below(_all_below(scene, q, y, float(band.upper.max()))))
-    first, counts = int(np.median(found[0])), np.array(found)
-    possible = range(int(counts.min()), int(counts.max()) + 1)
-    return sorted(possible, key=lambda k: (abs(k - first), k))
+            q, own = scene.path.at(y)[0], []
+            for band in bands:
+                hz = _all_below(scene, q[band.rows], y, float(band.upper.max()))
+                own.append(band.below(hz))
+            ranges.append([(k.min(), k.max()) for k in own])
+            medians.append([int(np.median(k)) for k in own])
+    least, most = np.min(ranges, axis=0)[:, 0], np.max(ranges, axis=0)[:, 1]
+    near = np.array(list(dict.fromkeys(map(tuple, medians))))
+
+    def rank(choice: tuple[int, ...]) -> tuple[int, int, tuple[int, ...]]:
+        away = np.abs(near - choice).sum(axis=1)
+        return int(away.min()), int(away.argmin()), choice
+
+    each = (range(int(low), int(high) + 1) for low, high in zip(least, most, strict=True))
+    return sorted(itertools.islice(itertools.product(*each), MOST_CHOICES), key=rank)
 
 
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:

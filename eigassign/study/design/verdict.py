@@ -81,8 +81,6 @@ def _word(facts: Facts) -> tuple[str, str]:
         return "reached", "every target is met"
     (before_violation, before), (violation, after) = facts.merits
     if violation > MET:
-        if violation < (1.0 - IMPROVED) * before_violation:
-            return "improved", f"nearer to what is asked, which is not met: {_all(far)}"
         return "do_not_use", f"no design was found that meets what is asked: {_all(far)}"
     if before_violation > MET or after < (1.0 - IMPROVED) * before:
         though = "" if worst is None else _though(worst)

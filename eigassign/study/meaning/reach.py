@@ -11,10 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from time import monotonic
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
@@ -23,8 +26,11 @@ from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
+from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
-from eigassign.study.design.response import response_of
+from eigassign.study.design.one_shot import catalogues
+from eigassign.study.design.response import DesignResponse, response_of
+from eigassign.study.design.variants import possible_counts
 from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
@@ -32,6 +38,8 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
 STEPS, STARTS = 30, 3  # of a search at one sample
+CHOICES, SECONDS = 8, 10.0  # of the numbers of modes below bands there; of a search of catalogues
+R = TypeVar("R", bound=Requirement)
 
 
 def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
@@ -54,7 +62,8 @@ def reach_rows(wanted: Sequence[Requirement], ranges: tuple[Solved, Solved]) -> 
     for w in wanted:
         if w.terms and w.followed is None:
             error = float(w.least_errors(*ranges).max())
-            yield RangeRow(w.label, *w.curve_range(*ranges), "proved", error)
+            how = "proved" if len(w.terms) == 1 else "bounded"
+            yield RangeRow(w.label, *w.curve_range(*ranges), how, error)
 
 
 def misses(wanted: Requirement, exact: Solved, max_error: float) -> bool:
@@ -84,30 +93,36 @@ def unreachable(
             continue
         allowed, errors = _allowed(w, max_error), w.errors(exact)
         known = ranges is not None and w.followed is None
+        others = [*scene.limits, *(one for one in wanted if not one.is_goal)] if w.is_goal else []
         if known and ranges is not None:
             left = w.least_errors(*ranges)
             k = int(left.argmax())
             if left[k] > allowed:
                 low, high = (float(values[k]) for values in w.curve_range(*ranges))
-                best = low if low > w.lower[k] else high
                 how = (
                     f"within the bounds it lies between {low:.4g} and {high:.4g} Hz there (proved)"
                 )
+                free = not (others or scene.constraints or scene.file.design.catalogues)
+                best: float | None = low if low > w.lower[k] else high
+                if not free or len(w.terms) > 1:  # the corners need not keep all limits
+                    best = _nearest(scene, w, others, k, y, allowed)
                 yield _words(scene, w, k, best, how)
                 continue
-        others = [*scene.limits, *(one for one in wanted if not one.is_goal)] if w.is_goal else []
-        if len(w.terms) == 1 and (others or not known):
+        if w.terms and (others or not known):
             yield from _searched(scene, w, others, y, errors, allowed)
 
 
-def _words(scene: Scene, wanted: Requirement, k: int, reached: float, how: str) -> str:
-    """The frequency that is reached at sample k of a target, and the one that was asked for."""
+def _words(scene: Scene, wanted: Requirement, k: int, reached: float | None, how: str) -> str:
+    """The frequency that is ``reached`` at sample k of a target, and the one that was asked for."""
     asked = float(wanted.hz[k])
-    most = "highest" if reached < asked else "lowest"
     curve = wanted.curve_name if len(wanted.terms) == 1 else f"the {wanted.axis}"
+    where = f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}"
+    if reached is None:
+        return f"{where}: {asked:.4g} Hz was asked; {how}"
+    most = "highest" if reached < asked else "lowest"
     return (
-        f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}: the {most} "
-        f"that {curve} reaches there is {reached:.4g} Hz; {asked:.4g} Hz was asked; {how}"
+        f"{where}: the {most} that {curve} reaches there is {reached:.4g} Hz; {asked:.4g} Hz was "
+        f"asked; {how}"
     )
 
 
@@ -139,41 +154,55 @@ def _nearest(
 ) -> float | None:
     """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
 
-    Within the linear limits and those of the ``others`` that hold at this sample. The search ends
-    with the first start that leads within ``allowed`` of it. None where none leads to a design
-    within the limits.
+    Within the linear limits and those of the ``others`` that hold at this sample, and of catalogues
+    by a search of their tree. The search ends with the first start that leads within ``allowed`` of
+    it. None where none leads to a design within the limits.
     """
     lower, upper = scene.bounds
     if not constraints_agree(scene.constraints, Bounds(lower, upper)):
         return None
     at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
     there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal)
-    of_modes = (one for one in others if one.mode_terms)  # a band has none: it leaves a choice
-    beside = [_at(one, at) for one in of_modes if one.rows.start <= at < one.rows.stop]
-    of_design = (one for one in others if one.terms and not one.mode_terms)
-    elastic = (one for one in of_design if one.constraint is None)
-    asked = Requirements((there, *beside, *elastic), np.ones(1))
+    beside = [_at(one, at) for one in others if one.mode_terms and _holds(one, at)]
+    elastic = [one for one in others if not one.mode_terms and one.terms and not one.constraint]
     alone = replace(scene, trajectory=scene.path.chosen([at]))
-    followed = [replace(there, followed=wanted.followed), *beside]
-    response = response_of(alone, asked.modes, followers(alone, followed))
-    problem = DesignProblem(
-        lambda y: asked.appraise(y, response(y)), lower, upper, scene.constraints
-    )
-    found = []
-    for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
-        try:
-            best = minimise(problem, start, STEPS)
-        except EigassignError:
-            continue
-        if best.seen.violation > MET:
-            continue
-        found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal[0]))
-        if found[-1][0] <= allowed:
-            break
+    bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
+    followed = followers(alone, [replace(there, followed=wanted.followed), *beside])
+    listed, found = catalogues(scene.file), []
+    for below in possible_counts(alone, bands)[:CHOICES]:
+        kept = []
+        for band, n in zip(bands, below, strict=True):
+            above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)
+            kept += band.kept_clear(n, above, 0.0)
+        asked = Requirements((there, *beside, *elastic, *kept), np.ones(1))
+        problem = _problem(alone, asked, response_of(alone, asked.modes, followed))
+        for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
+            try:
+                if listed:
+                    chosen = choose(problem, listed, [start], STEPS, monotonic() + SECONDS)
+                    best = chosen.optima[0]
+                else:
+                    best = minimise(problem, start, STEPS)
+            except EigassignError:
+                continue
+            if best.seen.violation > MET:
+                continue
+            found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal[0]))
+            if found[-1][0] <= allowed:
+                return float(found[-1][1])
     return float(min(found)[1]) if found else None
 
 
-def _at(one: Requirement, at: int) -> Requirement:
+def _problem(scene: Scene, asked: Requirements, response: DesignResponse) -> DesignProblem:
+    lower, upper = scene.bounds
+    return DesignProblem(lambda y: asked.appraise(y, response(y)), lower, upper, scene.constraints)
+
+
+def _holds(one: Requirement, at: int) -> bool:
+    return one.rows.start <= at < one.rows.stop
+
+
+def _at(one: R, at: int) -> R:
     """A requirement at one of its samples, which is the only one there is."""
     own = slice(at - one.rows.start, at - one.rows.start + 1)
     return replace(one, rows=slice(0, 1), lower=one.lower[own], upper=one.upper[own], along=())

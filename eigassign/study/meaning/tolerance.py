@@ -81,21 +81,29 @@ def _rows(
 ) -> ToleranceRows:
     errors = [float(w.worst_errors(lowest, highest).max()) for w in wanted]
     rows = tuple(
-        RangeRow(w.label, *w.curve_range(lowest, highest), how, error)
+        RangeRow(w.label, *w.curve_range(lowest, highest), _how(w, how), error)
         for w, error in zip(wanted, errors, strict=True)
     )
     pairs = list(zip(wanted, errors, strict=True))
     own = [pair for pair in pairs if pair[0].is_goal] or pairs
     before = max(float(np.abs(w.errors(exact)).max()) for w, _ in own)
     after = max(error for _, error in own)
-    tried = {"proved": "proved", "followed": "the worst of both corners"}.get(
-        how, f"the worst of {DRAWS} draws"
-    )
+    said = "bounded" if any(row.how == "bounded" for row in rows) else how
+    tried = {
+        "proved": "proved",
+        "bounded": "at most",
+        "followed": "the worst of both corners",
+    }.get(said, f"the worst of {DRAWS} draws")
     words = (
         f"with every tolerance at its worst: worst error {100 * before:.3g} → "
         f"{100 * after:.3g} % ({tried})"
     )
     return ToleranceRows(rows, before, after, words)
+
+
+def _how(wanted: Requirement, how: str) -> str:
+    """Corners bound each of two modes, whose distance need not reach what these bounds leave."""
+    return "bounded" if how == "proved" and len(wanted.terms) > 1 else how
 
 
 def _exact(scene: Scene, own: Sequence[Follower]) -> Ranges:
