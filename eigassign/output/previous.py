@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from eigassign.case.schema.targets import TARGETS
 from eigassign.errors import UsageError
-from eigassign.facts import Fact, Hertz
+from eigassign.facts import Fact
 from eigassign.files import STORED, json_value, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
 from eigassign.output.tables import Table, facts_table
@@ -53,7 +53,7 @@ class Moved:
     what: str
     before: str
     now: str
-    hz: Annotated[Hertz | None, Fact(heading="moved by", digits="+.4g")] = None
+    hz: Annotated[float | None, Fact(heading="moved by", digits=lambda hz: f"{hz:+.4g} Hz")] = None
 
     def __str__(self) -> str:
         by = "" if self.hz is None else f", moved by {self.hz:+.4g} Hz"
