@@ -48,7 +48,7 @@ class DesignStiffness:
         """r_t (n_terms, n): θ at (q, y), ``scaled`` at that y, ``turned`` at (q, y0)."""
         now = np.concatenate([theta[self.still_terms], scaled[self.moving_terms]])
         before = turned[np.concatenate([self.still_terms, self.moving_terms])]
-        return np.divide(now, before, out=np.ones_like(now), where=before != 0.0)
+        return np.asarray(np.divide(now, before, out=np.ones_like(now), where=before != 0.0))
 
     def softer_shapes(self, ratio: Floats) -> tuple[Floats, Floats]:
         """α relative to each point (n_points, n, 1); Σ r_t e_t of its shapes (n_points, n, c)."""

@@ -71,23 +71,27 @@ def find_optimum(
 
     Bands to keep out of are checked (`clearance`): where modes come too near between the samples,
     the limits at the samples are drawn in by what is lacking, and the answer is sought anew from
-    where it was.
+    where it was. It stays as it was where limits that are drawn in so far cannot be met.
     """
     seconds, margin = scene.file.assignment.seconds, MARGIN
     deadline = np.inf if seconds is None else monotonic() + seconds
     designs = [scene.initial, *starts][: most_starts(scene.file)]
     models = None if followed_modes(scene.file) else reduced_models(scene)
-    found: Found | None = None
-    for _ in range(5):  # each time drawn in by twice the room that was lacking
+
+    def sought(designs: Sequence[Floats], margin: float) -> Found:
         task = Task(scene, tuple(wanted), margin)
-        other = _best_variant(task, coarse_to_fine(task, models), designs, deadline, progress)
-        met = other.best.seen.violation <= MET
-        if found is not None and not met:  # of limits that are drawn in: they may be met as asked
+        return _best_variant(task, coarse_to_fine(task, models), designs, deadline, progress)
+
+    found = sought(designs, margin)
+    for _ in range(4):  # each time drawn in by twice the room that was lacking
+        lacking, ended = wanting(found.clearances), (End.SECONDS, End.INTERRUPTED)
+        if not lacking or found.best.seen.violation > MET or found.best.end in ended:
             break
-        found, lacking = other, wanting(other.clearances)
-        if lacking == 0.0 or not met or found.best.end in (End.SECONDS, End.INTERRUPTED):
+        margin += 2.0 * lacking + MARGIN
+        other = sought([found.best.y], margin)
+        if other.best.seen.violation > MET:
             break
-        designs, margin = [found.best.y], margin + 2.0 * lacking + MARGIN
+        found = other
     return found
 
 

@@ -199,7 +199,7 @@ def _problem(scene: Scene, asked: Requirements, response: DesignResponse) -> Des
 
 
 def _holds(one: Requirement, at: int) -> bool:
-    return one.rows.start <= at < one.rows.stop
+    return bool(one.rows.start <= at < one.rows.stop)
 
 
 def _at(one: R, at: int) -> R:
