@@ -40,7 +40,7 @@ from eigassign.study.updating.fit import UpdateResults
 
 T = TypeVar("T")
 Floats = NDArray[np.float64]
-SCHEMA = 1  # of results.json: raised when a field goes or means something else
+SCHEMA = 2  # of results.json: raised when a field goes or means something else
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
 
 # --- What results.json holds
