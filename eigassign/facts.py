@@ -94,7 +94,7 @@ def fact(row: Any, name: str) -> Fact:
 
 
 def _parts(kind: Any) -> Iterator[Any]:
-    """What an optional or annotated type is made of, declarations too, the innermost first."""
+    """The parts of an optional or annotated type, declarations too, the innermost first."""
     if get_origin(kind) in (Annotated, Union, UnionType):
         for part in get_args(kind):
             yield from _parts(part)

@@ -126,7 +126,7 @@ class ChartPoint:
 
     @property
     def exact_solves(self) -> str:
-        """How many it takes, of set-up and of an evaluation."""
+        """The exact solves of the set-up, and of an evaluation."""
         each = f" + {self.solves_online:.2g} each" if self.solves_online else ""
         return f"{self.solves}{each}"
 

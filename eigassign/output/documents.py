@@ -60,7 +60,7 @@ class CaseDocument:
 
 
 @dataclass(frozen=True)
-class Document:
+class OriginDocument:
     """The beginning of results.json."""
 
     schema: Annotated[int, Fact("raised when a field goes or means something else")]
@@ -100,7 +100,7 @@ class ModeDocument:
 
 @dataclass(frozen=True)
 class TargetDocument:
-    """What is asked, and what became of it."""
+    """A target, and what became of it."""
 
     kind: Annotated[str, Fact("the key of the case file: frequency, at_least, keep_out, …")]
     label: Annotated[str, Fact("what is asked, in words")]
@@ -117,7 +117,7 @@ class TargetDocument:
 
 @dataclass(frozen=True)
 class SensitivityDocument:
-    """How the targets change with one parameter."""
+    """Changes of the targets with one parameter."""
 
     unit: str
     targets: Sequence[SensitivityRow]
@@ -147,7 +147,7 @@ class CoordinateDocument:
 
 @dataclass(frozen=True)
 class MotionDocument:
-    """All samples, of several trajectories one after the other."""
+    """The samples, of several trajectories one after the other."""
 
     time_s: Annotated[Floats, Fact("from the start of its trajectory", unit="s")]
     trajectory: OfSamples
@@ -167,8 +167,8 @@ class TrajectoryDocument:
 
 
 @dataclass(frozen=True)
-class RunDocument(Document):
-    """What a run found; what it did not ask for is null or empty."""
+class RunDocument(OriginDocument):
+    """A run; what it did not ask for is null or empty."""
 
     design: Annotated[Mapping[str, DesignRow], Fact("by parameter, in the order of the case")]
     mass: MassRow | None
@@ -244,11 +244,11 @@ def run_document(results: RunResults) -> RunDocument:
     )
 
 
-def beginning(results: RunResults | UpdateResults) -> Document:
+def beginning(results: RunResults | UpdateResults) -> OriginDocument:
     """The version and the case, by its hash, that the numbers are of."""
     name, title, reference = results.case_name, results.title, results.reference
     case = CaseDocument(name, title, reference, results.case_sha256, results.case_files)
-    return Document(SCHEMA, results.version, case)
+    return OriginDocument(SCHEMA, results.version, case)
 
 
 def _target(results: RunResults, target: TargetStudy) -> TargetDocument:
@@ -307,7 +307,7 @@ def _worst(study: ModeStudy) -> dict[str, dict[str, float] | None]:
 
 
 def results_document(results: RunResults) -> dict[str, Any]:
-    """What results.json holds as plain values, arrays as they are."""
+    """The content of results.json as plain values, arrays as they are."""
     return dict(document(run_document(results)))
 
 

@@ -100,7 +100,7 @@ def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
 ) -> tuple[tuple[Expansion, Expansion], bool]:
-    """Both expansions about one point, and True where they come from the cache."""
+    """The two expansions about one point, and True where they come from the cache."""
     one = replace(plan, more_q=())
     if cache is None or expansion_size(model, one).seconds < cache.least_s:
         return _made(model, plan, full_order), False

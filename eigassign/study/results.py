@@ -257,7 +257,7 @@ class SolverRow:
 
 @dataclass(frozen=True)
 class OptimalityRow:
-    """How far the answer is known to be optimal."""
+    """The extent to which the answer is known to be optimal."""
 
     kind: Annotated[str, Fact("proved, bounded or local")]
     stationarity: Annotated[float | None, Fact("what remains of the first-order conditions")]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Rung:
-    """What may be chosen: its error, relative in Hz, and all that was tried so far in words."""
+    """A choice: its error, relative in Hz, and all that was tried so far in words."""
 
     error: NDArray[np.float64]  # (n, n_modes) at the samples, or (n_modes,) the largest of them
     reasons: tuple[str, ...]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eigassign.facts import Fact
 from eigassign.output import documents
-from eigassign.output.documents import Document, dumps
+from eigassign.output.documents import OriginDocument, dumps
 from eigassign.output.figures.update import update_figures
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
@@ -119,8 +119,8 @@ def write_update(
 
 
 @dataclass(frozen=True)
-class UpdateDocument(Document):
-    """What an update found."""
+class UpdateDocument(OriginDocument):
+    """An update as its file of results has it."""
 
     verdict: Annotated[str, Fact("fitted, poor_fit, not_identified or unfinished")]
     headline: Annotated[str, Fact("the verdict in words")]
