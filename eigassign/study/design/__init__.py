@@ -6,12 +6,12 @@ Reading order:
     one_shot     the paper's answer: one quadratic program about one expansion point
     response     frequencies along the trajectory and their slopes in the design
     judgement    what a design does to the targets
-    clearance    proof that a band stays clear of modes all along a trajectory
+    clearance    whether a band stays clear of modes all along a trajectory
     variants     the problems that the targets make, one for each choice that bands leave
     starts       the local optima of one of them, from several starts
     optimum      the design that meets the targets best, by the sequential method
     conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
     answer       the answer by either method
-    verdict      the word for it, its reason and the exit code, of the facts alone
+    verdict      the word for it, its reason and shortcoming, of the facts alone
     account      these facts, how the answer was found, and what holds it back
 """

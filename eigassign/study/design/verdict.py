@@ -6,7 +6,9 @@ In this order, the first that holds:
     do_not_use     numbers of the answer cannot be vouched for
     unreachable    a target is out of reach whatever the design
     infeasible     limits contradict, some of them on frequencies
+    do_not_use     every target seems to be met, and that cannot be vouched for
     reached        every target is met and every limit kept, to the accuracy that is accepted
+    do_not_use     limits are not met
     improved       better than the initial design
     do_not_use     no better than that
 """
