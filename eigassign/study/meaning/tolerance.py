@@ -2,13 +2,15 @@
 
 Where all frequencies are monotone in every parameter that has a tolerance (`monotone`), two
 corners bound them exactly. The other parameters are drawn from their ranges by a Sobol sequence,
-each draw with the monotone ones at both corners. Models of many unknowns are evaluated by a reduced
-model about the answer then, and its own estimate of its error widens the ranges. Modes followed by
-their shape are monotone too as long as they only cross others, which is not proved.
+and taken at corners of these, each time with the monotone ones at both corners. Models of many
+unknowns are evaluated by a reduced model about the answer then, and its own estimate of its error
+widens the ranges. Modes followed by their shape are monotone too as long as they only cross others,
+which is not proved.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -24,6 +26,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want
+MOST_SIDES = 6  # of a box with at most as many corners as there are draws
 POINTS = 5  # poses along the trajectory about which it is made
 DOUBTFUL = 0.01  # estimate of its error, relative, with which nothing can be said
 
@@ -51,10 +54,11 @@ def study_tolerance(
     designs, ranges = y[None], _exact(scene, own)
     how = "followed" if own else "proved"
     if len(drawn):
-        designs, how = np.repeat(y[None], DRAWS, axis=0), "sampled"
         from scipy.stats import qmc  # half a second, and most runs draw nothing
 
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
+        points = np.concatenate([points, _corners(len(drawn))])
+        designs, how = np.repeat(y[None], len(points), axis=0), "sampled"
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
         pencil = scene.model.pencil
         if not pencil.is_dense:
@@ -93,12 +97,19 @@ def _rows(
         "proved": "proved",
         "bounded": "at most",
         "followed": "the worst of both corners",
-    }.get(said, f"the worst of {DRAWS} draws")
+    }.get(said, f"the worst of {DRAWS} draws and of corners")
     words = (
         f"with every tolerance at its worst: worst error {100 * before:.3g} → "
         f"{100 * after:.3g} % ({tried})"
     )
     return ToleranceRows(rows, before, after, words)
+
+
+def _corners(n: int) -> Floats:
+    """The corners of a box of n sides 0 to 1; of more than six those along a face or an edge."""
+    if n <= MOST_SIDES:
+        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
+    return np.concatenate([np.tri(n), 1.0 - np.tri(n), np.eye(n), 1.0 - np.eye(n)])
 
 
 def _how(wanted: Requirement, how: str) -> str:
