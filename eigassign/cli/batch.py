@@ -29,7 +29,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.command(
     epilog=arguments.examples(
         "eigassign batch cases --jobs 2",
-        "eigassign batch planar_arm.yaml --set targets.0.frequency=12..16:5 --reports none",
+        "eigassign batch planar_arm.yaml --set targets.0.frequency=12..15:4 --reports none",
         "eigassign batch planar_arm.yaml --set expansion.order=2,3,4 --dry-run",
     )
 )

@@ -209,10 +209,14 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
             swept += ["--shard", f"{part}/2", "--out", f"part-{part}"]
             assert main(["batch", "planar_arm.yaml", *swept]) == 0
     for line in lines:
-        words = shlex.split(line.partition(" > ")[0])[1:]
+        command, _, kept = line.partition(" > ")
+        words = shlex.split(command)[1:]
         expanded = [
             name
             for word in words
             for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
         ]
+        capsys.readouterr()
         assert main(expanded) == 0, line
+        if kept:
+            Path(kept).write_text(capsys.readouterr().out)
