@@ -24,7 +24,8 @@ from eigassign.modal.reduced.design_stiffness import DesignStiffness
 from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.residual import JointCorrection, ResidualTerms
-from eigassign.series.compiler import Instruction, Program
+from eigassign.modal.reduced.spans import Spans
+from eigassign.series.compiler import CompiledArrays, CompiledTable, Instruction, Program
 from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]
@@ -34,7 +35,7 @@ CLASSES: dict[str, Any] = {
     made.__name__: made
     for made in (
         *(ReducedModel, ErrorTerms, AddedMass, ResidualTerms, JointCorrection, DesignStiffness),
-        *(Program, Instruction, ImplicitFunction),
+        *(Program, Instruction, ImplicitFunction, CompiledTable, CompiledArrays, Spans),
     )
 }
 LONGEST_TREE = 2_000_000  # bytes: a hundred times those of the longest shipped case's

@@ -131,7 +131,10 @@ def _read(path: Path, kind: Kind) -> list[Known]:
         files = [batch] if batch.exists() else [own] if own.exists() else below
     for file in files:
         try:
-            found += _known(json_value(read_bytes(file, STORED)), kind)
+            for known in _known(json_value(read_bytes(file, STORED)), kind):
+                if not isinstance(known.case, str) or not isinstance(known.ended, str):
+                    raise TypeError
+                found.append(known)
         except OSError as error:
             raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
         except (ValueError, LookupError, TypeError, AttributeError):

@@ -154,6 +154,7 @@ def test_files_of_earlier_versions_are_read(tmp_path, name):
         ("[]", "has no frequencies to compare with"),
         ('{"cases": []}', "has no frequencies to compare with"),
         ('{"cases": [{"name": 1}]}', "is not results.json"),
+        ('{"case": {"name": ["arm"]}, "targets": [], "assignment": null}', "is not results.json"),
         (f'{{"cases": [{to_line(ROW).replace("190.0", "null")}]}}', "is not results.json"),
         (f'{{"cases": [{to_line(ROW).replace("190.0, ", "")}]}}', "is not results.json"),
     ],
@@ -162,6 +163,14 @@ def test_what_is_no_earlier_result_is_refused(tmp_path, text, said):
     (tmp_path / "x.json").write_text(text)
     with pytest.raises(UsageError, match=said):
         EarlierResult(tmp_path / "x.json", "answers", 0.01)
+
+
+@pytest.mark.parametrize("case", ["5", "null", "[1]"])
+def test_validations_of_cases_without_a_name_are_refused(tmp_path, case):
+    row = f'{{"case": {case}, "mode": 1, "where": "x", "lowest_hz": 1, "mean_hz": 1, '
+    (tmp_path / "x.json").write_text(f'[{row}"highest_hz": 1}}]')
+    with pytest.raises(UsageError, match=r"is not results\.json"):
+        EarlierResult(tmp_path / "x.json", "validations", 0.01)
 
 
 def test_results_of_other_cases_are_refused(tmp_path):

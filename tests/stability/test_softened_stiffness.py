@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calibration import Drawn, Floats, tally
-from softened import draw
+from softened import CASES, draw
 
+import eigassign as ea
 from eigassign.modal import reduce
 
 
@@ -40,3 +41,29 @@ def test_no_estimate_is_below_the_error_of_a_softer_design():
 @pytest.mark.slow
 def test_no_estimate_is_below_the_error_of_twenty_thousand_softer_designs():
     check(range(100, 900), 16, 0.4)
+
+
+@pytest.mark.parametrize("modes", [(4,), (1, 4), (2, 3, 4), (1, 2, 3, 4)])
+@pytest.mark.parametrize("half_order", [1, 2, 3])
+def test_modes_that_a_travelling_nut_brings_down_are_not_passed_over(
+    modes: tuple[int, ...], half_order: int
+) -> None:
+    """Bending of the span behind the nut is in no basis made where that span was short."""
+    case = ea.load_case(CASES / "ball_screw.yaml")
+    model, y = case.model(), case.initial_design
+    q, others = case.trajectory.q, np.array(modes) - 1
+    reduced = reduce(model.pencil, q[-1], y, modes, half_order)
+    error = np.abs(reduced.frequencies(q, y) / model.frequencies(q, y, count=4)[:, others] - 1.0)
+    estimate = reduced.error_estimate(q, y)
+    assert np.all(error <= np.maximum(estimate, 1e-11))
+    assert np.isfinite(estimate[-1]).all()
+
+
+@pytest.mark.parametrize("stiffer", [1.0, 5.0, 10.0, 60.0])
+def test_nor_where_a_stiffer_servo_lets_them_pass_a_mode(stiffer: float) -> None:
+    model = ea.load_case(CASES / "ball_screw.yaml").model()
+    y0, y = np.array([4752.0, 151.8]), np.array([stiffer * 4752.0, 151.8])
+    reduced = reduce(model.pencil, [0.4], y0, (2,), 3)
+    true = model.frequencies([0.25], y, count=2)[0, 1]
+    error = abs(reduced.frequencies([0.25], y)[0, 0] / true - 1.0)
+    assert error <= reduced.error_estimate([0.25], y)[0, 0]

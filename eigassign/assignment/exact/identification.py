@@ -26,7 +26,8 @@ a bound holds take part in it where v leads away from all these bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +45,7 @@ SINGULAR = 1e-8  # of the largest singular value: what is below it is round-off 
 PRECISION = 1e-3  # of the distance from ŷ to the end of an interval
 SLIGHT = 1e-2  # entry of a direction, of its largest, that no bound need stop
 FAR = 100.0  # standard deviations: what is further, or has no answer, is only known to be outside
+POOR = 0.01  # p-value below which the model does not explain the measurements
 ROUNDS = 5  # of fitting anew from a better minimum that a profile has come upon
 
 
@@ -90,6 +92,7 @@ class Identified:
     held: tuple[str, ...]  # of each parameter: the bound that holds it, lower or upper; or ""
     unidentified: Floats  # (k, n_y) directions, the largest entry 1 of its range of bounds
     rounds: int  # fits from better and better starts
+    tried: int  # further starts, where the first explained nothing
 
     @property
     def deviation(self) -> Floats:
@@ -103,11 +106,14 @@ def identify(
     lower: Floats,
     upper: Floats,
     start: Floats,
+    others: Sequence[Floats] = (),
 ) -> Identified:
     """The parameters between ``lower`` and ``upper`` (n_y,) that explain ``measured`` best.
 
-    ``start`` (n_y,) is put within the bounds. Where a profile comes upon a better explanation than
-    the fit, the fit starts anew from there. Raises what ``response`` raises at the start.
+    ``start`` (n_y,) is put within the bounds. Where the fit from there explains nothing, by a χ²
+    whose chance is below `POOR`, the ``others`` are tried until one does; the best counts. Where a
+    profile comes upon a better explanation than the fit, the fit starts anew from there. Raises
+    what ``response`` raises at the start.
     """
     from scipy.special import gammaincc  # loaded only where something is identified
 
@@ -120,7 +126,14 @@ def identify(
     problem = DesignProblem(appraise, lower, upper)
     start = np.clip(start, lower, upper)
     initial_hz = response(start)[0]
-    fit = _fitted(problem, start)
+    fit, tried = _fitted(problem, start), 0
+    room = max(len(initial_hz) - len(start), 1)
+    for other in others:
+        if gammaincc(room / 2.0, fit.objective / 2.0) >= POOR:
+            break
+        tried += 1
+        with suppress(EigassignError):
+            fit = min(fit, _fitted(problem, other), key=lambda found: found.objective)
     for rounds in range(1, ROUNDS + 1):
         profile = _Profile(problem, fit)
         intervals = profile.intervals()
@@ -146,6 +159,7 @@ def identify(
         held=held,
         unidentified=frozen(_unidentified(problem, fit, held)),
         rounds=rounds,
+        tried=tried,
     )
 
 

@@ -14,7 +14,7 @@ f ∝ μ^{−1/2}, the relative error in frequency is √((μ̂ + ε)/μ̂) − 
 The residual is known in K_E(q, y0)⁻¹ (see `residual`). Where design parameters soften links to α of
 their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y) (see `design_stiffness`), and ‖ρ‖²/α is a bound.
 Where they add mass, ν grows by what that mass adds to the modes beside the basis (see
-`added_mass`).
+`added_mass`), and where riders travel along beams, by what their longer spans do (see `spans`).
 
 The estimate is infinite, that is, the answer is refused, where a pair stands for no mode any more,
 or where a mode that the basis does not hold may lie below it.
@@ -41,6 +41,7 @@ from eigassign.modal.reduced.residual import (
     residual_gram,
     residual_terms,
 )
+from eigassign.modal.reduced.spans import Spans, spans
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -63,6 +64,7 @@ class ErrorTerms:
     residual: ResidualTerms
     joints: JointCorrection
     stiffness: DesignStiffness
+    spans: Spans | None
     added: AddedMass
     anchors: Floats  # (n_points, c + 1): the largest μ at each point, one more than are represented
     first_design: Flags  # (n_points,): those of the first point's y, which growth is relative to
@@ -90,13 +92,17 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     heavy, posed = _with_design(reduced, x, terms.added.heaviest(x[:, n:], y0), theta)
     # Beside the basis the pose moves modes as well; as a design reorders them, that counts with it
     beside = np.maximum(softest / RANGE, softest**2)
-    outside = largest_outside(terms, mu, beside / terms.added.factor(theta))
+    travel = np.ones((len(terms.anchors), len(x)))
+    if terms.spans is not None:
+        travel = terms.spans.growth(reduced, x)
+    outside = largest_outside(terms, mu, beside / terms.added.factor(theta), travel)
     outside += terms.added.lifted(heavy, turned) / beside
     error = frequency_error(mu, gram, outside, terms.anchors)
     error[~(closes & posed & stays)] = np.inf
     shares = _mass_shares(terms, M_c, all_mu, all_z)
     heavier = terms.added.heavier_shapes(theta, turned)
     most, own = (heavier / each for each in terms.stiffness.softer_shapes(ratio))
+    most = most * travel[:, :, None]
     error[mode_missing(all_mu, gram, shares, terms.anchors, most, own)] = np.inf
     hardest = ratio.max(axis=0, initial=1.0)
     return np.asarray(error + _rounding(reduced, terms, theta, mu, wide, hardest))
@@ -153,16 +159,20 @@ def _shifts(mu: Floats, gram: Floats, outside: Floats, kept: int) -> Floats:
 # --- Modes that the basis does not hold, or no longer
 
 
-def largest_outside(terms: ErrorTerms, mu: Floats, softest: Floats) -> Floats:
+def largest_outside(
+    terms: ErrorTerms, mu: Floats, softest: Floats, travel: Floats | None = None
+) -> Floats:
     """How large μ of the modes without a vector in the basis may have become, (n,).
 
     Their largest μ at an expansion point, grown as the represented modes did or as the links
-    softened, whichever is more; of those points of whose design that is known the one that says
-    least counts.
+    softened, whichever is more, and as the spans beside riders did by their ``travel`` (n_points,
+    n); of those points of whose design that is known the one that says least counts.
     """
     anchors = terms.anchors[terms.first_design]
     growth = np.max(mu[:, None, :] / anchors[:, : mu.shape[1]], axis=2)
     grown = anchors[:, -1] * np.maximum(growth, 1.0 / softest[:, None])
+    if travel is not None:
+        grown = grown * travel[terms.first_design].T
     return np.asarray(grown.min(axis=1))
 
 
@@ -287,6 +297,7 @@ def error_terms(basis: RitzBasis) -> ErrorTerms:
         residual=residual_terms(pencil, basis.K0, factor, wide),
         joints=joint_correction(pencil, factor, basis.theta_mean, wide),
         stiffness=design_stiffness(pencil, basis.points, basis.represented),
+        spans=spans(pencil, basis.points),
         added=added_mass(pencil, factor, basis.points[0], basis.V, basis.represented),
         anchors=np.hstack([1.0 / basis.lam[:, :count], following]),
         first_design=(basis.points == basis.points[0])[:, pencil.n_joints :].all(axis=1),

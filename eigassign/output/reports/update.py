@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.identification import POOR
 from eigassign.facts import Fact
 from eigassign.output import documents
 from eigassign.output.documents import OriginDocument, dumps
@@ -17,7 +18,6 @@ from eigassign.output.figures.update import update_figures
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.updating.fit import (
-    POOR,
     ExplainedMeasurement,
     FitRow,
     UnidentifiedDirection,

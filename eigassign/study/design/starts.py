@@ -193,12 +193,12 @@ def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Ite
     if most <= 0:
         return
     if task.models is not None or task.followers:
-        yield from spread_designs(task.scene, most, 0)
+        yield from spread_designs(task.scene.bounds, most, 0)
         return
     box, fewest = UnitBox.of(variant.problem), thinned(task, 8) or task
     asked = variant_of(fewest, tuple(k for _, k in variant.below))
     ranked: list[tuple[tuple[float, float], Floats]] = []
-    for y in spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
+    for y in spread_designs(task.scene.bounds, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
         z = box.inside(box.z(y))
         try:
             seen = asked.without_slopes(box.y(z))

@@ -164,7 +164,7 @@ def possible_counts(scene: Scene, bands: Sequence[ForbiddenBand]) -> list[tuple[
     lower, upper = scene.bounds
     designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
     if len(lower):
-        designs += list(spread_designs(scene, 8, 1))
+        designs += list(spread_designs(scene.bounds, 8, 1))
     ranges, medians = [], []
     for y in designs:
         with suppress(EigassignError):
@@ -200,9 +200,9 @@ def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:
         count = min(2 * count, available)
 
 
-def spread_designs(scene: Scene, count: int, seed: int) -> Floats:
-    """Designs (count, n_y) of a Latin hypercube over the bounds."""
-    lower, upper = scene.bounds
+def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:
+    """Designs (count, n_y) of a Latin hypercube over the ``bounds``, lower and upper (n_y,)."""
+    lower, upper = bounds
     cells = np.tile(np.arange(count), (len(lower), 1))
     share = (np.random.default_rng(seed).permuted(cells, axis=1).T + 0.5) / count
     wide = (lower > 0.0) & (upper > 10.0 * lower)
