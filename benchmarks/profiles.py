@@ -35,7 +35,7 @@ def case_text(name: str) -> str:
     import yaml
 
     if name == "two_link":
-        return chart_cases.paper()
+        return (common.CASES / "two_link.yaml").read_text(encoding="utf-8")
     if name.startswith("trunk"):
         return chart_cases.large(326)
     data = yaml.safe_load(chart_cases.six())
