@@ -45,6 +45,6 @@ def spans(pencil: Pencil, points: Floats) -> Spans | None:
 
 
 def _both(table: CompiledArrays, z: Floats) -> Floats:
-    """Both spans of every rider at z (n_z, n), (n, n_riders, 2)."""
+    """The two spans of every rider at z (n_z, n), (n, n_riders, 2)."""
     station, length = np.moveaxis(table(z)[0], -1, 0)
     return np.stack([station, length - station], axis=-1)
