@@ -59,7 +59,7 @@ def _schema(kind: Any, may_lack: bool, found: dict[str, Any]) -> dict[str, Any]:
 
 def _row(row: Any, may_lack: bool, found: dict[str, Any]) -> dict[str, Any]:
     """The reference to a row; one whose numbers may lack has a schema of its own."""
-    name = f"{row.__name__.removesuffix('OriginDocument')}{'WithGaps' if may_lack else ''}"
+    name = f"{row.__name__.removesuffix('Document')}{'WithGaps' if may_lack else ''}"
     if name not in found:
         properties = found[name] = dict[str, Any](description=inspect.cleandoc(row.__doc__))
         facts = written(row).items()
