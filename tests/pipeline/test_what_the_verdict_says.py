@@ -8,37 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from two_elastic_links import ALLOY, TWO_LINKS
 
 import eigassign as ea
 from eigassign.pipeline import Result, solve_case
 from eigassign.study import BuiltCase
 
-ALLOY = {"youngs_modulus": 70e9, "density": 2700}
-TWO_LINKS: dict[str, Any] = {
-    "title": "two links on elastic drives",
-    "mechanism": {
-        "space": "planar",
-        "materials": {"alloy": ALLOY},
-        "sections": {
-            "tube": {"shape": "tube", "outer_diameter": 0.04, "inner_diameter": 0.03},
-            "rod": {"shape": "circle", "diameter": 0.03},
-        },
-        "links": {
-            "a": {"length": 0.6, "material": "alloy", "section": "tube", "elements": 2},
-            "b": {"length": 0.5, "material": "alloy", "section": "rod", "elements": 2},
-        },
-        "joints": {
-            "shoulder": {"type": "revolute", "base": "ground", "follower": "a.start"},
-            "elbow": {"type": "revolute", "base": "a.end", "follower": "b.start"},
-        },
-        "bodies": {"motor": {"at": "a.end", "mass": 0.5}, "tool": {"at": "b.end", "mass": 1.0}},
-    },
-    "coordinates": {
-        "q1": {"joint": "shoulder", "drive": {"stiffness": 20000}},
-        "q2": {"joint": "elbow", "drive": {"stiffness": 8000}},
-    },
-    "trajectory": {"q": [[0.0, 0.2], [0.3, 0.8], [0.5, 1.4], [0.7, 2.0]], "duration": 1},
-}
 K1 = {"parameter": "coordinates.q1.drive.stiffness", "min": 5000, "max": 40000}
 K2 = {"parameter": "coordinates.q2.drive.stiffness", "min": 2000, "max": 16000}
 MOTOR = {"parameter": "bodies.motor.mass", "min": 0.2, "max": 2}
