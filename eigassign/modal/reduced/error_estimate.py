@@ -32,7 +32,7 @@ from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.roundoff import rounding_weights
 from eigassign.modal.reduced.added_mass import AddedMass, added_mass
 from eigassign.modal.reduced.basis import RitzBasis
-from eigassign.modal.reduced.design_stiffness import DesignStiffness, design_stiffness
+from eigassign.modal.reduced.design_stiffness import LEAST, DesignStiffness, design_stiffness
 from eigassign.modal.reduced.pencil import ReducedPencil, ritz_pairs
 from eigassign.modal.reduced.residual import (
     JointCorrection,
@@ -86,7 +86,7 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     turned, closes = _with_design(reduced, x, np.broadcast_to(y0, (len(x), len(y0))))
     scaled, stays = _with_design(reduced, x, terms.stiffness.scaling(x[:, n:], y0), theta)
     ratio = terms.stiffness.ratio(theta, scaled, turned)
-    softest = np.maximum(ratio.min(axis=0, initial=1.0), 1e-300)
+    softest = np.maximum(ratio.min(axis=0, initial=1.0), LEAST)
     gram = residual_gram(terms.residual, terms.joints, theta, turned, mu, wide)
     gram = gram / softest[:, None, None]
     heavy, posed = _with_design(reduced, x, terms.added.heaviest(x[:, n:], y0), theta)

@@ -108,7 +108,7 @@ def _best_variant(
     one that misses them least, relative to the limits.
     """
     scene, listed = task.scene, catalogues(task.scene.file)
-    choices = possible_counts(scene, task.bands)
+    choices, total = possible_counts(scene, task.bands)
     tried: list[Searched] = []
     for below in choices[:VARIANTS]:
         if listed:
@@ -130,7 +130,7 @@ def _best_variant(
         exact_solves=sum(one.exact_solves for one in tried) + len(scene.path.q),
         chosen=variants[0].chosen,
         lost=tuple(dict.fromkeys(line for one in tried for line in one.lost)),
-        untried=len(choices) - len(tried),
+        untried=total - len(tried),
     )
 
 

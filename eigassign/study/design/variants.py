@@ -8,6 +8,7 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -153,14 +154,17 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     return PosedProblem(tuple(named), requirements, problem, response)
 
 
-def possible_counts(scene: Scene, bands: Sequence[ForbiddenBand]) -> list[tuple[int, ...]]:
-    """Each choice of k for all bands that may be, by designs all over the bounds.
+def possible_counts(
+    scene: Scene, bands: Sequence[ForbiddenBand]
+) -> tuple[list[tuple[int, ...]], int]:
+    """Choices of k for all bands that may be, by designs all over the bounds; how many there are.
 
     Of a band every k from the fewest modes below it to the most. The likeliest choices come first:
-    those that designs are nearest to, then the others by their distance from these.
+    those that designs are nearest to, then the others by their distance from these; of more than
+    `MOST_CHOICES` not all are listed.
     """
     if not bands:
-        return [()]
+        return [()], 1
     lower, upper = scene.bounds
     designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
     if len(lower):
@@ -181,8 +185,10 @@ def possible_counts(scene: Scene, bands: Sequence[ForbiddenBand]) -> list[tuple[
         away = np.abs(near - choice).sum(axis=1)
         return int(away.min()), int(away.argmin()), choice
 
-    each = (range(int(low), int(high) + 1) for low, high in zip(least, most, strict=True))
-    return sorted(itertools.islice(itertools.product(*each), MOST_CHOICES), key=rank)
+    each = [range(int(low), int(high) + 1) for low, high in zip(least, most, strict=True)]
+    listed = itertools.islice(itertools.product(*each), MOST_CHOICES)
+    found = dict.fromkeys((*map(tuple, near.tolist()), *listed))
+    return sorted(found, key=rank), math.prod(map(len, each))
 
 
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:

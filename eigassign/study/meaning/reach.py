@@ -169,7 +169,7 @@ def _nearest(
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
     followed = followers(alone, [replace(there, followed=wanted.followed), *beside])
     listed, found = catalogues(scene.file), []
-    for below in possible_counts(alone, bands)[:CHOICES]:
+    for below in possible_counts(alone, bands)[0][:CHOICES]:
         kept = []
         for band, n in zip(bands, below, strict=True):
             above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)

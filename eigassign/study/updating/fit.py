@@ -37,9 +37,7 @@ from eigassign.study.design.variants import spread_designs
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
-STARTS = (
-    16  # further ones, where the first explains nothing; of 80 random cases three needed one or two
-)
+STARTS = 16  # further ones, where the first explains nothing: 3 of 80 random cases needed 1 to 3
 OUTLIER = 3.0  # standard deviations
 
 # --- Results

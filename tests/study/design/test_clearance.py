@@ -178,3 +178,21 @@ def test_a_target_that_only_a_coarse_model_meets_is_not_called_reached(
         accepted = solve_case(load_case(path)).results.assignment
         assert accepted is not None
         assert accepted.verdict == "reached"
+
+
+def test_a_coordinate_that_only_trembles_asks_for_no_more_points(arm: Scene) -> None:
+    """Round-off of a coordinate at rest is no motion between the samples."""
+    solved = []
+
+    class Counting:
+        def __getattr__(self, name: str) -> object:
+            return getattr(arm.model, name)
+
+        def frequencies(self, q: np.ndarray, y: np.ndarray, count: int = 3) -> np.ndarray:
+            solved.append(len(q))
+            return arm.model.frequencies(q, y, count)
+
+    q = np.column_stack([np.linspace(1.7, 1.9, 21), 5.3 + 1e-12 * (-1.0) ** np.arange(21)])
+    there = ForbiddenBand("", "", (), slice(0, 21), np.full(21, 230.0), np.full(21, 300.0))
+    check_clear(Counting(), there, 1, q, arm.initial)  # type: ignore[arg-type]
+    assert max(solved) <= 21
