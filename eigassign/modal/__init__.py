@@ -37,9 +37,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.sparse": "solve_sparse",
         "exact.substructure": "Inner proved solve_large solve_together",
         "exact.tracking": "overlaps track",
-        "expansion": (
-            "Expansion NearestExpansion companion_order expand polynomial_error radius_share"
-        ),
+        "expansion": ("Expansion NearestExpansion companion_order expand radius_share"),
         "fit.interpolation": "Interpolant Nodes basis_at interpolate interval_nodes sample_nodes",
         "fit.path": "smooth_parts",
         "fit.region": "Box",
@@ -48,7 +46,7 @@ __all__, __getattr__, __dir__ = face(
         "projection": "project project_at project_terms",
         "reduced.added_mass": "added_mass",
         "reduced.basis": "ritz_basis",
-        "reduced.error_estimate": "frequency_error largest_outside mode_missing",
+        "reduced.error_estimate": "error_beside frequency_error largest_outside mode_missing",
         "reduced.model": "ReducedModel",
         "reduced.pencil": "ritz_pairs",
         "reduced.reduce": "reduce",

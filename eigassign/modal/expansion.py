@@ -24,6 +24,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
 from eigassign.modal.exact.clusters import CLUSTER_GAP
+from eigassign.modal.reduced.error_estimate import error_beside
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.taylor.local_coordinates import (
@@ -119,7 +120,7 @@ class Expansion:
         """
         f = self.frequencies(q, y)
         beside = self.reduced
-        return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
+        return error_beside(f, beside.frequencies(q, y), beside.error_estimate(q, y))
 
     @cached_property
     def reduced(self) -> ReducedModel:
@@ -320,14 +321,6 @@ def companion_order(n_variables: int, known: int) -> int:
     orders = range(max(known, 2), 1, -1)
     fitting = [m for m in orders if comb(n_variables + m, m) <= MOST_VECTORS]
     return fitting[0] if fitting else 1
-
-
-def polynomial_error(polynomial: Floats, reduced: Floats, estimate: Floats) -> Floats:
-    """Relative error in frequency (n, n_modes); infinite where λ < 0 or f̂ is refused."""
-    apart = np.abs(polynomial / reduced - 1.0)
-    with np.errstate(invalid="ignore"):  # 0 · ∞, where f̂ is refused
-        bound = apart * (1.0 + estimate) + estimate
-    return np.where(np.isfinite(bound), bound, np.inf)
 
 
 # --- How far the series reaches: its radius of convergence, seen from the coefficients

@@ -30,7 +30,7 @@ from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
-FORMAT = "reduced model 8"  # raise it whenever what the arrays of a reduced model mean changes
+FORMAT = "reduced model 9"  # raise it whenever what the arrays of a reduced model mean changes
 CLASSES: dict[str, Any] = {
     made.__name__: made
     for made in (
@@ -74,7 +74,13 @@ def stored_series(arrays: Mapping[str, Array], k: int) -> list[Cluster]:
 
 def reduced_arrays(reduced: ReducedModel) -> dict[str, Array]:
     """A reduced model with what its error estimate needs."""
-    return tree_arrays(replace(reduced, certified=reduced.error_terms))
+    return tree_arrays(_made(reduced))
+
+
+def _made(reduced: ReducedModel) -> ReducedModel:
+    """``reduced`` with nothing left to be made."""
+    wider = None if reduced.wider is None else _made(reduced.wider)
+    return replace(reduced, certified=reduced.error_terms, widened=wider)
 
 
 def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
@@ -85,19 +91,26 @@ def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
     """
     try:
         model = _Reader(arrays).whole()
-        if type(model) is not ReducedModel or type(model.certified) is not ErrorTerms:
-            raise TypeError
-        x, n_modes = model.points[:1], len(model.modes)
-        with np.errstate(all="ignore"):
-            hz = model.frequencies(x[:, : model.n_q], x[:, model.n_q :])
-            error_estimate = model.error_estimate(x[:, : model.n_q], x[:, model.n_q :])
-        shape = (1, n_modes)
-        if hz.shape != shape or error_estimate.shape != shape or not np.isfinite(hz).all():
-            raise ValueError
+        _check(model)
+        if model.widened is not None:
+            _check(model.widened)
     except Exception as error:  # of what is no model, anything may come
         name = type(error).__name__
         raise UsageError(f"these arrays are not a reduced model ({name})") from error
     return model
+
+
+def _check(model: Any) -> None:
+    """Raises anything where ``model`` does not answer at its expansion point."""
+    if type(model) is not ReducedModel or type(model.certified) is not ErrorTerms:
+        raise TypeError
+    x, n_modes = model.points[:1], len(model.modes)
+    with np.errstate(all="ignore"):
+        hz = model.frequencies(x[:, : model.n_q], x[:, model.n_q :])
+        error_estimate = model.error_estimate(x[:, : model.n_q], x[:, model.n_q :])
+    shape = (1, n_modes)
+    if hz.shape != shape or error_estimate.shape != shape or not np.isfinite(hz).all():
+        raise ValueError
 
 
 # --- Frozen objects as a tree, and its leaves in two arrays

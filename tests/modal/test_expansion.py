@@ -18,9 +18,9 @@ from eigassign.modal import (
     Expansion,
     Model,
     eigenvalues,
+    error_beside,
     expand_subspace,
     modes,
-    polynomial_error,
     substitute,
 )
 from eigassign.modal import expand as expand_pencil
@@ -298,7 +298,7 @@ def test_many_samples_give_what_few_give(gap: float) -> None:
 
 
 def test_where_the_reduced_model_is_refused_the_error_is_infinite_without_a_word() -> None:
-    error = polynomial_error(
+    error = error_beside(
         np.array([[190.0, 191.0]]), np.array([[190.0, 190.0]]), np.array([[np.inf, 0.0]])
     )
     np.testing.assert_allclose(error, [[np.inf, 1 / 190]])

@@ -40,6 +40,9 @@ def test_any_mechanism_survives_as_arrays(seed):
     built = reduce(model_of(tree).pencil, q0, [], (1,), 1)
     back = reduced_from_arrays(reduced_arrays(built))
     assert back.frequencies(q0 + 0.1, []).tobytes() == built.frequencies(q0 + 0.1, []).tobytes()
+    assert (
+        back.error_estimate(q0 + 2.0, []).tobytes() == built.error_estimate(q0 + 2.0, []).tobytes()
+    )
 
 
 def test_it_is_evaluated_where_there_is_no_mechanism(reduced, tmp_path):

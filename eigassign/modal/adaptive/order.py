@@ -35,9 +35,9 @@ from eigassign.modal.expansion import (
     Expansion,
     NearestExpansion,
     expand,
-    polynomial_error,
     radius_share,
 )
+from eigassign.modal.reduced.error_estimate import error_beside
 
 Floats = NDArray[np.float64]
 ORDERS = (2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20)
@@ -76,7 +76,7 @@ class ExpansionChoice(Rung, NearestExpansion):
         """Relative error of ``frequencies`` (n, n_modes), beside the one reduced model."""
         reduced = self.beside.reduced
         f, e = reduced.frequencies(q, y), reduced.error_estimate(q, y)
-        return polynomial_error(self.frequencies(q, y), f, e)
+        return error_beside(self.frequencies(q, y), f, e)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ def expansions(
         part = expand(pencil, q0, y0, modes, trial.order, cluster_gap=trial.gap)
         parts, hz = (*trial.parts, part), (*trial.hz, part.frequencies(q, y))
         chosen = NearestExpansion(parts).pick(q, hz)
-        estimate = polynomial_error(chosen, reduced_hz, beside.error)
+        estimate = error_beside(chosen, reduced_hz, beside.error)
         error, worst = float(estimate.max()), int(np.argmax(estimate.max(axis=1)))
         several = len(parts) > 1
         reach = "" if several else _reach(part, x, estimate)

@@ -108,6 +108,17 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     return np.asarray(error + _rounding(reduced, terms, theta, mu, wide, hardest))
 
 
+def error_beside(f: Floats, better: Floats, estimate: Floats) -> Floats:
+    """Relative error of frequencies f (n, n_modes) beside ``better`` ones with their ``estimate``.
+
+    Infinite where f is not a number or the better one is refused.
+    """
+    apart = np.abs(f / better - 1.0)
+    with np.errstate(invalid="ignore"):  # 0 · ∞, where the better one is refused
+        bound = apart * (1.0 + estimate) + estimate
+    return np.where(np.isfinite(bound), bound, np.inf)
+
+
 # --- From residuals to a relative error in frequency
 
 

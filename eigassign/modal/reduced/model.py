@@ -7,6 +7,7 @@ the Taylor vectors give, but stay accurate far beyond the radius of convergence.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,9 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import counted, of_modes
+from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.pencil import theta_slopes
 from eigassign.modal.arguments import chunks, samples
-from eigassign.modal.reduced.error_estimate import ErrorTerms, relative_error
+from eigassign.modal.reduced.error_estimate import (
+    REFUSED,
+    ErrorTerms,
+    error_beside,
+    relative_error,
+)
 from eigassign.modal.reduced.pencil import ReducedPencil, ritz_pairs, ritz_values
 
 Floats = NDArray[np.float64]
@@ -35,6 +42,7 @@ class ReducedModel(ReducedPencil):
     modes: tuple[int, ...]
     half_order: int
     certified: ErrorTerms | Callable[[], ErrorTerms]  # as they are, or how to make them
+    widened: ReducedModel | Callable[[], ReducedModel | None] | None  # on more vectors
 
     def __repr__(self) -> str:
         return (
@@ -47,6 +55,14 @@ class ReducedModel(ReducedPencil):
     def error_terms(self) -> ErrorTerms:
         """The arrays of the error estimate, made when they are first asked for."""
         return self.certified() if callable(self.certified) else self.certified
+
+    @cached_property
+    def wider(self) -> ReducedModel | None:
+        """The model with more modes that answers are compared with where they are refused.
+
+        Beside a basis that holds those modes, fewer can have come down unseen.
+        """
+        return self.widened() if callable(self.widened) else self.widened
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n_samples, n_modes) in Hz; ``error_estimate`` says how far to trust them.
@@ -92,9 +108,21 @@ class ReducedModel(ReducedPencil):
         """Estimate of the relative error in frequency, (n_samples, n_modes); no exact solve.
 
         Infinite where it is refused: a neighbouring mode is not represented, so that not even the
-        identity of the mode is certain.
+        identity of the mode is certain. Before that, answers are compared with those of the
+        `wider` model.
         """
         x, terms = samples(q, y, self.n_q, self.n_y), self.error_terms
         wanted = np.array(self.modes) - 1
         parts = chunks(x, terms.residual.mass[0].size)
-        return np.concatenate([relative_error(self, terms, part)[:, wanted] for part in parts])
+        error = np.concatenate([relative_error(self, terms, part)[:, wanted] for part in parts])
+        refused = ~np.isfinite(error).all(axis=1)
+        if refused.any() and self.wider is not None:
+            q, y = x[refused, : self.n_q], x[refused, self.n_q :]
+            with suppress(
+                EigassignError
+            ):  # where more vectors cannot be evaluated it stays refused
+                better, estimate = self.wider.frequencies(q, y), self.wider.error_estimate(q, y)
+                beside = error_beside(self.frequencies(q, y), better, estimate)
+                beside[beside > REFUSED] = np.inf
+                error[refused] = np.minimum(error[refused], beside)
+        return error

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, samples, whole_within
 from eigassign.modal.projection import project
-from eigassign.modal.reduced.basis import RitzBasis, ritz_basis
+from eigassign.modal.reduced.basis import RitzBasis, ritz_basis, widened
 from eigassign.modal.reduced.compression import ACCURACY, compressed, half_widths
 from eigassign.modal.reduced.error_estimate import error_terms
 from eigassign.modal.reduced.model import ReducedModel
@@ -45,12 +46,15 @@ def reduce(
     points = samples(q0, y0, pencil.n_q, n_y)
     widths = None if span is None else half_widths(span, pencil.n_q, n_y, accuracy)
     basis = ritz_basis(pencil, points, wanted, half_order, guard, given)
-    whole = _projected(basis, half_order)
+    whole = _projected(basis, half_order, guard)
     return whole if widths is None else compressed(basis, whole, widths, accuracy)
 
 
-def _projected(basis: RitzBasis, half_order: int) -> ReducedModel:
-    """The pencil on the basis; what only the error estimate needs waits until it is asked for."""
+def _projected(basis: RitzBasis, half_order: int, widen: bool) -> ReducedModel:
+    """The pencil on the basis; what only the error estimate needs waits until it is asked for.
+
+    ``widen`` where refused answers are compared with a wider model.
+    """
     pencil, k = basis.pencil, basis.V.shape[1]
     # Terms are large and cancel, so their round-off counts: the mean with their transposes.
     stiffness, mass = (0.5 * (A + A.transpose(0, 2, 1)) for A in project(pencil, basis.wide))
@@ -70,4 +74,14 @@ def _projected(basis: RitzBasis, half_order: int) -> ReducedModel:
         mass_terms=m_terms,
         mass=mass[m_terms],
         certified=partial(error_terms, basis),
+        widened=partial(_wider, basis, half_order) if widen else None,
     )
+
+
+def _wider(basis: RitzBasis, half_order: int) -> ReducedModel | None:
+    """The model on a widened basis; None where there is none."""
+    try:
+        more = widened(basis)
+    except AccuracyError:
+        return None
+    return None if more is None else _projected(more, half_order, False)
