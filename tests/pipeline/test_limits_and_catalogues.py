@@ -271,3 +271,32 @@ def test_what_has_no_effect_stays_and_what_has_the_same_changes_least() -> None:
     notes = " ".join(result.results.notes)
     assert "nothing that is asked depends on foot" in notes
     assert "m1, second have the same effect" in notes
+
+
+def test_slopes_that_vanish_or_are_alike_at_one_design_only_are_no_lack_of_effect() -> None:
+    """At the top of a curve a diameter has no slope, and one sample cannot tell two masses."""
+    start, end = HEAD.index("  links:"), HEAD.index("  joints:")
+    head = HEAD[:start] + (
+        "    thin: {shape: circle, diameter: 20 mm}\n  links:\n"
+        "    upper_arm: {length: 0.6, material: aluminium, section: rod, elements: 2}\n"
+        "    forearm: {length: 0.45, material: aluminium, section: thin, elements: 2}\n"
+    ) + HEAD[end : HEAD.index("trajectory:")]  # fmt: skip
+    head = head.replace("{joint: shoulder}", "{joint: shoulder, drive: {stiffness: 2 MN m/rad}}")
+    head = head.replace("angle: absolute}", "drive: {stiffness: 2 MN m/rad}}")
+    design = (
+        "trajectory: {points: [[0, 0.5], [0.5, 0.5]], duration: 1 s, samples: 2}\n"
+        "assignment: {starts: 1}\ndesign:\n"
+        "  d: {parameter: sections.thin.diameter, min: 5 mm, max: 120 mm}\n"
+        "  tool: {parameter: bodies.tool_mass.mass, min: 50 g, max: 1 kg}\n"
+    )
+    result, _ = solved(design, "  - {mode: 1, frequency: 300 Hz}\n", head)
+    assert result.design["tool"] == 0.05
+    assert "effect" not in (notes := " ".join(result.results.notes))
+    assert "depends on d" not in notes
+    design = design[: design.index("  d:")] + (
+        "  elbow: {parameter: bodies.elbow_mass.mass, min: 0, max: 250 g}\n"
+        "  tool: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}\n"
+    )
+    result, row = solved(design, "  - {mode: 1, frequency: 22 Hz}\n", head)
+    assert row.verdict == "reached", row.reason
+    assert "effect" not in " ".join(result.results.notes)

@@ -98,7 +98,7 @@ def find_answer(
     found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
     steps = scene.file.assignment.steps
     contradiction = conflict(found, catalogues(scene.file), steps, scene.limits)
-    notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
+    notes += idle_notes(scene.model.y_names, found, scene.initial)
     notes += _band_notes(found)
     if found.lost:
         notes.append(f"{len(found.lost)} designs were passed over, for {found.lost[-1]}")

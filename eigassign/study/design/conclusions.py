@@ -19,16 +19,15 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import choose
-from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.exact.design_problem import MET, ON, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
+from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
 from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
-from eigassign.study.design.variants import PosedProblem
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -37,6 +36,7 @@ MOST = 12  # limits of which the smallest contradiction is looked for
 ENOUGH = 100
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
 SAME = 1e-9  # of the merit: a design this little worse is as good
+LEAST = 1e-6  # of the bounds: a change that no printed digit shows
 
 
 # --- Convexity
@@ -163,20 +163,49 @@ def _effects(problem: DesignProblem, seen: Appraisal) -> Floats:
     return np.vstack([seen.slopes, seen.excess_slopes, prices]) * width
 
 
-def idle_notes(names: Sequence[str], variant: PosedProblem, seen: Appraisal) -> Iterator[str]:
-    """Parameters without effect, and those that only together have one, in words."""
-    free = np.flatnonzero(variant.problem.upper > variant.problem.lower)
-    J = _effects(variant.problem, seen)[:, free]
+def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[str]:
+    """Parameters without effect, and those that only together have one, in words.
+
+    What slopes of 0 suggest is tried at the bounds, for they are 0 at the top of a curve too.
+    """
+    problem, best = found.variant.problem, found.best
+    width = problem.upper - problem.lower
+    free = np.flatnonzero(width > 0.0)
+    J = _effects(problem, best.seen)[:, free]
     size = np.linalg.norm(J, axis=0)
-    idle = size <= WITHOUT * size.max(initial=0.0)
-    if idle.any():
-        listed = ", ".join(names[k] for k in free[idle])
-        yield f"nothing that is asked depends on {listed}: left as they are where limits allow"
-    moving = free[~idle]
-    alike = np.abs(_null_space(J[:, ~idle] / size[~idle])).max(axis=1, initial=0.0) > 1e-3
-    if alike.any():
-        listed = ", ".join(names[k] for k in moving[alike])
-        yield f"{listed} have the same effect on what is asked: their smallest change is taken"
+    still = size <= WITHOUT * size.max(initial=0.0)
+    idle = [k for k in free[still] if _changes_nothing(problem, best, np.eye(len(width))[k])]
+    away = np.where(width > 0.0, (best.y - initial) / np.where(width > 0.0, width, 1.0), 0.0)
+    if idle:
+        kept = ": left as they are" if np.abs(away[idle]).max() <= LEAST else ""
+        yield f"nothing that is asked depends on {', '.join(names[k] for k in idle)}{kept}"
+    moving = free[~still]
+    V = _null_space(J[:, ~still] / size[~still])
+    together = np.zeros((len(width), V.shape[1]))  # in shares of the bounds
+    together[moving] = V / size[~still, None]
+    if V.size and all(_changes_nothing(problem, best, width * d) for d in together.T):
+        alike = moving[np.abs(V).max(axis=1) > 1e-3]
+        least = np.abs(np.linalg.qr(together)[0].T @ away).max() <= LEAST
+        change = ": their smallest change is taken" if least else ""
+        listed = ", ".join(names[k] for k in alike)
+        yield f"{listed} have the same effect on what is asked{change}"
+
+
+def _changes_nothing(problem: DesignProblem, best: Optimum, d: Floats) -> bool:
+    """True where what is asked stays as it is from bound to bound along d (n_y,)."""
+    for along in (d, -d):
+        ends = np.where(along > 0.0, problem.upper, problem.lower) - best.y
+        moved = along != 0.0
+        far = float((ends[moved] / along[moved]).min())
+        y = np.clip(best.y + far * along, problem.lower, problem.upper)
+        try:
+            seen = problem.appraise(y)
+        except EigassignError:
+            return False
+        pairs = ((seen.residual, best.seen.residual), (seen.excess, best.seen.excess))
+        if max(np.abs(a - b).max(initial=0.0) for a, b in pairs) > ON:
+            return False
+    return True
 
 
 def _null_space(J: Floats) -> Floats:
