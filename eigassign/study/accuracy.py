@@ -69,18 +69,22 @@ def study_accuracy(scene: Scene, optimum: Floats | None = None) -> Accuracy:
     return Accuracy(mesh, (*lines, rounding_line(lost)))
 
 
-def model_error(scene: Scene, judged: MeshError | None, y: Floats, modes: Collection[int]) -> float:
-    """By how much mesh and reduced links raise ``modes`` at most at design y (n_y,), relative.
+def model_errors(
+    scene: Scene, judged: MeshError | None, y: Floats, modes: Collection[int]
+) -> dict[int, float]:
+    """By how much mesh and reduced links raise each mode at most at design y (n_y,), relative.
 
-    The mesh's part was ``judged`` before; infinite where nothing is known.
+    At `judged_poses`; the mesh's part of some modes was ``judged`` before. Infinite where nothing
+    is known.
     """
-    mesh = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
-    of_mesh = max((mesh.get(mode, 0.0) for mode in modes), default=0.0)
-    if scene.model.reduced is None or not modes:
-        return of_mesh
+    known = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
     q = judged_poses(scene.model, poses_at(scene.path, y))
-    of_links = float(scene.model.truncation_error(q, y, sorted(modes)).max())
-    return (1.0 + of_mesh) * (1.0 + of_links) - 1.0
+    mesh, links = scene.model.discretisation_error, scene.model.truncation_error
+    found = {}
+    for mode in sorted(modes):
+        of_mesh = known.get(mode) or float(mesh(q, y, (mode,)).max())
+        found[mode] = (1.0 + of_mesh) * (1.0 + float(links(q, y, (mode,)).max())) - 1.0
+    return found
 
 
 def rounding_line(lost: float) -> str:

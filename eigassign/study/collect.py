@@ -88,7 +88,8 @@ def _with_answer(
     """The results with those of the answer; ``reach`` matters to one that the expansion gave."""
     answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
     row = assignment_row(
-        scene, answer, assigned.wanted, targets, results.discretisation, meaning.unreachable
+        *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
+        *(results.discretisation, meaning.unreachable),
     )
     reach = reach if answer.found is None else ()
     motion = study_motion(scene, assigned.solved.initial.hz)
@@ -148,7 +149,7 @@ def _poses(scene: Scene) -> DrawnPoses:
 
 def _others(assigned: VerifiedAssignment) -> OtherModes | None:
     """Up to three modes above the lowest assigned one that have no target themselves."""
-    targets = {mode for target in assigned.targets for mode in _modes(target)}
+    targets = {mode for target in assigned.targets for mode in target.numbers}
     before, after = assigned.solved.initial.hz, assigned.solved.exact.hz
     above = range(min(targets, default=0) + 1, before.shape[1] + 1)
     rest = [m for m in above if m not in targets][:3]
@@ -158,17 +159,10 @@ def _others(assigned: VerifiedAssignment) -> OtherModes | None:
 
 def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
     """The modes from the lowest to the one above the highest that a target names."""
-    highest = max((mode for target in assigned.targets for mode in _modes(target)), default=1)
+    highest = max((mode for target in assigned.targets for mode in target.numbers), default=1)
     solved = assigned.solved
     before, after = (each.hz[:, : highest + 1] for each in (solved.initial, solved.exact))
     return OtherModes(tuple(range(1, before.shape[1] + 1)), before, after)
-
-
-def _modes(target: TargetStudy) -> set[int]:
-    """The modes that it names, and those that a followed one is."""
-    return set(
-        target.asked.modes if target.followed is None else target.followed.exact_numbers.tolist()
-    )
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:

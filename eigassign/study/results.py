@@ -237,6 +237,12 @@ class TargetStudy(Brief):
         return self.asked.hz
 
     @property
+    def numbers(self) -> set[int]:
+        """The modes that it names, or that a followed one is with the answer."""
+        row = self.followed
+        return set(self.asked.modes if row is None else row.exact_numbers.tolist())
+
+    @property
     def approximation_error(self) -> float:
         """Largest |predicted / exact − 1| along the trajectory, at the optimum; 0 if not known."""
         if self.predicted_hz is None:

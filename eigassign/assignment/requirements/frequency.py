@@ -25,7 +25,6 @@ class AssignedFrequency(Requirement):
     """
 
     form = FrequencyTarget
-    of_soft_model = True
     columns = ("target", "initial", "one shot", "predicted", "exact")
 
     def __post_init__(self) -> None:

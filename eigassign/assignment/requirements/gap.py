@@ -12,7 +12,6 @@ class ModeGap(Requirement):
     """The frequencies of two modes differ by at least ``hz``."""
 
     form = GapTarget
-    of_soft_model = True
 
     @staticmethod
     def asked(target: GapTarget) -> str:

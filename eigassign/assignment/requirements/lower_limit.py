@@ -12,7 +12,6 @@ class LowerLimit(Requirement):
     """The frequency of a mode is at least ``hz``."""
 
     form = AtLeastTarget
-    of_soft_model = True
 
     @staticmethod
     def asked(target: AtLeastTarget) -> str:
@@ -23,7 +22,3 @@ class LowerLimit(Requirement):
     def edges(target: AtLeastTarget, *hz: Floats) -> Edges:
         """The limit, and no upper edge."""
         return hz[0], np.full_like(hz[0], np.inf)
-
-    def stake(self, hz: Floats, raised: float) -> float:
-        """The relative way of ``hz`` below the limit at worst; room that is left goes first."""
-        return float((1.0 - hz / (1.0 + raised) / self.hz).max())

@@ -90,7 +90,6 @@ class Requirement(Brief):
     """
 
     form: ClassVar[type[AnyTarget]]  # of the case file
-    of_soft_model: ClassVar[bool] = False  # a model that is too stiff may seem to meet it
     columns: ClassVar[tuple[str, ...]] = ("target", "initial", "one shot", "exact")
 
     label: str  # in words: "mode 2 at least 320 Hz"
@@ -203,9 +202,10 @@ class Requirement(Brief):
         """The modes to be shown with it, before and after; None where its curve says it all."""
         return None
 
-    def stake(self, hz: Floats, raised: float) -> float:
-        """The relative error that ``hz`` (n,) may have in a model that raises it so far at most."""
-        return raised if self.of_soft_model else 0.0
+    def stake(self, solved: Solved, raised: float) -> float:
+        """The largest error where a model raises all frequencies so far at most, relative."""
+        own = solved.hz / (1.0 + raised), solved.followed / (1.0 + raised), solved.numbers
+        return float(self.worst_errors(Solved(*own), solved).max())
 
     # --- Its rows of the programs
 

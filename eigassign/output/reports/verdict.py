@@ -138,7 +138,10 @@ def _trust(results: RunResults) -> Iterator[str]:
     if row.model_error != 0.0:
         most = row.model_error
         how = "an unknown amount" if most is None else f"{percent(max(most, 1e-5))} at most"
-        yield f"Mesh and reduced links put them too high by {how}."
+        judged = results.discretisation
+        few = judged is not None and judged.poses < results.time_s.size
+        where = f", at {judged.poses} of them" if judged is not None and few else ""
+        yield f"Mesh and reduced links put the modes asked for too high by {how}{where}."
     yield _sentence(row.optimality.words)
     if not row.finished:
         yield "The search was ended before it was done."

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
-from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.study.accuracy import model_error
+from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.study.accuracy import model_errors
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import error_between
 from eigassign.study.design.conclusions import extreme, is_proved
@@ -42,13 +42,14 @@ def assignment_row(
     answer: Answer,
     wanted: Sequence[Requirement],
     targets: Sequence[TargetStudy],
+    exact: Solved,
     mesh: MeshError | None,
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers.
 
-    ``mesh`` is the mesh's error there; ``unreachable`` says in words which targets are out of reach
-    within the bounds.
+    ``exact`` are its frequencies, ``mesh`` is the mesh's error there; ``unreachable`` says in words
+    which targets are out of reach within the bounds.
     """
     keys, found = scene.file.assignment, answer.found
     initial, optimal = _merits(answer, targets)
@@ -60,11 +61,9 @@ def assignment_row(
     limits = tuple(_limits(scene, answer.y))
     conflicting = () if answer.conflict is None else answer.conflict.names
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
-    of_model = {m for one in wanted if one.of_soft_model for m in one.modes}
-    raised = model_error(scene, mesh, answer.y, of_model)
+    of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
+    raised = max(of_model.values(), default=0.0)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
-    at_stake = (t.asked.stake(t.exact_hz, raised) for t in targets)
-    coarse = any(stake > largest for stake in at_stake)
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
     said = verdict(
         Facts(
@@ -73,7 +72,7 @@ def assignment_row(
             limits=limits,
             doubts=() if trusted else (UNTRUSTED,),
             unproved=(
-                *((_too_coarse(raised, largest),) if coarse else ()),
+                *_too_coarse(targets, exact, of_model, largest),
                 *_missed_between(scene, answer.y, targets, largest),
                 *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
@@ -174,11 +173,26 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
     return f"no design within the bounds {meets} {listed}{together}"
 
 
-def _too_coarse(raised: float, accepted: float) -> str:
+def _too_coarse(
+    targets: Sequence[TargetStudy], exact: Solved, of_model: Mapping[int, float], accepted: float
+) -> Iterator[str]:
+    """Say which target may be missed most by as much as mesh and reduced links raise its modes.
+
+    Bands are checked for themselves, and what nothing raises is what it seems to be.
+    """
+    worst, label, raised = 0.0, "", 0.0
+    for target in targets:
+        too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
+        if too_high > 0.0 and target.asked.terms:
+            stake = target.asked.stake(exact, too_high)
+            worst, label, raised = max((worst, label, raised), (stake, target.label, too_high))
+    if worst <= accepted:
+        return
     how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by more than can be told"
-    return (
-        f"mesh and reduced links raise the frequencies {how}, and {100 * accepted:.2g} % are "
-        f"accepted: {FINER}"
+    missed = f", so that it may be missed by {100 * worst:.3g} %" if np.isfinite(raised) else ""
+    yield (
+        f"{label}: mesh and reduced links raise the frequencies {how}{missed}, and "
+        f"{100 * accepted:.3g} % are accepted: {FINER}"
     )
 
 

@@ -180,6 +180,44 @@ def test_a_target_that_only_a_coarse_model_meets_is_not_called_reached(
         assert accepted.verdict == "reached"
 
 
+FEW = (("samples: 152", "samples: 12"), ("modes: [1]", "modes: auto"))
+ALIKE_3 = "{mode: {like: 3, at: {time: 0.5 s}}, at_least: 745 Hz}"
+APART = "{gap: {between: [2, 3], at_least: 219 Hz}}"
+
+
+@pytest.mark.parametrize(
+    ("links", "target", "missed"),
+    [
+        (COARSE, ALIKE_3, "mode 3"),  # 11 % too high, whatever its number
+        ((("elements: 4", "elements: 3"),), APART, "missed by"),  # 1.1 % of mode 3: 8 Hz of 219
+    ],
+)
+def test_a_mesh_counts_in_followed_modes_and_in_the_distance_of_two(
+    links: tuple[tuple[str, str], ...], target: str, missed: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "case.yaml"
+    path.write_text(changed(*links, *FEW, ("{mode: 1, frequency: 190 Hz}", target)))
+    row = solve_case(load_case(path)).results.assignment
+    assert row is not None
+    assert row.verdict == "do_not_use"
+    assert "more elements" in row.reason
+    assert missed in row.reason
+
+
+def test_what_a_mesh_leaves_open_adds_to_the_distance_of_a_wanted_frequency(tmp_path: Path) -> None:
+    path = tmp_path / "case.yaml"
+    words = []
+    for accepted in ("2 %", "1.6 %"):
+        path.write_text(f"{changed(*COARSE, *FEW)}assignment: {{max_error: {accepted}}}\n")
+        results = solve_case(load_case(path)).results
+        assert results.assignment is not None
+        assert 0.014 < results.targets[0].error.exact.max_relative < 0.016
+        assert results.assignment.model_error is not None
+        assert results.assignment.model_error > 0.003
+        words.append(results.assignment.verdict)
+    assert words == ["reached", "do_not_use"]
+
+
 def test_a_coordinate_that_only_trembles_asks_for_no_more_points(arm: Scene) -> None:
     """Round-off of a coordinate at rest is no motion between the samples."""
     solved = []
