@@ -8,6 +8,7 @@ Reading order:
     settling    chooses elements and reduced links left to auto, and builds the model
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
+    monotone    parameters in which every frequency is monotone, so that corners bound it
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict

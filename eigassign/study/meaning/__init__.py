@@ -3,7 +3,6 @@
 Reading order:
 
     sensitivity  slopes of the targeted frequencies at the answer, and what its limits cost
-    monotone     parameters in which every frequency is monotone, so that corners bound it
     reach        what each target can reach within the bounds, and which cannot be reached
     tolerance    what deviations of the parameters do to an answer
     tradeoff     the least error that each limit of the mass, or of the price, leaves

@@ -31,7 +31,7 @@ from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import DesignResponse, response_of
 from eigassign.study.design.variants import possible_counts
-from eigassign.study.meaning.monotone import corners, effects
+from eigassign.study.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
 

@@ -20,7 +20,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, followers, solve_design
-from eigassign.study.meaning.monotone import corners, effects
+from eigassign.study.monotone import corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
 
