@@ -117,7 +117,7 @@ def searched(case: BuiltCase) -> tuple[Result, CatalogueRow]:
     row = result.results.assignment
     assert row is not None
     assert row.catalogue is not None
-    assert row.optimality.kind == "bounded"
+    assert row.optimality.kind == "proved"
     return result, row.catalogue
 
 

@@ -290,7 +290,7 @@ def search_catalogue(
         else:
             pending = _split(problem, node, near)
     if not met.best:
-        raise _nothing(problem, nodes, exhausted)
+        raise none_found(problem, nodes, exhausted)
     bound = min([bound for bound, *_ in heap[:1]] + [met.best[0].objective])
     if not problem.convex:
         met.exchange(end)
@@ -298,7 +298,7 @@ def search_catalogue(
     return CatalogueSearch(tuple(every[:keep]), min(bound, every[0].objective), nodes, exhausted)
 
 
-def _nothing(problem: CatalogueProblem, nodes: int, exhausted: bool) -> EigassignError:
+def none_found(problem: CatalogueProblem, nodes: int, exhausted: bool) -> EigassignError:
     """The error of a search without any combination."""
     names = tuple(own.name for own in problem.catalogues)
     if exhausted:

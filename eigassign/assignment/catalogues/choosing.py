@@ -20,9 +20,11 @@ bound holds as far as these are global.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 
@@ -31,11 +33,13 @@ from eigassign.assignment.catalogues.branching import (
     SECONDS,
     CatalogueProblem,
     CatalogueSearch,
+    Combination,
     ListedValues,
     Node,
     Relaxed,
     Rows,
     hull,
+    none_found,
     search_catalogue,
 )
 from eigassign.assignment.checks import Floats
@@ -220,6 +224,8 @@ def _within(bounds: Bounds, own: ListedValues, rows: Rows) -> Rows:
 
 RELAXED = 3  # starts of the relaxation of all combinations
 MISSED = 1e-7  # of a constraint's terms: what the programs leave of a limit
+MOST = 5000  # combinations that are gone through one by one
+TOGETHER = 64  # combinations that are looked at together
 STOPPED = (End.SECONDS, End.INTERRUPTED)
 
 
@@ -227,13 +233,16 @@ STOPPED = (End.SECONDS, End.INTERRUPTED)
 class Chosen:
     """The best combinations met, the best first: their rows, and each with its exact optimum.
 
-    ``search`` is None where time ran out or Ctrl-C came before the tree was searched.
+    ``search`` is None where time ran out or Ctrl-C came before all was searched. ``settled``: of
+    each of all ``count`` combinations it is known that it is not better.
     """
 
     rows: tuple[Rows, ...]
     optima: tuple[Optimum, ...]
     search: CatalogueSearch | None
     appraisals: int
+    count: int
+    settled: bool
 
 
 class _StoppedError(Exception):
@@ -247,24 +256,31 @@ def choose(
     steps: int = 100,
     deadline: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
+    lacking: Callable[[Floats], float] = lambda _: 0.0,
 ) -> Chosen:
     """The combination with the least violation, then the least F; begun near ``starts``.
 
-    The first few are tried at the root of the tree. If no combination meets all limits, the tree is
-    searched anew for the one that misses them least. ``deadline`` is a time of `time.monotonic`.
-    Raises AccuracyError where no combination has an answer.
+    Up to `MOST` combinations are gone through one by one, those of which it is known that they are
+    no better excepted; more are searched as a tree. The first few starts are tried at its root. If
+    no combination meets all limits, the tree is searched anew for the one that misses them least.
+    ``deadline`` is a time of `time.monotonic`. ``lacking`` says of a design (n_y,) without anything
+    continuous, which meets all limits, what it misses besides. Raises AccuracyError where no
+    combination has an answer.
     """
-    exact = _Exact(problem, catalogues, starts, steps, deadline, progress)
+    exact = _Exact(problem, catalogues, starts, steps, deadline, progress, lacking)
+    count = prod(map(len, exact.root))
     try:
-        search = exact.searched()
+        search = exact.searched() if count > MOST else exact.enumerated()
     except (_StoppedError, AccuracyError):
         search = None
     if not exact.fixed and exact.solved(exact.nearest(exact.root, starts[0])) is None:
         raise AccuracyError(
             "catalogues: no combination was met that the mechanism can be solved at"
         )
-    best = best_first(sorted(exact.fixed), lambda rows: worth(exact.fixed[rows]))[:KEEP]
-    return Chosen(tuple(best), tuple(exact.fixed[r] for r in best), search, exact.appraisals)
+    best = best_first(sorted(exact.fixed), exact.worth)[:KEEP]
+    optima = tuple(exact.fixed[rows] for rows in best)
+    settled = search is not None and count <= MOST and exact.is_listed
+    return Chosen(tuple(best), optima, search, exact.appraisals, count, settled)
 
 
 class _Exact(CatalogueProblem):
@@ -281,14 +297,81 @@ class _Exact(CatalogueProblem):
         steps: int,
         deadline: float,
         progress: Callable[[str], None],
+        lacking: Callable[[Floats], float],
     ) -> None:
         super().__init__(catalogues, problem.lower.size)
-        self.problem, self.starts = problem, starts
+        self.problem, self.starts, self.lacking = problem, starts, lacking
+        listed = [column for own in catalogues for column in own.columns]
+        self.is_listed = not np.delete(problem.upper > problem.lower, listed).any()
         self.steps, self.deadline, self.progress = steps, deadline, progress
         self.bounds = Bounds(problem.lower, problem.upper)
         self.fixed: dict[Rows, Optimum] = {}
+        self.lacks: dict[Rows, float] = {}
         self.appraisals, self.nodes = 0, 0
         self.value: Callable[[Optimum], float | None] = _of_feasible
+
+    def worth(self, rows: Rows) -> tuple[float, float]:
+        """Violation and F of a combination that was solved."""
+        found = self.fixed[rows]
+        if found.seen.violation <= MET and self.is_listed and rows not in self.lacks:
+            self.lacks[rows] = self.lacking(found.y)
+        return max(found.seen.violation, self.lacks.get(rows, 0.0)), found.objective
+
+    def enumerated(self) -> CatalogueSearch:
+        """Go through all combinations, those first of which least is known against them.
+
+        What is known grows level by level (`Least`); at last a combination is solved. The search
+        ends when the first few are.
+        """
+        problem, every = self.problem, list(itertools.product(*self.root))
+        lower, upper = (np.tile(side, (len(every), 1)) for side in (problem.lower, problem.upper))
+        for own, at in zip(self.catalogues, np.array(every).T, strict=True):
+            lower[:, own.columns] = upper[:, own.columns] = own.rows[at]
+        levels = 0 if problem.least is None else problem.least.levels
+        level, violation = np.zeros(len(every), dtype=int), self._kept(lower, upper)
+        value = np.array([problem.price(y) for y in problem.cheapest(lower, upper)])
+        for start in self.starts:  # so that there is an answer when time runs out
+            self.solved(self.nearest(self.root, start))
+        while True:
+            level[np.isinf(violation)] = levels + 1
+            equal = violation <= max(violation.min(), 0.0) + MET
+            order = np.lexsort((value, np.where(equal, 0.0, violation)))
+            ahead = [k for k in order[:KEEP] if level[k] <= levels]
+            if not ahead:
+                break
+            if time.monotonic() > self.deadline:
+                raise _StoppedError
+            first = ahead[0]
+            if problem.least is not None and level[first] < levels:
+                alike = order[level[order] == level[first]]
+                alike = alike[:TOGETHER] if level[first] else alike
+                known = problem.least(level[first], lower[alike], upper[alike])
+                for k, (missed, residual) in zip(alike, known, strict=True):
+                    violation[k] = max(violation[k], missed)
+                    value[k] = problem.value(problem.cheapest(lower[k], upper[k]), residual)
+            else:
+                self.progress(f"catalogues: {len(self.fixed)} of {len(every)} combinations solved")
+                alike, found = np.array([first]), self.solved(every[first])
+                if found is not None and found.end in STOPPED:
+                    raise _StoppedError
+                none = np.inf, np.inf
+                violation[first], value[first] = self.worth(every[first]) if found else none
+            level[alike] += 1
+        if np.isinf(violation[order[0]]):
+            raise none_found(self, len(every), exhausted=True)
+        best = [every[k] for k in order[:KEEP] if np.isfinite(violation[k])]
+        told = (Combination(rows, self.fixed[rows].y, self.fixed[rows].objective) for rows in best)
+        return CatalogueSearch(tuple(told), float(value[order[0]]), len(every), exhausted=True)
+
+    def _kept(self, lower: Floats, upper: Floats) -> Floats:
+        """0 of each box of designs that linear limits leave something of, else infinite."""
+        kept = np.ones(len(lower), dtype=bool)
+        for row in self.problem.constraints:
+            ends = row.coefficients * lower, row.coefficients * upper
+            size = MISSED * np.maximum(*np.abs(ends)).sum(axis=1)
+            kept &= np.minimum(*ends).sum(axis=1) <= row.upper + size
+            kept &= np.maximum(*ends).sum(axis=1) >= row.lower - size
+        return np.where(kept, 0.0, np.inf)
 
     def searched(self) -> CatalogueSearch:
         """Search by F of what meets all limits; where nothing does, by the violation."""
@@ -333,10 +416,14 @@ class _Exact(CatalogueProblem):
             return self.fixed[rows]
         at = hull(self.catalogues, tuple((row,) for row in rows), self.bounds)[0]
         problem = replace(self.problem, lower=at.lower, upper=at.upper)
-        found = self._minimised(problem, np.clip(self.starts[0], at.lower, at.upper))
-        if found is not None:
-            self.fixed[rows] = found
-        return found
+        starts = [self.starts[0]]
+        if self.fixed and not self.is_listed:
+            starts += [best_first(self.fixed.values(), worth)[0].y]
+        each = (self._minimised(problem, np.clip(y, at.lower, at.upper)) for y in starts)
+        found = best_first(filter(None, each), worth)
+        if found:
+            self.fixed[rows] = found[0]
+        return self.fixed.get(rows)
 
     def _minimised(self, problem: DesignProblem, start: Floats) -> Optimum | None:
         try:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -57,6 +57,24 @@ class Appraisal:
         return float(np.max(self.excess, initial=0.0))
 
 
+class Least(Protocol):
+    """What is known of all designs between two without solving for the best: more at each level.
+
+    At the last one a single design is known but for its slopes.
+    """
+
+    @property
+    def levels(self) -> int:
+        """The number of levels."""
+
+    def __call__(self, level: int, lower: Floats, upper: Floats) -> Iterable[tuple[float, Floats]]:
+        """Yield the violation and the magnitudes of residuals (m,) that no design is below.
+
+        Of the designs between each of ``lower`` and ``upper`` (n, n_y); infinite where none has an
+        answer.
+        """
+
+
 @dataclass(frozen=True)
 class DesignProblem:
     """F and its limits; ``appraise`` may raise EigassignError where a design has no answer."""
@@ -68,6 +86,7 @@ class DesignProblem:
     prices: Floats | None = None  # (n_y,), of F per SI unit of y
     reference: Floats | None = None  # (n_y,), y that costs nothing
     objective: Objective = Objective.LEAST_SQUARES
+    least: Least | None = None
 
     @property
     def is_worst_case(self) -> bool:
@@ -83,6 +102,10 @@ class DesignProblem:
         if self.is_worst_case:
             return float(np.max(np.abs(residual), initial=0.0)) + self.price(y)
         return float(residual @ residual) + self.price(y)
+
+    def cheapest(self, lower: Floats, upper: Floats) -> Floats:
+        """The design (…, n_y) of least price between two."""
+        return lower if self.prices is None else np.where(self.prices > 0.0, lower, upper)
 
     def price(self, y: Floats) -> float:
         """p·(y − y_ref)."""

@@ -27,6 +27,7 @@ from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Frequencies,
     Requirement,
+    Solved,
     time_shares,
 )
 
@@ -95,6 +96,23 @@ class Requirements:
         residual, slopes = _stacked(residuals, len(y))
         excess = _stacked([rows.at(y, found) for rows in self.excesses], len(y))
         return Appraisal(residual, slopes, *excess, self._pairs(found, len(residual)))
+
+    def least(
+        self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved
+    ) -> tuple[float, Floats]:
+        """The violation that no design between two (n_y,) is below, and so its residuals (m,).
+
+        Its modes are between ``lowest`` and ``highest``; residuals are in magnitude.
+        """
+        excess, residual = (
+            [rows.least(*rows.of.range_over(lower, upper, lowest, highest)) for rows in some]
+            for some in (self.excesses, self.residuals)
+        )
+        if self.least_change is not None:
+            reference, width = self.least_change
+            residual.append((np.clip(reference, lower, upper) - reference) / width)
+        worst = max((float(one.max()) for one in excess), default=0.0)
+        return max(worst, 0.0), np.concatenate([np.zeros(0), *residual])
 
     def _pairs(self, found: Frequencies, m: int) -> NeighbourPairs | None:
         """Rows of one mode beside its neighbours; None where nothing is known of these.

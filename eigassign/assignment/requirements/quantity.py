@@ -7,9 +7,14 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.linear import LinearConstraint
-from eigassign.assignment.requirements.requirement import Quantity, Requirement
+from eigassign.assignment.requirements.requirement import (
+    Edges,
+    Floats,
+    Quantity,
+    Requirement,
+    Solved,
+)
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.mechanism.assembly.total_mass import TotalMass
@@ -37,9 +42,22 @@ class LimitedQuantity(Requirement):
         return cls(label, place, ((quantity, 1.0),), slice(0, 1), lower, upper)
 
     @property
+    def is_affine(self) -> bool:
+        """True where it is affine in the design, and so allows a convex set of designs."""
+        return True
+
+    @property
     def is_convex(self) -> bool:
         """True where it allows a convex set of designs."""
-        return True
+        return self.is_affine
+
+    def range_over(self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved) -> Edges:
+        """Its range over designs between two (n_y,); endless where it is not affine."""
+        middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        if half.any() and not self.is_affine:
+            return np.array([-np.inf]), np.array([np.inf])
+        amount, reach = self.amount(middle), np.abs(self.slopes(middle)) @ half
+        return np.array([amount - reach]), np.array([amount + reach])
 
     # --- Amounts in words
 
@@ -108,7 +126,7 @@ class MassLimit(LimitedQuantity):
             yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
 
     @property
-    def is_convex(self) -> bool:
+    def is_affine(self) -> bool:
         """True where the mass is affine in the design."""
         mass = self.terms[0][0]
         return isinstance(mass, TotalMass) and mass.is_affine

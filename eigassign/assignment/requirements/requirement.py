@@ -179,6 +179,10 @@ class Requirement(Brief):
             least, most = least + (low if c > 0.0 else high), most + (high if c > 0.0 else low)
         return np.asarray(least), np.asarray(most)
 
+    def range_over(self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved) -> Edges:
+        """The range (n,) of its curve over designs between two (n_y,), of modes between two."""
+        return self.curve_range(lowest, highest)
+
     def errors(self, solved: Solved) -> Floats:
         """The errors (n,)."""
         return self.worst_errors(solved, solved)
@@ -302,6 +306,12 @@ class EdgeRows:
         """The rows and their slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
         value, slopes = self.of.value(y, found)
         return self.scale * (value - self.edge), self.scale[:, None] * slopes
+
+    def least(self, low: Floats, high: Floats) -> Floats:
+        """The rows (n,) that no curve between two is below; of a goal in magnitude."""
+        ends = self.scale * (low - self.edge), self.scale * (high - self.edge)
+        least, most = np.minimum(*ends), np.maximum(*ends)
+        return np.maximum(np.maximum(least, -most), 0.0) if self.of.is_goal else least
 
     def curve(self, rows: Floats) -> Floats:
         """The curve (n,) that these rows stand for."""

@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.catalogues.branching import CatalogueSearch
+from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
@@ -14,6 +16,7 @@ from eigassign.study.accuracy import model_errors
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import error_between
 from eigassign.study.design.conclusions import extreme, is_proved
+from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
@@ -258,14 +261,7 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     best, chosen = found.best, found.chosen
     many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
     if chosen is not None and chosen.search is not None:
-        gap = chosen.search.relative_gap
-        better = f"better by more than {100 * gap:.2g} % of the objective" if gap else "better"
-        words = (
-            f"the best combination of the catalogues, by branch and bound in {chosen.search.nodes} "
-            f"nodes: none is {better}, if the optima of the relaxed problems (the first from "
-            f"{many}) are global"
-        )
-        return OptimalityRow("bounded", best.stationarity, gap, words)
+        return _of_catalogues(found, chosen, chosen.search)
     if chosen is None and is_proved(scene, found):
         met = best.seen.violation <= MET
         words = "the problem is convex: " + (
@@ -279,6 +275,25 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
         words += f"; {found.untried} choices of the numbers of modes below the bands were not tried"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
+    return OptimalityRow("local", best.stationarity, None, words)
+
+
+def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:
+    """What is known where the catalogues were searched to the end."""
+    best, among = found.best, f"{chosen.count} combinations of the catalogues"
+    each = [one.chosen is not None and one.chosen.settled for one in found.variants]
+    if all(each) and not found.untried and not found.lost:
+        met = best.seen.violation <= MET
+        words = f"of all {among} " + (
+            "none is better" if met else "none meets all limits, or misses them by less"
+        )
+        return OptimalityRow("proved", best.stationarity, 0.0, words)
+    how = (
+        "each as far as it may be better, its other parameters from two starts"
+        if search.nodes == chosen.count
+        else f"by branch and bound in {search.nodes} nodes"
+    )
+    words = f"the best found of {among}, {how}: others may be better"
     return OptimalityRow("local", best.stationarity, None, words)
 
 

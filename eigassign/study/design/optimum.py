@@ -144,12 +144,19 @@ def _search_catalogues(
 ) -> Searched:
     """The best combinations; where none meets the linear limits, these are missed as others are."""
     steps, near = task.scene.file.assignment.steps, starts[: KEEP + 1]
+
+    def chosen_of(variant: PosedProblem) -> Chosen:
+        def lacking(y: Floats) -> float:
+            return wanting([*_clearances(task, variant, y)])
+
+        return choose(variant.problem, listed, near, steps, deadline, progress, lacking)
+
     variant = variant_of(task, below)
     try:
-        chosen = choose(variant.problem, listed, near, steps, deadline, progress)
+        chosen = chosen_of(variant)
     except InfeasibleError:
         variant = variant_of(task, below, missed=True)
-        chosen = choose(variant.problem, listed, near, steps, deadline, progress)
+        chosen = chosen_of(variant)
     return Searched(
         variant=variant,
         optima=chosen.optima,

@@ -12,11 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.requirements.requirement import Frequencies, Solved
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
@@ -26,6 +29,7 @@ from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.surrogate import Surrogate
 from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
+from eigassign.study.monotone import corners
 from eigassign.study.scene import OTHERS, Scene
 
 Floats = NDArray[np.float64]
@@ -112,6 +116,95 @@ def response_of(
     wanted = np.append(moving, upper > lower)
     own = scene.model, scene.path, wanted, count, followers, models
     return DesignResponse(*own, initial=scene.initial)
+
+
+# --- Of many designs, without slopes
+
+SPREAD = (4, 16, 64)  # samples that are looked at before all are
+ENDLESS = 1e150  # Hz; squares of it are numbers
+
+
+@dataclass
+class Glances:
+    """The lowest ``count`` frequencies of many designs at more and more samples, remembered."""
+
+    model: Model
+    path: Trajectories
+    count: int
+    known: dict[bytes, Floats] = field(default_factory=dict)  # (n, count) in Hz; NaN: no answer
+    exact_solves: int = 0  # so far
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """All samples, those first that are spread over the trajectories."""
+        spread = np.concatenate([self.path.spread(few) for few in SPREAD])
+        return np.array([*dict.fromkeys([*spread.tolist(), *range(len(self.path.q))])])
+
+    @cached_property
+    def levels(self) -> tuple[int, ...]:
+        """The numbers of samples to look at, one after the other: none first, and all last."""
+        fewest = (np.isin(self.order, self.path.spread(few)) for few in SPREAD)
+        ends = (int(np.flatnonzero(those).max()) + 1 for those in fewest)
+        return tuple(sorted({0, *ends, len(self.order)}))
+
+    def look(self, designs: Floats, few: int) -> None:
+        """Solve designs (n, n_y) at the first samples, as far as they are not known."""
+        each = {y.tobytes(): y for y in designs}
+        had = {key: self.known.setdefault(key, np.zeros((0, self.count))) for key in each}
+        left = [key for key in each if len(had[key]) < few]
+        if not left:
+            return
+        try:
+            q = [self.path.at(each[key])[0][self.order[len(had[key]) : few]] for key in left]
+            lengths = [len(poses) for poses in q]
+            y = np.repeat([each[key] for key in left], lengths, axis=0)
+            hz = self.model.frequencies(np.concatenate(q), y, self.count)
+        except EigassignError:
+            if len(left) == 1:
+                self.known[left[0]] = np.full((len(self.order), self.count), np.nan)
+                return
+            for key in left:
+                self.look(each[key][None], few)
+            return
+        self.exact_solves += len(hz)
+        for key, own in zip(left, np.split(hz, np.cumsum(lengths)[:-1]), strict=True):
+            self.known[key] = np.concatenate([had[key], own])
+
+    def solved(self, y: Floats, few: int, unknown: float) -> Solved | None:
+        """A design at the first samples, ``unknown`` Hz elsewhere; None without an answer."""
+        hz = np.full((len(self.order), self.count), unknown)
+        hz[self.order[:few]] = self.known[y.tobytes()][:few] if few else np.zeros((0, self.count))
+        nothing = np.zeros((len(hz), 0))
+        return None if np.isnan(hz).any() else Solved(hz, nothing, nothing.astype(np.intp))
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What is known of all designs between two: a `Least` of requirements.
+
+    Their frequencies are between those at two corners, where they differ only in parameters in
+    which every frequency is monotone: with others there is no level but that without samples.
+    """
+
+    file: CaseFile
+    requirements: Requirements
+    glances: Glances
+    levels: int
+
+    def __call__(self, level: int, lower: Floats, upper: Floats) -> Iterator[tuple[float, Floats]]:
+        """Yield the violation and the magnitudes of residuals (m,) that no design is below."""
+        few, own = self.glances.levels[level], self.glances
+        boxes = zip(lower, upper, *corners(self.file, lower, lower, upper), strict=True)
+        own.look(np.concatenate(corners(self.file, lower, lower, upper)), few)
+        for low, high, softest, stiffest in boxes:
+            lowest, highest = own.solved(softest, few, 0.0), own.solved(stiffest, few, ENDLESS)
+            if lowest is None or highest is None:  # of several designs others may have an answer
+                yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
+                continue
+            try:
+                yield self.requirements.least(low, high, lowest, highest)
+            except EigassignError:  # no mechanism has such properties
+                yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
 
 
 # --- Reduced models

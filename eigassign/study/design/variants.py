@@ -27,7 +27,14 @@ from eigassign.assignment.requirements.sampling import requirements_of, time_wei
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers
-from eigassign.study.design.response import DesignResponse, ReducedModels, response_of
+from eigassign.study.design.response import (
+    DesignResponse,
+    Glances,
+    Outlook,
+    ReducedModels,
+    response_of,
+)
+from eigassign.study.monotone import effects
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -51,7 +58,12 @@ class PosedProblem:
 
     def of(self, some: Requirements) -> DesignProblem:
         """The problem with ``some`` of its requirements, beside limits that every step keeps."""
-        return replace(self.problem, appraise=lambda y: some.appraise(y, self.response(y)))
+        least = self.problem.least
+        if isinstance(least, Outlook):
+            least = replace(least, requirements=some)
+        return replace(
+            self.problem, appraise=lambda y: some.appraise(y, self.response(y)), least=least
+        )
 
     def with_limits(self, names: Collection[str]) -> DesignProblem:
         """The problem with those limits only that are named."""
@@ -78,6 +90,23 @@ class Task:
     def bands(self) -> tuple[ForbiddenBand, ...]:
         """The bands along each trajectory for itself."""
         return tuple(band for one in self.wanted for band in one.bands)
+
+    @cached_property
+    def glances(self) -> dict[int, Glances]:
+        """What is known of many designs, by the number of modes."""
+        return {}
+
+    def outlook(self, asked: Requirements) -> Outlook | None:
+        """What is known of designs without solving for the best; None of followed modes."""
+        scene, count = self.scene, asked.modes
+        if self.followers:
+            return None
+        lower, upper = scene.bounds
+        listed = [k for own in scene.file.design.catalogues for k in own.columns]
+        known = (effects(scene.file) != 0.0) | (lower == upper)
+        known[listed] = True
+        own = self.glances.setdefault(count, Glances(scene.model, scene.path, count))
+        return Outlook(scene.file, asked, own, len(own.levels) if known.all() else 1)
 
     @cached_property
     def followers(self) -> tuple[Follower, ...]:
@@ -148,6 +177,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         constraints=scene.constraints if kept else (),
         prices=prices if prices.any() else None,
         reference=scene.initial,
+        least=task.outlook(requirements),
         objective=objective if has_goals else Objective.LEAST_SQUARES,
     )
     named = zip((band.label for band in task.bands), below, strict=True)
