@@ -29,7 +29,7 @@ from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.surrogate import Surrogate
 from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
-from eigassign.study.monotone import corners
+from eigassign.study.monotone import corners, effects
 from eigassign.study.scene import OTHERS, Scene
 
 Floats = NDArray[np.float64]
@@ -205,6 +205,23 @@ class Outlook:
                 yield self.requirements.least(low, high, lowest, highest)
             except EigassignError:  # no mechanism has such properties
                 yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
+
+
+def outlook_of(
+    scene: Scene,
+    requirements: Requirements,
+    followers: tuple[Follower, ...],
+    glances: dict[int, Glances],
+) -> Outlook | None:
+    """The outlook of requirements, ``glances`` by the number of modes; None of followed ones."""
+    if followers:
+        return None
+    lower, upper = scene.bounds
+    known = (effects(scene.file) != 0.0) | (lower == upper)
+    known[[k for own in scene.file.design.catalogues for k in own.columns]] = True
+    count = requirements.modes
+    own = glances.setdefault(count, Glances(scene.model, scene.path, count))
+    return Outlook(scene.file, requirements, own, len(own.levels) if known.all() else 1)
 
 
 # --- Reduced models

@@ -32,9 +32,9 @@ from eigassign.study.design.response import (
     Glances,
     Outlook,
     ReducedModels,
+    outlook_of,
     response_of,
 )
-from eigassign.study.monotone import effects
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -95,18 +95,6 @@ class Task:
     def glances(self) -> dict[int, Glances]:
         """What is known of many designs, by the number of modes."""
         return {}
-
-    def outlook(self, asked: Requirements) -> Outlook | None:
-        """What is known of designs without solving for the best; None of followed modes."""
-        scene, count = self.scene, asked.modes
-        if self.followers:
-            return None
-        lower, upper = scene.bounds
-        listed = [k for own in scene.file.design.catalogues for k in own.columns]
-        known = (effects(scene.file) != 0.0) | (lower == upper)
-        known[listed] = True
-        own = self.glances.setdefault(count, Glances(scene.model, scene.path, count))
-        return Outlook(scene.file, asked, own, len(own.levels) if known.all() else 1)
 
     @cached_property
     def followers(self) -> tuple[Follower, ...]:
@@ -177,7 +165,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         constraints=scene.constraints if kept else (),
         prices=prices if prices.any() else None,
         reference=scene.initial,
-        least=task.outlook(requirements),
+        least=outlook_of(scene, requirements, task.followers, task.glances),
         objective=objective if has_goals else Objective.LEAST_SQUARES,
     )
     named = zip((band.label for band in task.bands), below, strict=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from time import monotonic
 from typing import TypeVar
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.choosing import choose
-from eigassign.assignment.exact.design_problem import MET, DesignProblem
+from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.feasibility import constraints_agree
@@ -29,7 +30,7 @@ from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import catalogues
-from eigassign.study.design.response import DesignResponse, response_of
+from eigassign.study.design.response import DesignResponse, Glances, outlook_of, response_of
 from eigassign.study.design.variants import possible_counts
 from eigassign.study.monotone import corners, effects
 from eigassign.study.results import RangeRow
@@ -169,13 +170,21 @@ def _nearest(
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
     followed = followers(alone, [replace(there, followed=wanted.followed), *beside])
     listed, found = catalogues(scene.file), []
+    glances: dict[int, Glances] = {}
     for below in possible_counts(alone, bands)[0][:CHOICES]:
         kept = []
         for band, n in zip(bands, below, strict=True):
             above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)
             kept += band.kept_clear(n, above, 0.0)
         asked = Requirements((there, *beside, *elastic, *kept), np.ones(1))
-        problem = _problem(alone, asked, response_of(alone, asked.modes, followed))
+        response = response_of(alone, asked.modes, followed)
+        problem = DesignProblem(
+            partial(_appraised, asked, response),
+            lower,
+            upper,
+            scene.constraints,
+            least=outlook_of(alone, asked, followed, glances),
+        )
         for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
             try:
                 if listed:
@@ -193,9 +202,8 @@ def _nearest(
     return float(min(found)[1]) if found else None
 
 
-def _problem(scene: Scene, asked: Requirements, response: DesignResponse) -> DesignProblem:
-    lower, upper = scene.bounds
-    return DesignProblem(lambda y: asked.appraise(y, response(y)), lower, upper, scene.constraints)
+def _appraised(asked: Requirements, response: DesignResponse, y: Floats) -> Appraisal:
+    return asked.appraise(y, response(y))
 
 
 def _holds(one: Requirement, at: int) -> bool:
