@@ -38,6 +38,7 @@ from eigassign.assignment.catalogues.branching import (
     Node,
     Relaxed,
     Rows,
+    distinct_rows,
     hull,
     none_found,
     search_catalogue,
@@ -245,6 +246,17 @@ class Chosen:
     settled: bool
 
 
+def combinations(
+    catalogues: Sequence[ListedValues], lower: Floats, upper: Floats
+) -> tuple[list[Rows], Floats, Floats]:
+    """All combinations, none twice, and the limits (n, n_y) that each leaves of others (n_y,)."""
+    every = list(itertools.product(*(distinct_rows(own).tolist() for own in catalogues)))
+    least, most = (np.tile(side, (len(every), 1)) for side in (lower, upper))
+    for own, rows in zip(catalogues, np.array(every).T, strict=True):
+        least[:, own.columns] = most[:, own.columns] = own.rows[rows]
+    return every, least, most
+
+
 class _StoppedError(Exception):
     """Time ran out inside the tree."""
 
@@ -323,10 +335,8 @@ class _Exact(CatalogueProblem):
         What is known grows level by level (`Least`); at last a combination is solved. The search
         ends when the first few are.
         """
-        problem, every = self.problem, list(itertools.product(*self.root))
-        lower, upper = (np.tile(side, (len(every), 1)) for side in (problem.lower, problem.upper))
-        for own, at in zip(self.catalogues, np.array(every).T, strict=True):
-            lower[:, own.columns] = upper[:, own.columns] = own.rows[at]
+        problem = self.problem
+        every, lower, upper = combinations(self.catalogues, problem.lower, problem.upper)
         levels = 0 if problem.least is None else problem.least.levels
         level, violation = np.zeros(len(every), dtype=int), self._kept(lower, upper)
         value = np.array([problem.price(y) for y in problem.cheapest(lower, upper)])

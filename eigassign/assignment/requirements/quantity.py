@@ -11,6 +11,7 @@ from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,
+    Frequencies,
     Quantity,
     Requirement,
     Solved,
@@ -21,6 +22,7 @@ from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.modal.model import Model
 
 _MASS = "design.mass"
+_NO_MODES = Frequencies(np.zeros((1, 0)), np.zeros((1, 0, 0)))
 
 
 class LimitedQuantity(Requirement):
@@ -56,8 +58,9 @@ class LimitedQuantity(Requirement):
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         if half.any() and not self.is_affine:
             return np.array([-np.inf]), np.array([np.inf])
-        amount, reach = self.amount(middle), np.abs(self.slopes(middle)) @ half
-        return np.array([amount - reach]), np.array([amount + reach])
+        amount, slopes = self.value(middle, _NO_MODES)
+        reach = np.abs(slopes) @ half
+        return amount - reach, amount + reach
 
     # --- Amounts in words
 

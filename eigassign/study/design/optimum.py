@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import KEEP, ListedValues
-from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, choose
+from eigassign.assignment.catalogues.choosing import MOST, RELAXED, Chosen, choose, combinations
 from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, worth
@@ -24,7 +25,13 @@ from eigassign.study.design.clearance import check_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
-from eigassign.study.design.variants import PosedProblem, Task, possible_counts, variant_of
+from eigassign.study.design.variants import (
+    PosedProblem,
+    Task,
+    counts_of,
+    possible_counts,
+    variant_of,
+)
 from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
@@ -109,6 +116,10 @@ def _best_variant(
     """
     scene, listed = task.scene, catalogues(task.scene.file)
     choices, total = possible_counts(scene, task.bands)
+    if task.bands and listed and prod(len(own.rows) for own in listed) <= MOST:
+        _, lower, upper = combinations(listed, *scene.bounds)
+        every = counts_of(scene, task.bands, lower) if np.array_equal(lower, upper) else []
+        choices, total = (every, len(every)) if every else (choices, total)
     tried: list[Searched] = []
     for below in choices[:VARIANTS]:
         if listed:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -209,8 +210,34 @@ def possible_counts(
     return sorted(found, key=rank), math.prod(map(len, each))
 
 
+def counts_of(
+    scene: Scene, bands: Sequence[ForbiddenBand], designs: Floats
+) -> list[tuple[int, ...]]:
+    """Every choice of k with which a design of (n, n_y) may be clear of all bands.
+
+    It is that of the first sample of each, and the same at both edges. The commonest comes first.
+    """
+    try:
+        q = np.array([scene.path.at(y)[0] for y in designs])
+        each = []
+        for band in bands:
+            ends = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
+            first = replace(band, **dict(zip(("lower", "upper"), ends, strict=True)))
+            hz = _all_below(scene, q[:, band.rows.start], designs, float(band.upper[0]))
+            each.append(first.below(hz))
+    except EigassignError:
+        alone = designs[:, None] if len(designs) > 1 else ()
+        return list(dict.fromkeys(found for y in alone for found in counts_of(scene, bands, y)))
+    low, high = np.swapaxes(each, 0, 1)
+    found = Counter(map(tuple, low[:, (low == high).all(axis=0)].T.tolist()))
+    return [choice for choice, _ in found.most_common()]
+
+
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:
-    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere or have mass."""
+    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere or have mass.
+
+    At q (n, n_q), of one design y (n_y,) or of each (n, n_y).
+    """
     available = scene.model.n_dof - scene.model.n_rigid
     count = min(4, available)
     while True:
