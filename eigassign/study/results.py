@@ -348,9 +348,9 @@ class CombinationRow:
 
 @dataclass(frozen=True)
 class CatalogueRow:
-    """The search of the catalogues; null where it was ended before it could tell."""
+    """The search of the catalogues; null where it was ended before it could tell, or cannot."""
 
-    nodes: Annotated[int | None, Fact("of its tree")]
+    nodes: Annotated[int | None, Fact("of its tree, or combinations gone through")]
     gap: Annotated[Share | None, Fact("relative to the objective")]
     best: Annotated[tuple[CombinationRow, ...], Fact("the best few, the best first")]
 

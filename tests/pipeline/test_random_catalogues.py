@@ -12,7 +12,7 @@ import pytest
 
 from eigassign.case import parse
 from eigassign.pipeline import solve_case
-from eigassign.study import BuiltCase, check_clear
+from eigassign.study import BuiltCase
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD = TEXT.partition("design: #")[0]
@@ -129,3 +129,22 @@ def compared(case: BuiltCase) -> tuple[str, float, float, float]:
     clear = all(one.clear for one in row.clearances)
     found = row.objective_optimal if row.catalogue.best[0].violation <= 1e-9 and clear else np.inf
     return row.optimality.kind, found, best[0][0] if best else np.inf, seconds
+
+
+def agree(found: float, best: float) -> bool:
+    return found == best or abs(found - best) <= 1e-7 * abs(best)
+
+
+def test_the_best_of_random_catalogues_is_that_of_brute_force() -> None:
+    for seed in (1, 3, 108):
+        kind, found, best, _ = compared(random_case(np.random.default_rng(seed), 120))
+        assert kind == "proved"
+        assert agree(found, best)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 150))
+def test_so_it_is_of_up_to_5000_combinations(seed: int) -> None:
+    kind, found, best, _ = compared(random_case(np.random.default_rng(seed), 5000))
+    assert kind == "proved"
+    assert agree(found, best)

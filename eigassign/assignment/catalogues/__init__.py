@@ -1,4 +1,4 @@
-"""The best combinations of what catalogues list, by branch and bound.
+"""The best combinations of what catalogues list, one by one or by branch and bound.
 
 Reading order:
 

@@ -12,10 +12,12 @@ catalogues, and so a bound for each of their rows. All combinations of a small n
 once, by J ≥ ‖P (A (y − y0) + b)‖², where P projects onto what continuous columns cannot change;
 without such columns that bound is J itself.
 
-**The exact problem** (`choose`), solved in steps. A node's relaxation is the problem within the
-hull of its rows; a combination is the problem with the listed columns held. Both are minimised by
-`sequential`, the continuous columns along with them. The relaxations are local optima, so that the
-bound holds as far as these are global.
+**The exact problem** (`choose`), solved in steps. A combination is the problem with the listed
+columns held, its continuous columns minimised by `sequential`. Up to `MOST` combinations are gone
+through one by one, each as far as what is known of it (`Least`) does not put it behind the best:
+without continuous columns the best few are the best there are. Of more, a node's relaxation is the
+problem within the hull of its rows. That is a local optimum and no bound: the best of a tree is the
+best found.
 """
 
 from __future__ import annotations
@@ -404,7 +406,10 @@ class _Exact(CatalogueProblem):
         problem = replace(
             self.problem, lower=bounds.lower, upper=bounds.upper, constraints=constraints
         )
-        starts = self.starts[:RELAXED] if near is None else (near,)
+        starts = list(self.starts[:RELAXED])
+        if near is not None:  # optima of the whole are those of a node that holds them
+            within = ((bounds.lower <= y) & (y <= bounds.upper) for y in starts)
+            starts = [near, *(y for y, at in zip(starts, within, strict=True) if at.all())]
         found = (self._valued(self._minimised(problem, start)) for start in starts)
         best = min(filter(None, found), key=lambda each: each[1], default=None)
         return None if best is None else Relaxed(*best)

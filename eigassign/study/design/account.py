@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import CatalogueSearch
-from eigassign.assignment.catalogues.choosing import Chosen
+from eigassign.assignment.catalogues.choosing import MOST, Chosen
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
@@ -35,6 +35,7 @@ from eigassign.study.results import (
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 LIMIT = 1e-4  # of a limit, by which it may be missed between samples
 UNTRUSTED = "the expansion is further from exact than validation.max_error allows"
 FINER = "give the links more elements, raise reduce_to, or write auto"
@@ -227,7 +228,8 @@ def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> C
     )
     if search is None:
         return CatalogueRow(None, None, best)
-    return CatalogueRow(search.nodes, search.relative_gap, best)
+    gap = search.relative_gap if found is None else 0.0 if _is_settled(found) else None
+    return CatalogueRow(search.nodes, gap, best)
 
 
 def _merits(
@@ -281,20 +283,26 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
 def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:
     """What is known where the catalogues were searched to the end."""
     best, among = found.best, f"{chosen.count} combinations of the catalogues"
-    each = [one.chosen is not None and one.chosen.settled for one in found.variants]
-    if all(each) and not found.untried and not found.lost:
-        met = best.seen.violation <= MET
-        words = f"of all {among} " + (
-            "none is better" if met else "none meets all limits, or misses them by less"
-        )
+    met, of_bands = best.seen.violation <= MET, bool(found.variant.below)
+    if _is_settled(found):
+        words = f"of all {among} none {'is better' if met else 'meets all limits'}"
+        if not met and not of_bands:
+            words += ", or misses them by less"
+        most = best.objective + EQUAL * abs(best.objective)
+        if equal := sum(o.seen.violation <= MET and o.objective <= most for o in found.optima[1:]):
+            words += f"; {equal} more in the list of the best are as good"
         return OptimalityRow("proved", best.stationarity, 0.0, words)
-    how = (
-        "each as far as it may be better, its other parameters from two starts"
-        if search.nodes == chosen.count
-        else f"by branch and bound in {search.nodes} nodes"
-    )
+    how = f"by branch and bound in {search.nodes} nodes"
+    if chosen.count <= MOST:
+        how = "each as far as it may be better, its other parameters from two starts"
     words = f"the best found of {among}, {how}: others may be better"
     return OptimalityRow("local", best.stationarity, None, words)
+
+
+def _is_settled(found: Found) -> bool:
+    """True where every combination of the catalogues is known not to be better."""
+    each = [one.chosen is not None and one.chosen.settled for one in found.variants]
+    return all(each) and not found.untried and not found.lost
 
 
 def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:

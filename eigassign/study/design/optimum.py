@@ -123,9 +123,10 @@ def _best_variant(
     tried: list[Searched] = []
     for below in choices[:VARIANTS]:
         if listed:
-            tried.append(_search_catalogues(task, below, listed, starts, deadline, progress))
+            found = _search_catalogues(task, below, listed, levels, starts, deadline, progress)
         else:
-            tried.append(search_starts(levels, below, starts, tried, deadline, progress))
+            found = search_starts(levels, below, starts, tried, deadline, progress)
+        tried.append(found)
         ended, chosen = tried[-1].ended, tried[-1].chosen
         if ended or (chosen and chosen.search is None):
             break
@@ -138,7 +139,8 @@ def _best_variant(
         initial=_initial(scene, variant),
         clearances=tuple(_clearances(task, variant, best.y)),
         starts=sum(one.starts for one in tried),
-        exact_solves=sum(one.exact_solves for one in tried) + len(scene.path.q),
+        exact_solves=len(scene.path.q)
+        + sum(one.exact_solves for one in (*tried, *task.glances.values())),
         chosen=variants[0].chosen,
         lost=tuple(dict.fromkeys(line for one in tried for line in one.lost)),
         untried=total - len(tried),
@@ -149,12 +151,20 @@ def _search_catalogues(
     task: Task,
     below: tuple[int, ...],
     listed: Sequence[ListedValues],
+    levels: Sequence[Task],
     starts: Sequence[Floats],
     deadline: float,
     progress: Callable[[str], None],
 ) -> Searched:
-    """The best combinations; where none meets the linear limits, these are missed as others are."""
+    """The best combinations; where none meets the linear limits, these are missed as others are.
+
+    More than can be gone through are searched about the local optima without lists.
+    """
     steps, near = task.scene.file.assignment.steps, starts[: KEEP + 1]
+    relaxed = Searched(variant_of(task, below))
+    if prod(len(own.rows) for own in listed) > MOST:
+        relaxed = search_starts(levels, below, starts, (), deadline, progress)
+        near = [*(found.y for found in relaxed.optima[:RELAXED]), *near]
 
     def chosen_of(variant: PosedProblem) -> Chosen:
         def lacking(y: Floats) -> float:
@@ -171,8 +181,8 @@ def _search_catalogues(
     return Searched(
         variant=variant,
         optima=chosen.optima,
-        starts=min(len(near), RELAXED),
-        exact_solves=chosen.appraisals * len(task.scene.path.q),
+        starts=relaxed.starts or min(len(near), RELAXED),
+        exact_solves=chosen.appraisals * len(task.scene.path.q) + relaxed.exact_solves,
         lost=tuple(variant.response.lost),
         chosen=chosen,
     )
