@@ -146,10 +146,13 @@ def test_errors_of_frequencies_that_lie_between_two_are_those_of_the_worst_and_t
     for errors in np.abs([*at_corners, *(one.errors(solved(hz)) for hz in inside)]):
         assert (best <= errors + 1e-15).all()
         assert errors.max() <= worst.max() + 1e-15
+    least, most = one.curve_range(solved(lowest), solved(highest))
+    curves = np.array([one.curve(solved(hz)) for hz in (*corners, *inside)])
     if "keep_out" not in target:
-        least, most = one.curve_range(solved(lowest), solved(highest))
-        curves = np.array([one.curve(solved(hz)) for hz in corners])
         np.testing.assert_allclose([least, most], [curves.min(axis=0), curves.max(axis=0)])
+    assert (curves >= least - 1e-9).all()
+    assert (curves <= most + 1e-9).all()
+    assert np.array_equal(*one.curve_range(solved(lowest), solved(lowest)))
 
 
 def test_a_band_is_missed_by_the_best_number_of_modes_below_it(wanted: Read) -> None:

@@ -109,8 +109,15 @@ class ForbiddenBand(Requirement):
         return np.asarray(own[np.arange(len(own)), nearest])
 
     def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
-        """The curve of either: no range, for another mode may be nearest."""
-        return self.curve(lowest), self.curve(highest)
+        """Bounds (n,) of the curve: no farther from the middle than one mode is at the most."""
+        least, most = self._counted(lowest), self._counted(highest)
+        middle = 0.5 * (self.lower + self.upper)[:, None]
+        far = np.maximum(middle - least, most - middle).min(axis=1, keepdims=True)
+        ends = middle - far, middle + far
+        slack = 1e-12 * middle  # round-off: of one frequency, least and most are at an end
+        near = (most >= ends[0] - slack) & (least <= ends[1] + slack)
+        low, high = (np.clip(end, least, most) for end in ends)
+        return np.where(near, low, np.inf).min(axis=1), np.where(near, high, 0.0).max(axis=1)
 
     def worst_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """The way (n,) that modes between two frequencies lack to be clear."""

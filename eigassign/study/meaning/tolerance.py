@@ -113,8 +113,8 @@ def _corners(n: int) -> Floats:
 
 
 def _how(wanted: Requirement, how: str) -> str:
-    """Corners bound each of two modes, whose distance need not reach what these bounds leave."""
-    return "bounded" if how == "proved" and len(wanted.terms) > 1 else how
+    """Corners bound each of several modes: their distance, or the nearest, need not reach that."""
+    return "bounded" if how == "proved" and len(wanted.terms) != 1 else how
 
 
 def _exact(scene: Scene, own: Sequence[Follower]) -> Ranges:
