@@ -300,3 +300,20 @@ def test_slopes_that_vanish_or_are_alike_at_one_design_only_are_no_lack_of_effec
     result, row = solved(design, "  - {mode: 1, frequency: 22 Hz}\n", head)
     assert row.verdict == "reached", row.reason
     assert "effect" not in " ".join(result.results.notes)
+
+
+@pytest.mark.parametrize(
+    ("above", "word"), [(0.0, "reached"), (5e-9, "reached"), (1e-6, "infeasible")]
+)
+def test_a_limit_that_only_round_off_misses_contradicts_nothing(above: float, word: str) -> None:
+    design = DESIGN.replace("max: 250 g", "max: 1 g")
+    case = BuiltCase(
+        parse((HELD + design + TAIL + "  - {mode: 1, at_least: 1 Hz}\n").encode(), "a")
+    )
+    most = case.model().frequencies(case.trajectory.q, [0.0, 0.0], 1).min()
+    target = f"  - {{mode: 1, at_least: {most * (1.0 + above):.17g}}}\n"
+    _, row = solved(design, target, HELD)
+    assert row.verdict == word, row.reason
+    assert (row.conflict != ()) == (word == "infeasible")
+    assert "no design" in row.optimality.words
+    assert ("meets all" in row.optimality.words) == (word == "infeasible")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +62,10 @@ def assignment_row(
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else found.clearances
-    optimality = _optimality(scene, answer)
     limits = tuple(_limits(scene, answer.y))
+    if all(one.satisfied for one in (*targets, *limits)):  # what round-off misses contradicts not
+        answer = replace(answer, conflict=None)
+    optimality = _optimality(scene, answer)
     conflicting = () if answer.conflict is None else answer.conflict.names
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
@@ -266,9 +269,10 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
         return _of_catalogues(found, chosen, chosen.search)
     if chosen is None and is_proved(scene, found):
         met = best.seen.violation <= MET
-        words = "the problem is convex: " + (
-            "no design is better" if met else "no design meets all limits, or misses them by less"
-        )
+        words = "no design " + ("is better" if met else "misses the limits by less")
+        if answer.conflict is not None:
+            words = "no design meets all limits, or misses them by less"
+        words = f"the problem is convex: {words}"
         return OptimalityRow("proved", best.stationarity, None, words)
     count = len(found.optima)
     which = f"best of {count} local optima" if count > 1 else "only local optimum"
