@@ -39,6 +39,7 @@ Floats = NDArray[np.float64]
 POSES = 9  # at which the mesh is judged; each costs an exact solve
 POSES_LARGE = 3  # of a model of more than `LARGE` degrees of freedom, where one takes half a second
 LARGE = 10_000
+ROUNDED = 3  # at which round-off is measured by nine solves; of a large model one
 SAMPLES = 20  # at which the expansion's own estimate is evaluated
 
 
@@ -64,9 +65,7 @@ def study_accuracy(scene: Scene, optimum: Floats | None = None) -> Accuracy:
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
-    first = scene.model.x(q[0], scene.initial)[0]
-    lost = rounding_error(scene.model.pencil, first, max(scene.modes))
-    return Accuracy(mesh, (*lines, rounding_line(lost)))
+    return Accuracy(mesh, (*lines, _rounding_note(scene, y)))
 
 
 def model_errors(
@@ -85,6 +84,19 @@ def model_errors(
         of_mesh = known.get(mode) or float(mesh(q, y, (mode,)).max())
         found[mode] = (1.0 + of_mesh) * (1.0 + float(links(q, y, (mode,)).max())) - 1.0
     return found
+
+
+def _rounding_note(scene: Scene, y: Floats) -> str:
+    """`rounding_line` of some poses of design y, and of the first one of the initial design."""
+    pencil, q = scene.model.pencil, scene.q0[None]
+    if scene.trajectory is not None:
+        q = spread(poses_at(scene.trajectory, y), ROUNDED if pencil.is_dense else 1)
+    x = scene.model.x(q, y)
+    if pencil.is_dense:
+        x = np.unique(np.vstack([x, scene.model.x(q[:1], scene.initial)]), axis=0)
+    lost = max(rounding_error(pencil, each, max(scene.modes)) for each in x)
+    line = rounding_line(lost)
+    return f"{line}, at {len(x)} poses and designs" if len(x) > 1 and np.isfinite(lost) else line
 
 
 def rounding_line(lost: float) -> str:
