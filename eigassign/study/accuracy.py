@@ -207,8 +207,8 @@ class MotionStudy:
     warning: str | None
 
 
-def study_motion(scene: Scene, hz: Floats) -> MotionStudy | None:
-    """Check the case's timed trajectories; ``hz`` (n_t, n_modes) are their exact frequencies."""
+def study_motion(scene: Scene, y: Floats, hz: Floats) -> MotionStudy | None:
+    """Check the case's timed trajectories; ``hz`` (n_t, n_modes) are exact frequencies of y."""
     parts = () if scene.trajectory is None else scene.trajectory.parts
     timed = [part for part in parts if len(part.trajectory.given.time_s) >= 3]
     if not timed:
@@ -217,12 +217,16 @@ def study_motion(scene: Scene, hz: Floats) -> MotionStudy | None:
     limit = scene.file.validation.max_error
     simple = _simple_estimate(scene, timed, hz)
     if simple is not None and simple < NEGLIGIBLE * limit:
-        note = f"slow motion: the neglected velocity terms change λ by less than about {simple:.1g}"
+        note = (
+            f"slow motion: the neglected velocity terms change λ of the optimal design by less "
+            f"than about {simple:.1g}"
+        )
         return MotionStudy(simple, note, None)
     if names := placeless(scene.file):
         return _rough_study(simple, names, limit)
-    change, name = max((_change(scene, part), part.name) for part in timed)
+    change, name = max((_change(scene, part, y), part.name) for part in timed)
     along = f"trajectory {name!r}" if len(parts) > 1 else "the trajectory"
+    along += ", with the optimal design"
     return _motion_study(change, limit, along)
 
 
@@ -266,12 +270,12 @@ def _neglected_terms(trajectory: Trajectory, gap: float) -> float:
     return float((5.0 * speed**2 / gap**3 + push / gap).max(initial=0.0))
 
 
-def _change(scene: Scene, part: NamedTrajectory) -> float:
+def _change(scene: Scene, part: NamedTrajectory, y: Floats) -> float:
     """The largest relative change of a frequency along one trajectory, velocity terms included."""
     model = scene.model
     terms = velocity_terms(model.poses.case, model.poses.parameters, model.motion)
     motion = rates(part.trajectory)
-    return motion_effect(model.pencil, terms, motion, scene.initial, scene.modes).worst
+    return motion_effect(model.pencil, terms, motion, y, scene.modes).worst
 
 
 def _motion_study(change: float, limit: float, along: str) -> MotionStudy:

@@ -92,7 +92,7 @@ def _with_answer(
         *(results.discretisation, meaning.unreachable),
     )
     reach = reach if answer.found is None else ()
-    motion = study_motion(scene, assigned.solved.initial.hz)
+    motion = study_motion(scene, answer.y, assigned.solved.exact.hz)
     slow, fast = ("", None) if motion is None else (motion.note, motion.warning)
     warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, fast)
     notes = (*assigned.solved.notes, *_notes(scene, assigned, row), slow, *meaning.notes)

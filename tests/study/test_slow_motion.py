@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chains import case_of, two_link
 
 from eigassign import load_case
 from eigassign.mechanism import Trajectory, rates
@@ -86,3 +87,16 @@ def test_the_speed_is_judged_on_the_elements_that_auto_chose(tmp_path: Path) -> 
     path.write_text(text.replace("elements: 3", "elements: auto"), encoding="utf-8")
     results = solve_case(load_case(path)).results
     assert any("velocity terms" in line for line in (*results.notes, *results.warnings))
+
+
+@pytest.mark.parametrize(("before", "hz", "fast"), [(400.0, 2.2, True), (10.0, 10.6, False)])
+def test_the_answer_is_judged_and_not_the_initial_design(
+    before: float, hz: float, fast: bool
+) -> None:
+    """The softer its drive, the more the motion changes."""
+    tree = two_link(elements=(1, 1), drives=({"stiffness": 2e4}, {"stiffness": before}))
+    tree["trajectory"] = {"points": [[0.1, 0.5], [0.6, 1.5]], "duration": 0.5, "samples": 9}
+    tree["design"] = {"k": {"parameter": "coordinates.q2.drive.stiffness", "min": 10, "max": 1e3}}
+    tree |= {"targets": [{"mode": 1, "frequency": hz}], "assignment": {"starts": 1}}
+    results = solve_case(case_of(tree)).results
+    assert any("not slow" in warning for warning in results.warnings) is fast
