@@ -54,7 +54,7 @@ class Requirements:
     @property
     def modes(self) -> int:
         """The highest numbered mode that anything is asked of; 1 if nothing is."""
-        return max(1, *(mode for one in self.asked for mode, _ in one.mode_terms))
+        return max((1, *(mode for one in self.asked for mode, _ in one.mode_terms)))
 
     @property
     def limit_names(self) -> tuple[str, ...]:

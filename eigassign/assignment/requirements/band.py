@@ -124,7 +124,18 @@ class ForbiddenBand(Requirement):
         least, most = self._counted(lowest), self._counted(highest)
         low, high = self.lower[:, None], self.upper[:, None]
         down, up = np.maximum(most / low - 1.0, 0.0), np.maximum(1.0 - least / high, 0.0)
-        return np.concatenate([_fewest(down[own], up[own]) for _, own in self.along])
+        each = (_by_count(down[own], up[own]) for _, own in self.along)
+        return np.concatenate([min(errors, key=lambda one: float(one.max())) for errors in each])
+
+    def errors_by_count(self, hz: Floats, margin: float) -> Floats:
+        """The largest error (count + 1,) along one trajectory with 0, 1, … modes below the band.
+
+        ``hz`` (n, count) at its rows are all modes that matter; they keep off by ``margin``.
+        """
+        own = hz[:, [m - 1 for m in self.counted]] if self.modes else hz
+        low, high = self.lower[:, None] * (1.0 - margin), self.upper[:, None] * (1.0 + margin)
+        down, up = np.maximum(own / low - 1.0, 0.0), np.maximum(1.0 - own / high, 0.0)
+        return np.array([errors.max() for errors in _by_count(down, up)])
 
     def least_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """No errors (n,): which mode is where is not known."""
@@ -150,10 +161,11 @@ class ForbiddenBand(Requirement):
         return self.lower, self.upper
 
 
-def _fewest(down: Floats, up: Floats) -> Floats:
-    """The errors (n,) with the best k: of modes (n, count) the ways below, and above, the band."""
-    choices = [
+def _by_count(down: Floats, up: Floats) -> list[Floats]:
+    """The errors (n,) by the number of modes below: of modes (n, count) the ways below and above
+    the band.
+    """
+    return [
         np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
         for k in range(down.shape[1] + 1)
     ]
-    return np.asarray(min(choices, key=lambda errors: float(errors.max())))

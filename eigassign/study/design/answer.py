@@ -107,14 +107,16 @@ def find_answer(
 
 
 def _band_notes(found: Found) -> Iterator[str]:
-    """Say what came of each number of modes below the bands, where there was a choice."""
-    if found.untried:
+    """Say what came of the numbers of modes below the bands, where there was a choice."""
+    if found.choices > 1:
         yield (
-            f"of {len(found.variants) + found.untried} choices of the numbers of modes below the "
-            f"bands the {len(found.variants)} likeliest were tried"
+            f"of {found.choices} choices of the numbers of modes below the bands "
+            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: "
+            f"{found.searches} searches, each with some of the bands, stand for the others"
         )
     for one in found.variants[:SAID] if len(found.variants) > 1 else ():
-        choice = ", ".join(f"{band} with {k} below it" for band, k in one.variant.below)
+        below = ((band, k) for band, k in one.variant.below if k is not None)
+        choice = ", ".join(f"{band} with {k} below it" for band, k in below)
         best, missed = one.optima[0], one.optima[0].seen.violation
         how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {best.objective:.6g}"
         yield f"{choice}: {how}"

@@ -28,9 +28,11 @@ from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
+from eigassign.study.design.variants import lacking, variant_of
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+MOST_DIVIDED = 60  # searches to say whether some limits can be met together, with bands among them
 MOST = 12  # limits of which the smallest contradiction is looked for
 # Steps of a search that nobody has asked to end sooner: of 20 runs 19 took at most 15, one 32
 ENOUGH = 100
@@ -92,9 +94,9 @@ def conflict(
 ) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
-    Each trial starts at the compromise, and searches the catalogues ``listed``, for each choice of
-    the numbers of modes below the bands. Of a search that was ended, or that left out some of these
-    choices, nothing but limits that need no frequency can be said to contradict.
+    Each trial starts at the compromise, and searches the catalogues ``listed``, for each number of
+    modes below the bands that it comes into. Of a search that was ended, or that left out some
+    choices of these, nothing but limits that need no frequency can be said to contradict.
     """
     best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET:
@@ -110,10 +112,7 @@ def conflict(
     answers: list[bool | None] = []
 
     def contradict(rest: Sequence[str]) -> bool:
-        bands = {one.name for one in asked.limits if one.part_of}.intersection(rest)
-        variants = [one.variant for one in found.variants] if bands else [found.variant]
-        each = (_can_be_met(one.with_limits(rest), listed, best.y, steps) for one in variants)
-        met = not rest or next((told for told in each if told is not False), False)
+        met = not rest or _can_be_met(found, rest, listed, steps)
         answers.append(met)
         return met is False
 
@@ -139,18 +138,50 @@ def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
 
 
 def _can_be_met(
-    problem: DesignProblem, listed: Sequence[ListedValues], start: Floats, steps: int
+    found: Found, names: Sequence[str], listed: Sequence[ListedValues], steps: int
 ) -> bool | None:
-    """True where all limits can be met; None where the catalogues are too long to say."""
-    try:
-        if not listed:
-            return minimise(problem, start, steps).seen.violation <= MET
-        chosen = choose(problem, listed, [start], steps, monotonic() + 10.0)  # s for each limit
-    except EigassignError:
-        return True
-    if chosen.search is None and chosen.optima[0].seen.violation > MET:
-        return None
-    return chosen.optima[0].seen.violation <= MET
+    """True where the limits that are named can be met together; None where that cannot be said.
+
+    First without bands, then with the number of modes below one after the other that the designs
+    found are in.
+    """
+    start, bands = found.best.y, found.task.bands
+    named = {k for k, band in enumerate(bands) if band.name in names}
+    none: tuple[int | None, ...] = (None,) * len(bands)
+    open_ = [none]
+    for _ in range(MOST_DIVIDED):
+        if not open_:
+            return False
+        below = open_.pop()
+        problem = variant_of(found.task, below, missed=True).with_limits(names)
+        try:
+            met, y = _met(problem, listed, start, steps)
+        except EigassignError:
+            return True
+        if met is None:
+            return None
+        if not met:
+            continue
+        left_out = [k for k in named if below[k] is None]
+        errors = lacking(found.task, y) if left_out else []
+        band = max(left_out, key=lambda k: float(errors[k].min()), default=None)
+        if band is None or errors[band].min() <= MET:
+            return True
+        open_ += [(*below[:band], n, *below[band + 1 :]) for n in found.counts[band]]
+    return None
+
+
+def _met(
+    problem: DesignProblem, listed: Sequence[ListedValues], start: Floats, steps: int
+) -> tuple[bool | None, Floats]:
+    """Whether all limits of a problem can be met, None of long catalogues; and how nearly."""
+    if not listed:
+        best = minimise(problem, start, steps)
+        return best.seen.violation <= MET, best.y
+    chosen = choose(problem, listed, [start], steps, monotonic() + 10.0)  # s for each limit
+    best = chosen.optima[0]
+    met = best.seen.violation <= MET
+    return None if chosen.search is None and not met else met, best.y
 
 
 # --- What changes nothing

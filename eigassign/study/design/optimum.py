@@ -17,19 +17,29 @@ from eigassign.assignment.catalogues.branching import KEEP, ListedValues
 from eigassign.assignment.catalogues.choosing import MOST, RELAXED, Chosen, choose, combinations
 from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
-from eigassign.assignment.exact.sequential import End, Optimum, worth
+from eigassign.assignment.exact.sequential import Optimum, minimise, worth
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import InfeasibleError
 from eigassign.study.design.clearance import check_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
-from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
+from eigassign.study.design.starts import (
+    NOTHING,
+    SAME,
+    Searched,
+    coarse_to_fine,
+    continued,
+    most_starts,
+    search_starts,
+)
 from eigassign.study.design.variants import (
+    SPREAD,
+    Designs,
     PosedProblem,
     Task,
     counts_of,
-    possible_counts,
+    lacking,
     variant_of,
 )
 from eigassign.study.results import ClearanceRow
@@ -37,20 +47,30 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-VARIANTS = 24  # tried at most, the likeliest: of more it is said how many were left out
+SEARCHES = (
+    100  # searches with some of the bands: from then on a branch goes on in its likeliest part
+)
+PROMISING = 1  # designs all over the bounds from which a branch is searched too
+DRAWN = 4  # times that the limits of a branch are drawn in
+FEW = 5  # branches of an ended search that are completed
+Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
 
 
 @dataclass(frozen=True)
 class Found:
     """The best design, what it was chosen among, and how much work that was."""
 
+    task: Task
+    counts: tuple[Sequence[int], ...]  # the numbers of modes that may be below each band
+    choices: int  # of them for all bands
     variant: PosedProblem
     optima: tuple[Optimum, ...]  # distinct local optima of the variant, the best first
-    variants: tuple[Searched, ...]  # all that were tried, the best first
+    variants: tuple[Searched, ...]  # it, and others with some of the bands, the best first
     initial: tuple[float, float]  # violation and objective of the initial design
     clearances: tuple[ClearanceRow, ...]  # of every band along every trajectory
     starts: int
     exact_solves: int
+    searches: int
     chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
     lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
     untried: int = 0  # choices of the numbers of modes below the bands
@@ -76,80 +96,257 @@ def find_optimum(
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
 
-    Bands to keep out of are checked (`clearance`): where modes come too near between the samples,
-    the limits at the samples are drawn in by what is lacking, and the answer is sought anew from
-    where it was. It stays as it was where limits that are drawn in so far cannot be met.
-    """
-    seconds, margin = scene.file.assignment.seconds, MARGIN
-    deadline = np.inf if seconds is None else monotonic() + seconds
-    designs = [scene.initial, *starts][: most_starts(scene.file)]
-    models = None if followed_modes(scene.file) else reduced_models(scene)
-
-    def sought(designs: Sequence[Floats], margin: float) -> Found:
-        task = Task(scene, tuple(wanted), margin)
-        return _best_variant(task, coarse_to_fine(task, models), designs, deadline, progress)
-
-    found = sought(designs, margin)
-    for _ in range(4):  # each time drawn in by twice the room that was lacking
-        lacking, ended = wanting(found.clearances), (End.SECONDS, End.INTERRUPTED)
-        if not lacking or found.best.seen.violation > MET or found.best.end in ended:
-            break
-        margin += 2.0 * lacking + MARGIN
-        other = sought([found.best.y], margin)
-        if other.best.seen.violation > MET:
-            break
-        found = other
-    return found
-
-
-def _best_variant(
-    task: Task,
-    levels: Sequence[Task],
-    starts: Sequence[Floats],
-    deadline: float,
-    progress: Callable[[str], None],
-) -> Found:
-    """The best local optimum of all variants.
-
     No design is returned that is worse than the initial one. Where none meets all limits, it is the
     one that misses them least, relative to the limits.
     """
-    scene, listed = task.scene, catalogues(task.scene.file)
-    choices, total = possible_counts(scene, task.bands)
-    if task.bands and listed and prod(len(own.rows) for own in listed) <= MOST:
-        _, lower, upper = combinations(listed, *scene.bounds)
-        every = counts_of(scene, task.bands, lower) if np.array_equal(lower, upper) else []
-        choices, total = (every, len(every)) if every else (choices, total)
-    tried: list[Searched] = []
-    for below in choices[:VARIANTS]:
-        if listed:
-            found = _search_catalogues(task, below, listed, levels, starts, deadline, progress)
+    seconds = scene.file.assignment.seconds
+    deadline = np.inf if seconds is None else monotonic() + seconds
+    designs = [scene.initial, *starts][: most_starts(scene.file)]
+    return _Tree(scene, wanted, designs, deadline, progress).found()
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """All choices that have some numbers of modes below bands."""
+
+    below: Counts
+    searched: Searched
+    margin: float
+    was: Counts | None = None  # of a settled branch, before it was settled
+    drawn: int = 0  # times that its limits were drawn in
+
+    @property
+    def best(self) -> Optimum:
+        """The best design found."""
+        return self.searched.optima[0]
+
+
+class _Tree:
+    """Branch and bound over the numbers of modes below the bands.
+
+    A branch is searched with some of the bands only, the first with none: as far as a few starts
+    find its optimum, no choice of it has a better one. The best branch of all is taken. If its
+    optimum is in a band that was left out, it is divided by the number of modes below this band;
+    otherwise it is settled, from all starts, on all samples and exactly.
+
+    Bands of an answer are checked (`clearance`): where modes come too near between the samples, the
+    limits at the samples are drawn in by what is lacking, and the answer is sought anew from where
+    it was. It stays as it was where no choice can be met with limits that are drawn in so far.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        wanted: Sequence[Requirement],
+        starts: Sequence[Floats],
+        deadline: float,
+        progress: Callable[[str], None],
+    ) -> None:
+        self.task = Task(scene, tuple(wanted), MARGIN)
+        models = None if followed_modes(scene.file) else reduced_models(scene)
+        self.levels = {MARGIN: coarse_to_fine(self.task, models)}
+        self.listed = catalogues(scene.file)
+        self.starts, self.deadline, self.progress = starts, deadline, progress
+        few = self.at(MARGIN)[0]
+        self.designs = Designs.all_over(few.scene, few.bands, SPREAD) if few.bands else None
+        self.counts: tuple[Sequence[int], ...] = ()
+        self.every: list[tuple[int, ...]] = []  # choices that combinations of catalogues have
+        if self.designs is not None:
+            self.counts, self.every = self.designs.counts, _of_combinations(self.task, self.listed)
+        if self.every:
+            both = zip(self.counts, zip(*self.every, strict=True), strict=True)
+            self.counts = tuple(sorted({*some, *more}) for some, more in both)
+        self.made: list[Searched] = []
+        self.untried = 0  # choices that no search stands for
+
+    def found(self) -> Found:
+        """The best settled branch, and what it was chosen among."""
+        open_ = list(self.roots())
+        answer, unclear = None, []
+        while open_ and answer is None and not self.stopped:
+            best, *open_ = best_first(open_, _promise)
+            missed = best.best.seen.violation
+            if missed > MET and unclear:
+                break
+            if best.was is None:
+                open_ += self.divided(best)
+                continue
+            rows = _clearances(self.task, best.below, best.best.y)
+            if missed > MET or not wanting(rows):
+                answer = best
+                continue
+            drawn = self.drawn_in(best, wanting(rows))
+            if drawn is None or drawn.best.seen.violation > MET:
+                unclear.append(best)
+            else:
+                open_.append(drawn)
+            if not best.drawn:
+                open_ += self.beside(best, [k for k, row in enumerate(rows) if not row.clear])
+        if answer is None and self.stopped:
+            self.untried += sum(self.size(one.below) for one in open_ if one.was is None)
+            unclear += map(self.completed, best_first(open_, _promise)[:FEW])
+        answer = answer or best_first(unclear, _promise)[0]
+        others = best_first((one.searched for one in open_), lambda one: worth(one.optima[0]))
+        return self.account(answer, others)
+
+    def roots(self) -> Iterator[_Branch]:
+        """Yield the branch without bands; or every choice that combinations of catalogues have."""
+        none: Counts = (None,) * len(self.counts)
+        if not self.every:
+            yield self.branch(none, self.starts, was=None if none else none)
+        for k, below in enumerate(self.every):
+            if k == SEARCHES or (k and self.stopped):
+                self.untried = len(self.every) - k
+                return
+            yield self.branch(below, self.starts, was=below)
+
+    def at(self, margin: float) -> tuple[Task, ...]:
+        """The levels with limits drawn in so far."""
+        if margin not in self.levels:
+            levels = (replace(level, margin=margin) for level in self.levels[MARGIN])
+            self.levels[margin] = tuple(levels)
+        return self.levels[margin]
+
+    @property
+    def stopped(self) -> bool:
+        """True where the last search was ended, or that of catalogues too long."""
+        last = self.made[-1]
+        return last.ended is not None or (last.chosen is not None and last.chosen.search is None)
+
+    def account(self, answer: _Branch, others: Sequence[Searched]) -> Found:
+        """The answer with what it was chosen among, and how much work that was."""
+        scene, (best, *more) = self.task.scene, answer.searched.optima
+        ended = self.made[-1].ended
+        return Found(
+            task=self.task,
+            counts=self.counts,
+            choices=len(self.every) or self.size((None,) * len(self.counts)),
+            variant=answer.searched.variant,
+            optima=(best if ended is None else replace(best, end=ended), *more),
+            variants=(answer.searched, *others),
+            initial=_initial(scene, answer.searched.variant),
+            clearances=_clearances(self.task, answer.below, best.y),
+            starts=sum(one.starts for one in self.made),
+            exact_solves=len(scene.path.q)
+            + sum(one.exact_solves for one in self.made)
+            + sum(
+                one.exact_solves
+                for levels in self.levels.values()
+                for one in levels[-1].glances.values()
+            ),
+            searches=len(self.made),
+            chosen=answer.searched.chosen,
+            lost=tuple(dict.fromkeys(line for one in self.made for line in one.lost)),
+            untried=self.untried,
+        )
+
+    def branch(
+        self,
+        below: Counts,
+        near: Sequence[Floats],
+        margin: float = MARGIN,
+        was: Counts | None = None,
+        drawn: int = 0,
+    ) -> _Branch:
+        """The branch as it is searched; from all starts if it is settled and was not drawn in."""
+        levels = self.at(margin)
+        near, clock = near[: most_starts(self.task.scene.file)], (self.deadline, self.progress)
+        if self.listed:
+            searched = _search_catalogues(levels[-1], below, self.listed, levels, near, *clock)
         else:
-            found = search_starts(levels, below, starts, tried, deadline, progress)
-        tried.append(found)
-        ended, chosen = tried[-1].ended, tried[-1].chosen
-        if ended or (chosen and chosen.search is None):
-            break
-    variants = best_first(tried, lambda one: worth(one.optima[0]))
-    variant, (best, *others) = variants[0].variant, variants[0].optima
-    return Found(
-        variant=variant,
-        optima=(best if ended is None else replace(best, end=ended), *others),
-        variants=tuple(variants),
-        initial=_initial(scene, variant),
-        clearances=tuple(_clearances(task, variant, best.y)),
-        starts=sum(one.starts for one in tried),
-        exact_solves=len(scene.path.q)
-        + sum(one.exact_solves for one in (*tried, *task.glances.values())),
-        chosen=variants[0].chosen,
-        lost=tuple(dict.fromkeys(line for one in tried for line in one.lost)),
-        untried=total - len(tried),
-    )
+            made = sum(one.starts for one in self.made)
+            spread = was is not None and not drawn
+            levels = levels if was is not None else levels[:1]
+            searched = search_starts(levels, below, near, made, *clock, spread)
+        self.made.append(searched)
+        return _Branch(below, searched, margin, was, drawn)
+
+    def divided(self, branch: _Branch) -> Iterator[_Branch]:
+        """Yield the parts of a branch by the number of modes below the band that it is in most.
+
+        Or the branch settled, where it is in no band by more than it misses anyway.
+        """
+        errors, missed = self.lacking(branch), max(branch.best.seen.violation, MET)
+        nearest = [int(own.argmin()) for own in errors]
+        open_ = [k for k, n in enumerate(branch.below) if n is None and errors[k].min() > missed]
+        if not open_:
+            below = zip(branch.below, nearest, strict=True)
+            settled = tuple(n if own is None else own for own, n in below)
+            yield self.branch(settled, [branch.best.y, *self.starts], was=branch.below)
+            return
+        band = max(open_, key=lambda k: float(errors[k].min()))
+        counts = sorted({*self.counts[band], nearest[band]}, key=lambda n: float(errors[band][n]))
+        if len(self.made) > SEARCHES:
+            counts, others = counts[:1], counts[1:]
+            self.untried += sum(self.size(_with(branch.below, band, n)) for n in others)
+        for n in counts:
+            below = _with(branch.below, band, n)
+            if self.stopped:
+                self.untried += self.size(below)
+            else:
+                yield self.branch(below, self.near(branch, below))
+
+    def beside(self, branch: _Branch, bands: Sequence[int]) -> Iterator[_Branch]:
+        """Yield the choices that a branch was settled without: other numbers below ``bands``."""
+        below = branch.was or ()
+        for band in (k for k in bands if below[k] is None):
+            for n in self.counts[band]:
+                if n != branch.below[band]:
+                    other = _with(below, band, n)
+                    yield self.branch(other, self.near(branch, other))
+            below = _with(below, band, branch.below[band])
+
+    def drawn_in(self, branch: _Branch, lacking: float) -> _Branch | None:
+        """The branch with limits drawn in by twice the room that was lacking; None after a few."""
+        if branch.drawn == DRAWN:
+            return None
+        margin = branch.margin + 2.0 * lacking + MARGIN
+        return self.branch(branch.below, [branch.best.y], margin, branch.was, branch.drawn + 1)
+
+    def completed(self, branch: _Branch) -> _Branch:
+        """The best design of a search that was ended, with the numbers that it is nearest to."""
+        if branch.was is not None:
+            return branch
+        nearest = zip(branch.below, self.lacking(branch), strict=True)
+        below = tuple(int(own.argmin()) if n is None else n for n, own in nearest)
+        variant = variant_of(self.at(branch.margin)[-1], below)
+        found = continued(branch.best, minimise(variant.problem, branch.best.y, 0))
+        searched = replace(branch.searched, variant=variant, optima=(found,), chosen=None)
+        return replace(branch, below=below, searched=searched)
+
+    def near(self, branch: _Branch, below: Counts) -> list[Floats]:
+        """Designs to search a part of a branch from."""
+        few = self.at(MARGIN)[0]
+        if self.designs is None or few.followers:
+            return [one.y for one in branch.searched.optima[: 1 + PROMISING]]
+        return [branch.best.y, *self.designs.best_of(variant_of(few, below), PROMISING)]
+
+    def lacking(self, branch: _Branch) -> list[Floats]:
+        """What the optimum lacks to be clear of each band, by the number of modes below it."""
+        found = lacking(self.at(branch.margin)[-1], branch.best.y)
+        return [
+            np.pad(own, (0, max(max(each) + 1 - len(own), 0)), constant_values=np.inf)
+            for own, each in zip(found, self.counts, strict=True)
+        ]
+
+    def size(self, below: Counts) -> int:
+        """The number of choices in a branch."""
+        return prod(len(c) for c, n in zip(self.counts, below, strict=True) if n is None)
+
+
+def _promise(branch: _Branch) -> tuple[float, float]:
+    """Violation and F; of a settled branch F less what makes no difference."""
+    missed, value = worth(branch.best)
+    return missed, value if branch.was is None else value - SAME * abs(value) - NOTHING
+
+
+def _with(below: Counts, band: int, count: int | None) -> Counts:
+    return (*below[:band], count, *below[band + 1 :])
 
 
 def _search_catalogues(
     task: Task,
-    below: tuple[int, ...],
+    below: Counts,
     listed: Sequence[ListedValues],
     levels: Sequence[Task],
     starts: Sequence[Floats],
@@ -163,12 +360,12 @@ def _search_catalogues(
     steps, near = task.scene.file.assignment.steps, starts[: KEEP + 1]
     relaxed = Searched(variant_of(task, below))
     if prod(len(own.rows) for own in listed) > MOST:
-        relaxed = search_starts(levels, below, starts, (), deadline, progress)
+        relaxed = search_starts(levels, below, starts, 0, deadline, progress)
         near = [*(found.y for found in relaxed.optima[:RELAXED]), *near]
 
     def chosen_of(variant: PosedProblem) -> Chosen:
         def lacking(y: Floats) -> float:
-            return wanting([*_clearances(task, variant, y)])
+            return wanting(_clearances(task, below, y))
 
         return choose(variant.problem, listed, near, steps, deadline, progress, lacking)
 
@@ -188,10 +385,22 @@ def _search_catalogues(
     )
 
 
-def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[ClearanceRow]:
+def _of_combinations(task: Task, listed: Sequence[ListedValues]) -> list[tuple[int, ...]]:
+    """The choices that all combinations of catalogues have, where they are all that is designed."""
+    if not listed or prod(len(own.rows) for own in listed) > MOST:
+        return []
+    _, lower, upper = combinations(listed, *task.scene.bounds)
+    return counts_of(task.scene, task.bands, lower) if np.array_equal(lower, upper) else []
+
+
+def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...]:
+    """The bands that are not left out, checked at a design."""
     q = task.scene.path.at(y)[0]
-    for band, (_, below) in zip(task.bands, variant.below, strict=True):
-        yield check_clear(task.scene.model, band, below, q[band.rows], y)
+    return tuple(
+        check_clear(task.scene.model, band, k, q[band.rows], y)
+        for band, k in zip(task.bands, below, strict=True)
+        if k is not None
+    )
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:

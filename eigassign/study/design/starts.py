@@ -30,7 +30,6 @@ Floats = NDArray[np.float64]
 STARTS = 12  # with `starts: auto`, at most
 FEW = 24  # samples on which starts are followed, of more than twice as many
 SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
-BEHIND, FAR_BEHIND = 3, 2.0  # starts of a variant, and how much worse than the best it may be then
 SAME = 1e-4  # relative, in F: optima of the same worth
 NOTHING = 1e-14  # of F: no error
 
@@ -63,26 +62,25 @@ def most_starts(file: CaseFile) -> int:
 
 def search_starts(
     levels: Sequence[Task],
-    below: tuple[int, ...],
+    below: Sequence[int | None],
     starts: Sequence[Floats],
-    tried: Sequence[Searched],
+    made: int,
     deadline: float,
     progress: Callable[[str], None],
+    spread: bool = True,
 ) -> Searched:
-    """The local optima of a variant that ``starts`` and spread designs lead to.
+    """The local optima of a variant that ``starts`` lead to, and spread designs if asked for.
 
-    One that comes nowhere near the variants ``tried`` before is given up.
+    So many starts were ``made`` before.
     ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
     answer.
     """
     first, keys = levels[0], levels[0].scene.file.assignment
-    others, made = [one.optima[0] for one in tried], sum(one.starts for one in tried)
     search = Searched(variant_of(first, below))
-    for start in _in_turn(first, search.variant, starts):
+    for start in _in_turn(first, search.variant, starts) if spread else starts:
         progress(f"  from start {made + search.starts + 1}")
         search = replace(_after(search, start, keys.steps, deadline), starts=search.starts + 1)
-        enough = _agree(search) or _falls_behind(search, others)
-        if search.ended or (keys.starts == "auto" and enough):
+        if search.ended or (keys.starts == "auto" and _agree(search)):
             break
     responses = [search.variant.response]
     for level in levels[1:]:
@@ -121,7 +119,7 @@ def _after(
             raise
         return search
     stopped = found.end if found.end in (End.SECONDS, End.INTERRUPTED) else None
-    found = found if before is None else _continued(before, found)
+    found = found if before is None else continued(before, found)
     return replace(search, optima=(*optima, found), ended=search.ended or stopped)
 
 
@@ -142,7 +140,7 @@ def _refined(
     return search
 
 
-def _continued(before: Optimum, found: Optimum) -> Optimum:
+def continued(before: Optimum, found: Optimum) -> Optimum:
     """An optimum with the steps that led to its start; what was said there is its prediction."""
     said = before.seen.residual
     if found.predicted is None and said.shape == found.seen.residual.shape:
@@ -151,16 +149,6 @@ def _continued(before: Optimum, found: Optimum) -> Optimum:
 
 
 # --- Whether more starts would help
-
-
-def _falls_behind(search: Searched, others: Sequence[Optimum]) -> bool:
-    """True where some starts came nowhere near what ``others`` have: more would not either."""
-    if len(search.optima) < BEHIND or not others:
-        return False
-    own, best = (worth(best_first(optima, worth)[0]) for optima in (search.optima, others))
-    if own[0] > FAR_BEHIND * max(best[0], MET):
-        return True
-    return own[0] >= best[0] - MET and own[1] > best[1] + (FAR_BEHIND - 1.0) * abs(best[1])
 
 
 def _agree(search: Searched) -> bool:

@@ -8,7 +8,6 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 from __future__ import annotations
 
 import itertools
-import math
 from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import suppress
@@ -18,7 +17,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.exact.design_problem import (
+    Appraisal,
+    DesignProblem,
+    Objective,
+    best_first,
+)
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
@@ -36,17 +40,19 @@ from eigassign.study.design.response import (
     outlook_of,
     response_of,
 )
+from eigassign.study.monotone import corners
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+SPREAD = 8  # designs all over the bounds, beside corners and middle, that bands are looked at in
 MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them in order
 
 
 @dataclass(frozen=True)
 class PosedProblem:
-    """One choice of the number of modes below each band, with the problem that it makes."""
+    """One choice of the number of modes below some bands, with the problem that it makes."""
 
-    below: tuple[tuple[str, int], ...]  # the band in words, and k
+    below: tuple[tuple[str, int | None], ...]  # the band in words, and k; None of one left out
     requirements: Requirements
     problem: DesignProblem
     response: DesignResponse
@@ -131,8 +137,8 @@ def _few(whole: Task, few: int) -> NDArray[np.intp]:
     return np.union1d(path.spread(few), np.array(between, dtype=np.intp))
 
 
-def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> PosedProblem:
-    """The problem of a task with so many modes below each of its bands.
+def variant_of(task: Task, below: Sequence[int | None], missed: bool = False) -> PosedProblem:
+    """The problem of a task with so many modes below each of its bands, without those of None.
 
     Linear limits may be ``missed`` as others may, and are where they contradict each other.
     """
@@ -145,6 +151,8 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
     asked = [one for one in wanted if not one.bands]
     for band, k in zip(task.bands, below, strict=True):
+        if k is None:
+            continue
         q = scene.path.at(scene.initial)[0][band.rows]
         above = mode_above(scene.model, k, band.counted, q, scene.initial)
         asked += band.kept_clear(k, above, task.margin)
@@ -173,41 +181,66 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     return PosedProblem(tuple(named), requirements, problem, response)
 
 
-def possible_counts(
-    scene: Scene, bands: Sequence[ForbiddenBand]
-) -> tuple[list[tuple[int, ...]], int]:
-    """Choices of k for all bands that may be, by designs all over the bounds; how many there are.
+@dataclass(frozen=True)
+class Designs:
+    """Designs all over the bounds with their frequencies, and what these say of bands.
 
-    Of a band every k from the fewest modes below it to the most. The likeliest choices come first:
-    those that designs are nearest to, then the others by their distance from these; of more than
-    `MOST_CHOICES` not all are listed.
+    ``hz`` are the lowest frequencies (n, count) of each on the samples of ``scene``, as many as
+    reach beyond every band; ``y`` (m, n_y) are the designs.
     """
-    if not bands:
-        return [()], 1
-    lower, upper = scene.bounds
-    designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
-    if len(lower):
-        designs += list(spread_designs(scene.bounds, 8, 1))
-    ranges, medians = [], []
-    for y in designs:
-        with suppress(EigassignError):
-            q, own = scene.path.at(y)[0], []
-            for band in bands:
-                hz = _all_below(scene, q[band.rows], y, float(band.upper.max()))
-                own.append(band.below(hz))
-            ranges.append([(k.min(), k.max()) for k in own])
-            medians.append([int(np.median(k)) for k in own])
-    least, most = np.min(ranges, axis=0)[:, 0], np.max(ranges, axis=0)[:, 1]
-    near = np.array(list(dict.fromkeys(map(tuple, medians))))
 
-    def rank(choice: tuple[int, ...]) -> tuple[int, int, tuple[int, ...]]:
-        away = np.abs(near - choice).sum(axis=1)
-        return int(away.min()), int(away.argmin()), choice
+    scene: Scene
+    bands: Sequence[ForbiddenBand]
+    y: Floats
+    hz: Sequence[Floats]
 
-    each = [range(int(low), int(high) + 1) for low, high in zip(least, most, strict=True)]
-    listed = itertools.islice(itertools.product(*each), MOST_CHOICES)
-    found = dict.fromkeys((*map(tuple, near.tolist()), *listed))
-    return sorted(found, key=rank), math.prod(map(len, each))
+    @classmethod
+    def all_over(cls, scene: Scene, bands: Sequence[ForbiddenBand], count: int) -> Designs:
+        """The initial design, corners and the middle, and ``count`` spread ones."""
+        lower, upper = scene.bounds
+        extremes = corners(scene.file, scene.initial, lower, upper)
+        designs = [scene.initial, lower, upper, 0.5 * (lower + upper), *extremes]
+        if len(lower):
+            designs += list(spread_designs(scene.bounds, count, 1))
+        found = []
+        for y in designs:
+            with suppress(EigassignError):
+                found.append((y, all_below(scene, bands, scene.path.at(y)[0], y)))
+        return cls(scene, bands, np.array([y for y, _ in found]), [hz for _, hz in found])
+
+    @cached_property
+    def counts(self) -> tuple[range, ...]:
+        """The numbers of modes below each band, from the fewest to the most of any design."""
+        below = [[band.below(hz[band.rows]) for hz in self.hz] for band in self.bands]
+        return tuple(
+            range(int(min(k.min() for k in own)), int(max(k.max() for k in own)) + 1)
+            for own in below
+        )
+
+    @cached_property
+    def choices(self) -> list[tuple[int, ...]]:
+        """Choices of a number for every band, those that designs are nearest to first.
+
+        Of more than `MOST_CHOICES` not all are listed.
+        """
+        near = np.array(
+            [[int(np.median(b.below(hz[b.rows]))) for b in self.bands] for hz in self.hz]
+        )
+        listed = itertools.islice(itertools.product(*self.counts), MOST_CHOICES)
+        return sorted(
+            dict.fromkeys((*map(tuple, near.tolist()), *listed)),
+            key=lambda choice: int(np.abs(near - choice).sum(axis=1).min()),
+        )
+
+    def best_of(self, variant: PosedProblem, most: int) -> list[Floats]:
+        """The designs that a variant promises most from."""
+        asked, modes, worths = variant.requirements, variant.requirements.modes, []
+        for y, hz in zip(self.y, self.hz, strict=True):
+            lowest = np.pad(hz, ((0, 0), (0, max(modes - hz.shape[1], 0))), constant_values=np.inf)
+            seen = asked.appraise(y, Frequencies(lowest, np.zeros((*lowest.shape, len(y)))))
+            worths.append((seen.violation, variant.problem(y, seen)))
+        order = best_first(range(len(worths)), lambda k: worths[k])
+        return [self.y[k] for k in order[:most]]
 
 
 def counts_of(
@@ -223,8 +256,7 @@ def counts_of(
         for band in bands:
             ends = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
             first = replace(band, **dict(zip(("lower", "upper"), ends, strict=True)))
-            hz = _all_below(scene, q[:, band.rows.start], designs, float(band.upper[0]))
-            each.append(first.below(hz))
+            each.append(first.below(all_below(scene, [first], q[:, band.rows.start], designs)))
     except EigassignError:
         alone = designs[:, None] if len(designs) > 1 else ()
         return list(dict.fromkeys(found for y in alone for found in counts_of(scene, bands, y)))
@@ -233,22 +265,32 @@ def counts_of(
     return [choice for choice, _ in found.most_common()]
 
 
-def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:
-    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere or have mass.
+def all_below(scene: Scene, bands: Sequence[ForbiddenBand], q: Floats, y: Floats) -> Floats:
+    """The lowest frequencies (n, count), all that matter to the bands and have mass.
 
     At q (n, n_q), of one design y (n_y,) or of each (n, n_y).
     """
     available = scene.model.n_dof - scene.model.n_rigid
-    count = min(4, available)
+    beyond = max((float(band.upper.max()) for band in bands), default=0.0)
+    named = (mode for band in bands for mode in band.counted)
+    count = min(max((4, *named)), available)
     while True:
         try:
             found = scene.model.frequencies(q, y, count)
         except MissingMassError as error:
             count = available = error.most
             continue
-        if count == available or found[:, -1].min() > hz:
+        if count == available or found[:, -1].min() > beyond:
             return found
         count = min(2 * count, available)
+
+
+def lacking(task: Task, y: Floats) -> list[Floats]:
+    """What a design lacks to be clear of each band, by the number of modes below it from 0."""
+    if not task.bands:
+        return []
+    hz = all_below(task.scene, task.bands, task.scene.path.at(y)[0], y)
+    return [band.errors_by_count(hz[band.rows], task.margin) for band in task.bands]
 
 
 def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:

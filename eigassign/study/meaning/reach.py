@@ -31,7 +31,7 @@ from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import DesignResponse, Glances, outlook_of, response_of
-from eigassign.study.design.variants import possible_counts
+from eigassign.study.design.variants import SPREAD, Designs
 from eigassign.study.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
@@ -171,7 +171,7 @@ def _nearest(
     followed = followers(alone, [replace(there, followed=wanted.followed), *beside])
     listed, found = catalogues(scene.file), []
     glances: dict[int, Glances] = {}
-    for below in possible_counts(alone, bands)[0][:CHOICES]:
+    for below in Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]:
         kept = []
         for band, n in zip(bands, below, strict=True):
             above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)

@@ -1,0 +1,210 @@
+"""Several bands in several load cases: no number of modes below them is missed that is better.
+
+Random mechanisms are asked to keep out of one to three bands that some random design is clear of,
+some of them along one trajectory or in a part of it, some beside a wanted frequency, a limit of the
+mass or prices. The answer is compared with the best of a thousand random designs that are clear.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+from random_assignments import load_text, random_case
+
+import eigassign as ea
+
+Floats = np.ndarray
+FEASIBLE, MOST_DRAWN, CHUNK = 1_000, 20_000, 250
+BETWEEN = 4  # instants between two samples at which the best random design is looked at too
+
+
+class Band(NamedTuple):
+    """A band on the trajectories named, from a first to a last share of their time."""
+
+    names: list[str]
+    first: float
+    last: float
+    low: float
+    high: float
+
+
+class Problem(NamedTuple):
+    """A case with its bands, and what is made small."""
+
+    case: ea.Case
+    bands: list[Band]
+    prices: Floats | None
+    wanted: tuple[int, float] | None  # mode and Hz, on all trajectories
+    heaviest: float
+
+
+def several_bands(seed: int) -> Problem:
+    """Two to eight parameters, one to three load cases, one to three bands; always the same."""
+    rng = np.random.default_rng([seed, 31])
+    while True:
+        problem = _drawn_problem(int(rng.integers(1_000_000)), rng)
+        if problem is not None:
+            return problem
+
+
+def _drawn_problem(seed: int, rng: np.random.Generator) -> Problem | None:
+    data = yaml.safe_load(random_case(seed))
+    plain = load_text(random_case(seed))
+    data["design"].pop("constraints", None)
+    bodies = list(data["mechanism"]["bodies"])[:1]
+    loaded = [f"bodies.{name}.mass" for name in bodies]
+    chosen = [own for own in data["design"].items() if own[1]["parameter"] not in loaded]
+    data["design"] = dict(chosen[: int(rng.integers(2, 9))])
+    if len(chosen) < 2:
+        return None
+    q = plain.trajectory.q
+    few = q[np.linspace(0, len(q) - 1, int(rng.integers(5, 10))).astype(int)]
+    loads = [float(10 ** rng.uniform(-1.5, 0.6)) for _ in range(int(rng.choice([1, 2, 3, 3])))]
+    loads = loads if bodies else loads[:1]
+    data["trajectory"] = [
+        {"name": f"load{k}", "q": few.tolist(), "duration": 1.0}
+        | {"set": dict.fromkeys(loaded, load)}
+        for k, load in enumerate(loads)
+    ]
+    data["expansion"] = {"order": 1, "modes": [1], "q": few[0].tolist()}
+    data["targets"], data["assignment"] = [{"mode": 1, "at_least": 1e-3}], {}
+    case = load_text(json.dumps(data))
+    clear = _random_designs(case, rng, 1)[0]
+    hz = case.model().frequencies(case.trajectory.q, clear, 4)
+    bands: list[Band] = []
+    data["targets"] = []
+    for _ in range(int(rng.choice([1, 2, 2, 3, 3]))):
+        own = _band(case, hz, rng)
+        if own is None:
+            return None
+        bands.append(own)
+        target: dict[str, Any] = {"keep_out": [own.low, own.high]}
+        if len(own.names) < len(loads):
+            target["trajectory"] = own.names[0]
+        if (own.first, own.last) != (0.0, 1.0):
+            target["during"] = [own.first, own.last]
+        data["targets"].append(target)
+    form, prices, wanted, heaviest = rng.random(), None, None, np.inf
+    if form < 0.2:
+        wanted = int(rng.integers(1, 3)), float(np.median(hz[:, 0]) * rng.uniform(0.8, 1.6))
+        data["targets"].append({"mode": wanted[0], "frequency": wanted[1]})
+    elif form < 0.4:
+        width = [own["max"] - own["min"] for own in data["design"].values()]
+        prices = rng.uniform(0.2, 2.0, len(width)) / width * rng.choice([-1, 1, 1], len(width))
+        for own, price in zip(data["design"].values(), prices, strict=True):
+            own["price"] = float(price)
+    elif form < 0.6:
+        heaviest = float(1.02 * case.model().mass(clear))
+        data["design"]["mass"] = {"max": heaviest}
+    return Problem(load_text(json.dumps(data)), bands, prices, wanted, heaviest)
+
+
+def _band(case: ea.Case, hz: Floats, rng: np.random.Generator) -> Band | None:
+    """A band that the frequencies (n, 4) of some design are clear of."""
+    parts = case.trajectory.parts
+    names = [part.name for part in parts]
+    first, last = 0.0, 1.0
+    if (narrow := rng.random()) < 0.3:
+        names = [str(rng.choice(names))]
+        if narrow < 0.15:
+            first, last = sorted(rng.uniform(0.0, 1.0, 2).tolist())
+    level = float(np.exp(rng.uniform(*np.log([0.8 * hz[:, 0].min(), 1.05 * hz[:, 2].max()]))))
+    low, high = 0.0, np.inf
+    for part, rows in zip(parts, case.trajectory.rows, strict=True):
+        if part.name in names:
+            time = part.trajectory.time_s
+            inside = (time >= first - 0.25) & (time <= last + 0.25)
+            found = hz[rows][inside]
+            if len({int(k) for k in (found < level).sum(axis=1)}) > 1:
+                return None
+            low = max(low, float(np.max(found[found < level], initial=0.5 * level)))
+            high = min(high, float(np.min(found[found > level], initial=2.0 * level)))
+    if high < 1.01 * low:
+        return None
+    middle, half = np.sqrt(low * high), 0.5 * np.log(high / low) * rng.uniform(0.3, 0.9)
+    edges = middle * np.exp(-half), middle * np.exp(half)
+    return Band(names, first, last, float(edges[0]), float(edges[1]))
+
+
+def _bounds(case: ea.Case) -> tuple[Floats, Floats]:
+    columns = case.file.design.parameters.values()
+    return np.array([one.min for one in columns]), np.array([one.max for one in columns])
+
+
+def _random_designs(case: ea.Case, rng: np.random.Generator, count: int) -> Floats:
+    """Designs (count, n_y), uniform, or in the logarithm over more than a decade."""
+    low, high = _bounds(case)
+    u, far = rng.random((count, len(low))), (low > 0.0) & (high > 10.0 * low)
+    base = np.where(far, low, 1.0)
+    return np.where(far, base * (np.where(far, high, 1.0) / base) ** u, low + u * (high - low))
+
+
+def is_clear(problem: Problem, y: Floats, between: int = 0) -> bool:
+    """Whether a design keeps all limits, at the samples and ``between`` them."""
+    case = problem.case
+    if case.model().mass(y) > problem.heaviest * (1.0 + 1e-9):
+        return False
+    for own in problem.bands:
+        for name in own.names:
+            (part,) = (p.trajectory for p in case.trajectory.parts if p.name == name)
+            count = (len(part.q) - 1) * (between + 1) + 1
+            at = np.linspace(part.time_s[0], part.time_s[-1], count)
+            inner = at[(at > own.first) & (at < own.last)]
+            at = np.concatenate([[own.first], inner, [own.last]])
+            q = np.column_stack([np.interp(at, part.time_s, column) for column in part.q.T])
+            hz = _frequencies(case, q, y, own.high)
+            below = [(hz < edge).sum(axis=1) for edge in (own.low, own.high)]
+            if np.ptp(below) > 0:
+                return False
+    return True
+
+
+def _frequencies(case: ea.Case, q: Floats, y: Floats, beyond: float) -> Floats:
+    model = case.model()
+    available, count = model.n_dof - model.n_rigid, 4
+    while True:
+        hz = model.frequencies(q, y, min(count, available))
+        if count >= available or hz[:, -1].min() > beyond:
+            return np.asarray(hz)
+        count *= 2
+
+
+def objective(problem: Problem, y: Floats) -> float:
+    """The merit as the results state it: squared errors, price, or squared change of the design."""
+    case = problem.case
+    low, high = _bounds(case)
+    if problem.wanted is not None:
+        mode, wanted = problem.wanted
+        hz = case.model().frequencies(case.trajectory.q, y, mode)[:, mode - 1]
+        weights = np.concatenate(
+            [_trapezoidal(part.trajectory.time_s) for part in case.trajectory.parts]
+        )
+        return float(weights @ (hz / wanted - 1.0) ** 2 / weights.sum())
+    if problem.prices is not None:
+        return float(problem.prices @ (y - case.initial_design))
+    return float((((y - case.initial_design) / (high - low)) ** 2).sum())
+
+
+def _trapezoidal(time: Floats) -> Floats:
+    half = 0.5 * np.diff(time)
+    return np.append(half, 0.0) + np.append(0.0, half)
+
+
+def best_random(problem: Problem, seed: int) -> tuple[float, int]:
+    """The least objective of a thousand random designs that are clear, and how many they were."""
+    rng = np.random.default_rng([seed, 37])
+    found: list[tuple[float, Floats]] = []
+    for _ in range(MOST_DRAWN // CHUNK):
+        for y in _random_designs(problem.case, rng, CHUNK):
+            if is_clear(problem, y):
+                found.append((objective(problem, y), y))
+        if len(found) >= FEASIBLE:
+            break
+    for value, y in sorted(found, key=lambda one: one[0]):
+        if is_clear(problem, y, BETWEEN):
+            return value, len(found)
+    return np.inf, len(found)
