@@ -215,7 +215,7 @@ def same_start() -> Iterator[common.Row]:
         if len(problem.C):
             continue
         scene = prepare(case, Stages(lambda line: None), None)
-        task = Task(scene, requirements_of(case.file, scene.path), 0.0)
+        task = Task(scene, requirements_of(case.file, scene.path))
         search = partial(_sequential, task)
         found = search()
         y = scipy_search(Timed, case)

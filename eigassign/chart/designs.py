@@ -62,7 +62,7 @@ def chart_designs(
     if len(path.q) < samples:
         few = f"designs are charted on {len(path.q)} of {samples} samples"
         notes.append(f"{few} of the trajectory, for an exact solve takes long")
-    task = Task(replace(scene, trajectory=path), requirements_of(scene.file, path), 0.0)
+    task = Task(replace(scene, trajectory=path), requirements_of(scene.file, path))
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
     ways: dict[str, Callable[[Task], Reached]] = {
         "one shot": _one_shot,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,13 @@ from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.case.schema.targets import Harmonic, KeepOutTarget
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it
+
+
+class Margin(NamedTuple):
+    """How far modes keep off a band, relative: off both edges, and off the upper one besides."""
+
+    room: float = 0.0
+    raised: float = 0.0  # by what the model raises the mode above the band
 
 
 class ForbiddenBand(Requirement):
@@ -82,12 +90,12 @@ class ForbiddenBand(Requirement):
         edges = (self.lower, self.upper)
         return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
 
-    def kept_clear(self, k: int, above: int | None, margin: float) -> Iterator[Requirement]:
+    def kept_clear(self, k: int, above: int | None, margin: Margin) -> Iterator[Requirement]:
         """Yield what says: k of the modes that count are below, and mode ``above`` is above.
 
-        ``above`` is 0 or None where there is no such mode; by ``margin`` (relative) modes keep off.
+        ``above`` is 0 or None where there is no such mode.
         """
-        lower, upper = self.lower * (1.0 - margin), self.upper * (1.0 + margin)
+        lower, upper = self.drawn_out(margin)
         endless = np.full_like(lower, np.inf)
         if k:
             highest = self.counted[k - 1] if self.modes else k
@@ -127,13 +135,18 @@ class ForbiddenBand(Requirement):
         each = (_by_count(down[own], up[own]) for _, own in self.along)
         return np.concatenate([min(errors, key=lambda one: float(one.max())) for errors in each])
 
-    def errors_by_count(self, hz: Floats, margin: float) -> Floats:
+    def drawn_out(self, margin: Margin) -> Edges:
+        """The edges (n,) that modes keep off by a margin."""
+        raised = (1.0 + margin.room) * (1.0 + margin.raised)
+        return self.lower * (1.0 - margin.room), self.upper * raised
+
+    def errors_by_count(self, hz: Floats, margin: Margin) -> Floats:
         """The largest error (count + 1,) along one trajectory with 0, 1, … modes below the band.
 
-        ``hz`` (n, count) at its rows are all modes that matter; they keep off by ``margin``.
+        ``hz`` (n, count) at its rows are all modes that matter.
         """
         own = hz[:, [m - 1 for m in self.counted]] if self.modes else hz
-        low, high = self.lower[:, None] * (1.0 - margin), self.upper[:, None] * (1.0 + margin)
+        low, high = (edge[:, None] for edge in self.drawn_out(margin))
         down, up = np.maximum(own / low - 1.0, 0.0), np.maximum(1.0 - own / high, 0.0)
         return np.array([errors.max() for errors in _by_count(down, up)])
 

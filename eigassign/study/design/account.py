@@ -221,7 +221,7 @@ def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> C
     elif found is None and one_shot is not None and one_shot.search is not None:
         search = one_shot.search
         of_rows = tuple(one.rows for one in search.best)
-        exact = variant_of(Task(scene, tuple(wanted), 0.0), ()).problem
+        exact = variant_of(Task(scene, tuple(wanted)), ()).problem
         worth = [(one.y, exact(one.y, exact.appraise(one.y)), 0.0) for one in search.best]
     else:
         return None

@@ -18,6 +18,7 @@ from eigassign.assignment.catalogues.choosing import MOST, RELAXED, Chosen, choo
 from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import Optimum, minimise, worth
+from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import InfeasibleError
@@ -51,7 +52,7 @@ SEARCHES = (
     100  # searches with some of the bands: from then on a branch goes on in its likeliest part
 )
 PROMISING = 1  # designs all over the bounds from which a branch is searched too
-DRAWN = 4  # times that the limits of a branch are drawn in
+DRAWN = 6  # times that the limits of a branch are drawn in
 FEW = 5  # branches of an ended search that are completed
 Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
 
@@ -111,7 +112,7 @@ class _Branch:
 
     below: Counts
     searched: Searched
-    margin: float
+    margins: tuple[Margin, ...]
     was: Counts | None = None  # of a settled branch, before it was settled
     drawn: int = 0  # times that its limits were drawn in
 
@@ -142,12 +143,15 @@ class _Tree:
         deadline: float,
         progress: Callable[[str], None],
     ) -> None:
-        self.task = Task(scene, tuple(wanted), MARGIN)
+        bands = sum(len(one.bands) for one in wanted)
+        self.task = Task(scene, tuple(wanted), (Margin(MARGIN),) * bands)
         models = None if followed_modes(scene.file) else reduced_models(scene)
-        self.levels = {MARGIN: coarse_to_fine(self.task, models)}
+        self.levels: dict[tuple[Margin, ...], tuple[Task, ...]] = {
+            self.task.margins: coarse_to_fine(self.task, models)
+        }
         self.listed = catalogues(scene.file)
         self.starts, self.deadline, self.progress = starts, deadline, progress
-        few = self.at(MARGIN)[0]
+        few = self.at(self.task.margins)[0]
         self.designs = Designs.all_over(few.scene, few.bands, SPREAD) if few.bands else None
         self.counts: tuple[Sequence[int], ...] = ()
         self.every: list[tuple[int, ...]] = []  # choices that combinations of catalogues have
@@ -175,7 +179,7 @@ class _Tree:
             if missed > MET or not wanting(rows):
                 answer = best
                 continue
-            drawn = self.drawn_in(best, wanting(rows))
+            drawn = self.drawn_in(best, rows)
             if drawn is None or drawn.best.seen.violation > MET:
                 unclear.append(best)
             else:
@@ -200,12 +204,12 @@ class _Tree:
                 return
             yield self.branch(below, self.starts, was=below)
 
-    def at(self, margin: float) -> tuple[Task, ...]:
+    def at(self, margins: tuple[Margin, ...]) -> tuple[Task, ...]:
         """The levels with limits drawn in so far."""
-        if margin not in self.levels:
-            levels = (replace(level, margin=margin) for level in self.levels[MARGIN])
-            self.levels[margin] = tuple(levels)
-        return self.levels[margin]
+        if margins not in self.levels:
+            levels = (replace(one, margins=margins) for one in self.levels[self.task.margins])
+            self.levels[margins] = tuple(levels)
+        return self.levels[margins]
 
     @property
     def stopped(self) -> bool:
@@ -244,12 +248,12 @@ class _Tree:
         self,
         below: Counts,
         near: Sequence[Floats],
-        margin: float = MARGIN,
+        margins: tuple[Margin, ...] | None = None,
         was: Counts | None = None,
         drawn: int = 0,
     ) -> _Branch:
         """The branch as it is searched; from all starts if it is settled and was not drawn in."""
-        levels = self.at(margin)
+        levels = self.at(margins or self.task.margins)
         near, clock = near[: most_starts(self.task.scene.file)], (self.deadline, self.progress)
         if self.listed:
             searched = _search_catalogues(levels[-1], below, self.listed, levels, near, *clock)
@@ -259,7 +263,7 @@ class _Tree:
             levels = levels if was is not None else levels[:1]
             searched = search_starts(levels, below, near, made, *clock, spread)
         self.made.append(searched)
-        return _Branch(below, searched, margin, was, drawn)
+        return _Branch(below, searched, levels[-1].margins, was, drawn)
 
     def divided(self, branch: _Branch) -> Iterator[_Branch]:
         """Yield the parts of a branch by the number of modes below the band that it is in most.
@@ -296,12 +300,22 @@ class _Tree:
                     yield self.branch(other, self.near(branch, other))
             below = _with(below, band, branch.below[band])
 
-    def drawn_in(self, branch: _Branch, lacking: float) -> _Branch | None:
-        """The branch with limits drawn in by twice the room that was lacking; None after a few."""
+    def drawn_in(self, branch: _Branch, rows: Sequence[ClearanceRow]) -> _Branch | None:
+        """The branch with limits drawn in by the room that was lacking; None after a few times.
+
+        First by what the model raises the mode above the band, then by a little more than the rest.
+        """
         if branch.drawn == DRAWN:
             return None
-        margin = branch.margin + 2.0 * lacking + MARGIN
-        return self.branch(branch.below, [branch.best.y], margin, branch.was, branch.drawn + 1)
+        margins, more = list(branch.margins), 1.1 if 2 * branch.drawn < DRAWN else 2.0
+        for k, row in enumerate(rows):
+            room, raised = margins[k]
+            if not row.clear and row.raised is not None:
+                rest = -row.room - max(row.raised - raised, 0.0)
+                room += more * max(rest, 0.0) + MARGIN
+                margins[k] = Margin(room, max(row.raised, raised))
+        near, drawn = [branch.best.y], branch.drawn + 1
+        return self.branch(branch.below, near, tuple(margins), branch.was, drawn)
 
     def completed(self, branch: _Branch) -> _Branch:
         """The best design of a search that was ended, with the numbers that it is nearest to."""
@@ -309,21 +323,21 @@ class _Tree:
             return branch
         nearest = zip(branch.below, self.lacking(branch), strict=True)
         below = tuple(int(own.argmin()) if n is None else n for n, own in nearest)
-        variant = variant_of(self.at(branch.margin)[-1], below)
+        variant = variant_of(self.at(branch.margins)[-1], below)
         found = continued(branch.best, minimise(variant.problem, branch.best.y, 0))
         searched = replace(branch.searched, variant=variant, optima=(found,), chosen=None)
         return replace(branch, below=below, searched=searched)
 
     def near(self, branch: _Branch, below: Counts) -> list[Floats]:
         """Designs to search a part of a branch from."""
-        few = self.at(MARGIN)[0]
+        few = self.at(self.task.margins)[0]
         if self.designs is None or few.followers:
             return [one.y for one in branch.searched.optima[: 1 + PROMISING]]
         return [branch.best.y, *self.designs.best_of(variant_of(few, below), PROMISING)]
 
     def lacking(self, branch: _Branch) -> list[Floats]:
         """What the optimum lacks to be clear of each band, by the number of modes below it."""
-        found = lacking(self.at(branch.margin)[-1], branch.best.y)
+        found = lacking(self.at(branch.margins)[-1], branch.best.y)
         return [
             np.pad(own, (0, max(max(each) + 1 - len(own), 0)), constant_values=np.inf)
             for own, each in zip(found, self.counts, strict=True)

@@ -26,7 +26,7 @@ from eigassign.assignment.exact.design_problem import (
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.requirements.band import ForbiddenBand
+from eigassign.assignment.requirements.band import ForbiddenBand, Margin
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError
@@ -90,7 +90,7 @@ class Task:
 
     scene: Scene
     wanted: tuple[Requirement, ...]
-    margin: float  # by which the limits of bands are drawn in, relative
+    margins: tuple[Margin, ...] = ()  # by which modes keep off each band; none without bands
     models: ReducedModels | None = None  # that stand for exact solves
 
     @cached_property
@@ -150,12 +150,12 @@ def variant_of(task: Task, below: Sequence[int | None], missed: bool = False) ->
     if has_goals:  # F is errors, and prices are in %² of them, in the worst case in %
         prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
     asked = [one for one in wanted if not one.bands]
-    for band, k in zip(task.bands, below, strict=True):
+    for band, k, margin in zip(task.bands, below, task.margins, strict=True):
         if k is None:
             continue
         q = scene.path.at(scene.initial)[0][band.rows]
         above = mode_above(scene.model, k, band.counted, q, scene.initial)
-        asked += band.kept_clear(k, above, task.margin)
+        asked += band.kept_clear(k, above, margin)
     # linear limits are kept by every step; where they contradict, they are missed least
     kept = not missed and constraints_agree(scene.constraints, Bounds(lower, upper))
     asked += (one for one in scene.limits if not kept or one.constraint is None)
@@ -290,7 +290,8 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
     if not task.bands:
         return []
     hz = all_below(task.scene, task.bands, task.scene.path.at(y)[0], y)
-    return [band.errors_by_count(hz[band.rows], task.margin) for band in task.bands]
+    each = zip(task.bands, task.margins, strict=True)
+    return [band.errors_by_count(hz[band.rows], margin) for band, margin in each]
 
 
 def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:

@@ -100,5 +100,5 @@ def _judged(
     if answer.found is not None:
         variant = answer.found.variant
         return variant.requirements, answer.found.best.seen
-    variant = variant_of(Task(scene, tuple(wanted), 0.0), ())
+    variant = variant_of(Task(scene, tuple(wanted)), ())
     return variant.requirements, variant.problem.appraise(answer.y)

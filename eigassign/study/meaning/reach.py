@@ -24,6 +24,7 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
+from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
@@ -175,7 +176,7 @@ def _nearest(
         kept = []
         for band, n in zip(bands, below, strict=True):
             above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)
-            kept += band.kept_clear(n, above, 0.0)
+            kept += band.kept_clear(n, above, Margin())
         asked = Requirements((there, *beside, *elastic, *kept), np.ones(1))
         response = response_of(alone, asked.modes, followed)
         problem = DesignProblem(
