@@ -19,6 +19,9 @@ measurements nearly as well,
 the 95 % quantile of χ² with one degree of freedom (profile likelihood; Seber, Wild, Nonlinear
 Regression, 1989, ch. 5). An interval that reaches a bound ends there, and says so.
 
+Several minima of χ² may explain the measurements: those that no way joins along which χ² rises by
+3.84 at most above the higher one are distinct explanations.
+
 A direction v of y is not identified where the measurements hardly change along it: where moving
 from bound to bound changes all standardised residuals together by less than 1.96. Parameters that
 a bound holds take part in it where v leads away from all these bounds.
@@ -26,7 +29,7 @@ a bound holds take part in it where v leads away from all these bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -46,6 +49,7 @@ PRECISION = 1e-3  # of the distance from ŷ to the end of an interval
 SLIGHT = 1e-2  # entry of a direction, of its largest, that no bound need stop
 FAR = 100.0  # standard deviations: what is further, or has no answer, is only known to be outside
 POOR = 0.01  # p-value below which the model does not explain the measurements
+SAME = 1e-3  # of χ²: minima that explain nothing, and are as bad, count as one
 ROUNDS = 5  # of fitting anew from a better minimum that a profile has come upon
 
 
@@ -92,12 +96,23 @@ class Identified:
     held: tuple[str, ...]  # of each parameter: the bound that holds it, lower or upper; or ""
     unidentified: Floats  # (k, n_y) directions, the largest entry 1 of its range of bounds
     rounds: int  # fits from better and better starts
-    tried: int  # further starts, where the first explained nothing
+    minima: tuple[Optimum, ...]  # distinct ones that explain the measurements, the best first
+    starts: int
+    met: int  # distinct minima that the starts led to
 
     @property
     def deviation(self) -> Floats:
         """Standard deviations (n_y,), roots of the diagonal, while bounds in ``held`` hold."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def verdict(self) -> str:
+        """fitted, poor_fit, not_identified or unfinished."""
+        if self.fit.end is End.STEPS:
+            return "unfinished"
+        if self.p_value is not None and self.p_value < POOR:
+            return "poor_fit"
+        return "not_identified" if len(self.unidentified) or len(self.minima) > 1 else "fitted"
 
 
 def identify(
@@ -106,14 +121,15 @@ def identify(
     lower: Floats,
     upper: Floats,
     start: Floats,
-    others: Sequence[Floats] = (),
+    others: Iterable[Floats] = (),
+    enough: Callable[[int, int], bool] = lambda starts, found: False,
 ) -> Identified:
     """The parameters between ``lower`` and ``upper`` (n_y,) that explain ``measured`` best.
 
-    ``start`` (n_y,) is put within the bounds. Where the fit from there explains nothing, by a χ²
-    whose chance is below `POOR`, the ``others`` are tried until one does; the best counts. Where a
-    profile comes upon a better explanation than the fit, the fit starts anew from there. Raises
-    what ``response`` raises at the start.
+    ``start`` (n_y,) is put within the bounds. The ``others`` are tried until so many starts that
+    found so many distinct minima are ``enough``. A minimum explains the measurements where the
+    chance of so large a χ² is at least `POOR`. Where a profile comes upon a better explanation than
+    the best fit, the fit starts anew from there. Raises what ``response`` raises at the start.
     """
     from scipy.special import gammaincc  # loaded only where something is identified
 
@@ -126,20 +142,33 @@ def identify(
     problem = DesignProblem(appraise, lower, upper)
     start = np.clip(start, lower, upper)
     initial_hz = response(start)[0]
-    fit, tried = _fitted(problem, start), 0
+    minima, starts = [_fitted(problem, start)], 1
     room = max(len(initial_hz) - len(start), 1)
+
+    def explains(found: Optimum) -> bool:
+        return bool(gammaincc(room / 2.0, found.objective / 2.0) >= POOR)
+
+    def joined(found: Optimum) -> list[Optimum]:
+        """The minima with one more, if it is one; the better of two that are the same."""
+        for k, known in enumerate(minima):
+            if _are_same(problem, known, found, explains):
+                better = min(known, found, key=lambda each: each.objective)
+                return [*minima[:k], better, *minima[k + 1 :]]
+        return [*minima, found]
+
     for other in others:
-        if gammaincc(room / 2.0, fit.objective / 2.0) >= POOR:
+        if enough(starts, len(minima)):
             break
-        tried += 1
         with suppress(EigassignError):
-            fit = min(fit, _fitted(problem, other), key=lambda found: found.objective)
+            minima = joined(_fitted(problem, other))
+            starts += 1
     for rounds in range(1, ROUNDS + 1):
+        fit = min(minima, key=lambda found: found.objective)
         profile = _Profile(problem, fit)
         intervals = profile.intervals()
         if profile.best is fit or rounds == ROUNDS:
             break
-        fit = _fitted(problem, profile.best.y)
+        minima = joined(_fitted(problem, profile.best.y))
     held = _held(fit, len(start))
     covariance, rank = _covariance(problem, fit, held)
     hz, chi_squared = response(fit.y)[0], fit.objective
@@ -159,7 +188,9 @@ def identify(
         held=held,
         unidentified=frozen(_unidentified(problem, fit, held)),
         rounds=rounds,
-        tried=tried,
+        minima=tuple(sorted(filter(explains, minima), key=lambda found: found.objective)),
+        starts=starts,
+        met=len(minima),
     )
 
 
@@ -169,6 +200,43 @@ def _fitted(problem: DesignProblem, start: Floats) -> Optimum:
     if found.end is End.INTERRUPTED:
         raise KeyboardInterrupt
     return found
+
+
+def _are_same(
+    problem: DesignProblem, a: Optimum, b: Optimum, explains: Callable[[Optimum], bool]
+) -> bool:
+    """True where two minima are one: a way joins them; of such as explain nothing, χ² is equal.
+
+    The way is the line between them, at quarters; or, where χ² is too large there, other parameters
+    are fitted anew to the one that differs most.
+    """
+    if not (explains(a) and explains(b)):
+        return abs(a.objective - b.objective) <= SAME * max(a.objective, b.objective)
+    limit, move = max(a.objective, b.objective) + NOTICED**2, b.y - a.y
+    width = problem.upper - problem.lower
+    j = int(np.abs(move / np.where(width > 0.0, width, 1.0)).argmax())
+    for share in (0.5, 0.25, 0.75):
+        y = a.y + share * move
+        try:
+            if problem(y, problem.appraise(y)) <= limit:
+                continue
+        except EigassignError:
+            return False
+        fitted = _held_at(problem, j, float(y[j]), y)
+        if fitted is None or fitted.objective > limit:
+            return False
+    return True
+
+
+def _held_at(problem: DesignProblem, j: int, at: float, start: Floats) -> Optimum | None:
+    """The fit from ``start`` with y_j ``at`` a value; None where there is no answer."""
+    lower, upper = problem.lower.copy(), problem.upper.copy()
+    lower[j] = upper[j] = at
+    held = replace(problem, lower=lower, upper=upper)
+    try:
+        return _fitted(held, np.clip(start, lower, upper))
+    except EigassignError:
+        return None
 
 
 # --- Covariance, and what cannot be told
@@ -357,12 +425,12 @@ class _Profile:
         It starts where the linear model sends the others within their bounds; where χ² does not
         allow what that leads to, on the line from ŷ through ``near``, too.
         """
-        found = self._held_at(j, at, self._linear(j, at))
+        found = _held_at(self.problem, j, at, self._linear(j, at))
         if self._over(found) > 0.0:
             centre = self.fit.y
             along = near.y - centre
             line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
-            again = self._held_at(j, at, line)
+            again = _held_at(self.problem, j, at, line)
             if again is not None and (found is None or again.objective < found.objective):
                 found = again
         if found is None:
@@ -390,12 +458,3 @@ class _Profile:
             start[others] += move * width[others]
         start[j] = at
         return np.asarray(start)
-
-    def _held_at(self, j: int, at: float, start: Floats) -> Optimum | None:
-        lower, upper = self.problem.lower.copy(), self.problem.upper.copy()
-        lower[j] = upper[j] = at
-        held = replace(self.problem, lower=lower, upper=upper)
-        try:
-            return _fitted(held, np.clip(start, lower, upper))
-        except EigassignError:
-            return None

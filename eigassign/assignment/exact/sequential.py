@@ -37,6 +37,7 @@ FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds
 TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doubled
 OPTIMAL = 1e-7  # stationarity that is accepted
 ROUND_OFF = 1e-12  # of F
+PAYS = 0.5  # optima not seen yet: where no more are expected, no further start is made
 NEAR = 1e-4  # of the bounds: a step longer than this that promises nothing teaches curvature
 
 
@@ -244,6 +245,14 @@ def _with_curvature(
 def worth(optimum: Optimum) -> tuple[float, float]:
     """Violation and F, by which `best_first` orders."""
     return optimum.seen.violation, optimum.objective
+
+
+def unseen(starts: int, found: int) -> float:
+    """The expected number of optima not seen by so many starts that found so many.
+
+    w (n − 1)/(n − w − 2) − w (Boender, Rinnooy Kan); infinite for n ≤ w + 2.
+    """
+    return found * (found + 1) / (starts - found - 2) if starts > found + 2 else np.inf
 
 
 def distinct(optima: Sequence[Optimum], problem: DesignProblem) -> tuple[Optimum, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +19,7 @@ from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.updating.fit import (
     ExplainedMeasurement,
+    ExplainingMinimum,
     FitRow,
     UnidentifiedDirection,
     UpdatedParameter,
@@ -44,16 +45,24 @@ def headline(results: UpdateResults) -> str:
         "fitted": f"Explained: the model fits the measurements ({fit})",
         "poor_fit": f"NOT EXPLAINED: the measurements are further off than their standard "
         f"deviations allow ({fit}, below {POOR:g}); the intervals do not hold",
-        "not_identified": f"NOT IDENTIFIED: {'; '.join(d.words for d in results.unidentified)} "
-        f"({fit})",
+        "not_identified": f"NOT IDENTIFIED: {'; '.join(_why_not(results))} ({fit})",
         "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
     }[results.verdict]
     return f"{verdict}. {', '.join(found)}."
 
 
+def _why_not(results: UpdateResults) -> Iterator[str]:
+    yield from (direction.words for direction in results.unidentified)
+    if len(results.minima) > 1:
+        yield f"{len(results.minima)} distinct sets of values explain the measurements"
+
+
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
     """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
-    made = (parameters(results), directions(results), fit(results), measurements(results, most))
+    made = (
+        *(parameters(results), directions(results), minima(results)),
+        *(fit(results), measurements(results, most)),
+    )
     return tuple(table for table in made if table.rows)
 
 
@@ -77,6 +86,13 @@ def directions(results: UpdateResults) -> Table:
         "standard deviations, from bound to bound."
     )
     return facts_table("Not identified", results.unidentified, "words change", caption)
+
+
+def minima(results: UpdateResults) -> Table:
+    """The minima of χ² that explain the measurements, where there are several."""
+    several = results.minima if len(results.minima) > 1 else ()
+    caption = "Distinct minima, the best first; the intervals above are those of the first alone."
+    return facts_table("Explanations", several, "values chi_squared", caption)
 
 
 def fit(results: UpdateResults) -> Table:
@@ -128,6 +144,9 @@ class UpdateDocument(OriginDocument):
     covariance: Annotated[Floats, Fact("of the parameters, SI", may_lack=True)]
     correlation: Annotated[Floats, Fact("of the parameters", may_lack=True)]
     not_identified: Sequence[UnidentifiedDirection]
+    minima: Annotated[
+        Sequence[ExplainingMinimum], Fact("distinct ones that explain the measurements")
+    ]
     fit: FitRow
     measurements: Sequence[ExplainedMeasurement]
     warnings: Sequence[str]

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.assignment.exact.identification import (
-    POOR,
     Identified,
     MeasuredFrequencies,
     identify,
 )
-from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.exact.sequential import PAYS, unseen
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy_unit
@@ -37,7 +36,7 @@ from eigassign.study.design.variants import spread_designs
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
-STARTS = 16  # further ones, where the first explains nothing: 3 of 80 random cases needed 1 to 3
+STARTS = 100  # at most
 OUTLIER = 3.0  # standard deviations
 
 # --- Results
@@ -117,6 +116,14 @@ class UnidentifiedDirection:
 
 
 @dataclass(frozen=True)
+class ExplainingMinimum:
+    """One of several minima of χ² that explain the measurements: the parameters there, by name."""
+
+    values: Annotated[Mapping[str, float], Fact("SI, by their names", digits=listed)]
+    chi_squared: Annotated[float, Fact(heading="χ²", digits=".4g")]
+
+
+@dataclass(frozen=True)
 class FitRow:
     """The fit: χ² is the sum of squared residuals in standard deviations."""
 
@@ -144,6 +151,7 @@ class UpdateResults(Brief):
     covariance: Floats  # (n_y, n_y) in SI units; inf and NaN where not identified
     measurements: tuple[ExplainedMeasurement, ...]
     unidentified: tuple[UnidentifiedDirection, ...]
+    minima: tuple[ExplainingMinimum, ...]
     fit: FitRow
     verdict: str  # fitted, poor_fit, not_identified, unfinished
     notes: tuple[str, ...]
@@ -236,8 +244,12 @@ def update_problem(case: BuiltCase) -> UpdateProblem:
 def solve_update(problem: UpdateProblem) -> Identified:
     """The most likely parameters; raises EigassignError where the start has no answer."""
     start, limits = problem.case.initial_design, (problem.lower, problem.upper)
-    others = spread_designs(limits, STARTS, 0) if len(start) else ()
-    return identify(problem.response, problem.frequencies, *limits, start, tuple(others))
+    others = spread_designs(limits, STARTS - 1, 0) if len(start) else ()
+
+    def enough(starts: int, found: int) -> bool:
+        return unseen(starts, found) <= PAYS
+
+    return identify(problem.response, problem.frequencies, *limits, start, others, enough)
 
 
 def collect_update(
@@ -267,24 +279,22 @@ def collect_update(
             )
         ),
         unidentified=directions,
+        minima=tuple(
+            ExplainingMinimum(
+                dict(zip(problem.model.y_names, one.y.tolist(), strict=True)), one.objective
+            )
+            for one in found.minima
+        ),
         fit=FitRow(
             *(found.initial_chi_squared, found.chi_squared, found.degrees, found.p_value),
             len(found.fit.steps),
             str(found.fit.end),
         ),
-        verdict=_verdict(found),
+        verdict=found.verdict,
         notes=(*problem.notes, *_notes(problem, found)),
         warnings=(*map(str, case.file.warnings), *_warnings(problem, found)),
         timing_s=dict(timing_s),
     )
-
-
-def _verdict(found: Identified) -> str:
-    if found.fit.end is End.STEPS:
-        return "unfinished"
-    if found.p_value is not None and found.p_value < POOR:
-        return "poor_fit"
-    return "not_identified" if len(found.unidentified) else "fitted"
 
 
 def _parameters(
@@ -374,9 +384,10 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     held = [f"{n} at its {side} bound" for n, side in zip(names, found.held, strict=True) if side]
     if held:
         yield f"deviations and covariance hold only with {' and '.join(held)}; intervals do not"
-    if found.tried:
-        many = f"{found.tried} further start{'s' if found.tried > 1 else ''}"
-        yield f"the fit from the values in the file explains nothing: {many} tried, the best counts"
+    minima = f"{found.met} distinct minima" if found.met > 1 else "one minimum"
+    left = unseen(found.starts, found.met)
+    more = f"{left:.2g} more are expected" if np.isfinite(left) else "more are likely"
+    yield f"{found.starts} starts led to {minima} of χ²; {more}"
     design = problem.case.file.design
     if design.constraints or design.mass is not None:
         yield "limits of the mass and linear ones say what shall be: they are left aside here"

@@ -189,7 +189,7 @@ def test_a_fit_that_explains_nothing_is_sought_from_other_starts_too() -> None:
     assert found.verdict == "fitted"
     np.testing.assert_allclose([row.value for row in found.parameters], truth, rtol=1e-4)
     notes = " ".join(found.notes)
-    assert "further start" in notes
+    assert "starts led to 2 distinct minima" in notes
     assert "left aside" in notes
 
 
