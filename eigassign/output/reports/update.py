@@ -91,7 +91,7 @@ def directions(results: UpdateResults) -> Table:
 def minima(results: UpdateResults) -> Table:
     """The minima of χ² that explain the measurements, where there are several."""
     several = results.minima if len(results.minima) > 1 else ()
-    caption = "Distinct minima, the best first; the intervals above are those of the first alone."
+    caption = "Distinct minima of χ², the best first: the parameters above are those of the first."
     return facts_table("Explanations", several, "values chi_squared", caption)
 
 

@@ -256,6 +256,51 @@ def test_a_better_explanation_that_a_profile_comes_upon_is_taken() -> None:
     np.testing.assert_allclose(found.y, [1.0, 0.0], atol=1e-6)
 
 
+def several(response: Response, hz: list[float], n: int) -> Identified:
+    """The fit to exact frequencies within ±2 about 3, from nine spread starts."""
+    data = MeasuredFrequencies(np.array(hz), np.full(len(hz), 0.05))
+    starts = 3.0 + np.random.default_rng(1).uniform(-2.0, 2.0, (9, n))
+    ends = np.full(n, 2.0)
+    return identify(response, data, 3.0 - ends, 3.0 + ends, starts[0], starts[1:])
+
+
+def test_two_minima_that_explain_the_measurements_are_told_though_one_parameter_is_idle() -> None:
+    """(y_1 − 3)² = 1 at 2 and at 4, whatever y_2 is."""
+
+    def twice(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        a = y[0] - 3.0
+        return np.array([9.0 + a**2, 4.0 + a**2]), np.array([[2.0 * a, 0.0], [2.0 * a, 0.0]])
+
+    found = several(twice, [10.0, 5.0], 2)
+    assert (found.verdict, found.starts, found.met) == ("not_identified", 9, 2)
+    assert sorted(one.y[0] for one in found.minima) == pytest.approx([2.0, 4.0], abs=1e-6)
+
+
+def test_a_bent_valley_is_one_minimum() -> None:
+    """Only y_1 y_2 = 4 is known: the starts lead to as many points of it."""
+
+    def product(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([y[0] * y[1]]), np.array([[y[1], y[0]]])
+
+    found = several(product, [4.0], 2)
+    assert len(found.minima) == found.met == 1
+    assert found.verdict == "not_identified"
+    assert len(found.unidentified) == 1
+
+
+def test_no_more_starts_are_made_than_are_enough() -> None:
+    asked: list[tuple[int, int]] = []
+
+    def enough(starts: int, found: int) -> bool:
+        asked.append((starts, found))
+        return starts == 4
+
+    others = np.zeros((9, 3))
+    found = identify(linear, measured(linear), -WIDE, WIDE, np.zeros(3), others, enough)
+    assert asked == [(1, 1), (2, 1), (3, 1), (4, 1)]
+    assert found.verdict == "fitted"
+
+
 def test_where_the_model_has_no_answer_no_interval_goes() -> None:
     def stopping(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if y[0] > 0.35:
