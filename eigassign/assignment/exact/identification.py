@@ -164,7 +164,8 @@ def identify(
             starts += 1
     for rounds in range(1, ROUNDS + 1):
         fit = min(minima, key=lambda found: found.objective)
-        profile = _Profile(problem, fit)
+        loose = len(_unidentified(problem, fit, _held(fit, len(start)))) > 0
+        profile = _Profile(problem, fit, loose or len(minima) > 1)
         intervals = profile.intervals()
         if profile.best is fit or rounds == ROUNDS:
             break
@@ -339,8 +340,8 @@ class _Profile:
     profile comes upon widens the others'.
     """
 
-    def __init__(self, problem: DesignProblem, fit: Optimum) -> None:
-        self.problem, self.fit, self.best = problem, fit, fit
+    def __init__(self, problem: DesignProblem, fit: Optimum, doubtful: bool) -> None:
+        self.problem, self.fit, self.best, self.doubtful = problem, fit, fit, doubtful
         self.allowed = [fit]
         self.width = problem.upper - problem.lower
 
@@ -395,7 +396,10 @@ class _Profile:
             else:
                 outside = share
             if abs(over) <= PRECISION * NOTICED and share < 1.0:
-                return centre + share * room, False
+                below = self._below(j, centre + share * room) if self.doubtful else None
+                if below is None:
+                    return centre + share * room, False
+                near, inside, outside, over = below, share, np.inf, self._over(below)
             if share == last[0]:
                 break
             slope = (over - last[1]) / (share - last[0])
@@ -407,6 +411,19 @@ class _Profile:
             elif step >= 6 or not inside < share < outside:  # secants have not met: by halves
                 share = 0.5 * (inside + outside)
         return (bound, True) if inside >= 1.0 else (centre + inside * room, False)
+
+    def _below(self, j: int, at: float) -> Optimum | None:
+        """A fit with y_j ``at`` an end that lies below it; None where χ² is no less there.
+
+        From ŷ and from both corners of the bounds: where others are hardly told, fits near the one
+        before may miss it.
+        """
+        for start in (self.fit.y, self.problem.lower, self.problem.upper):
+            found = _held_at(self.problem, j, at, start)
+            if found is not None and self._over(found) < -PRECISION * NOTICED:
+                self._note(found)
+                return found
+        return None
 
     def _over(self, found: Optimum | None) -> float:
         rise = np.inf if found is None else max(found.objective - self.fit.objective, 0.0)
@@ -435,12 +452,16 @@ class _Profile:
                 found = again
         if found is None:
             return None
+        self._note(found)
+        return found
+
+    def _note(self, found: Optimum) -> None:
+        """Remember a fit that χ² allows, or that is better than any."""
         if self._over(found) <= 0.0:
             self.allowed.append(found)
         # another minimum, not round-off: lower by more than a thousandth of χ²
         if found.objective < self.best.objective - 1e-3 * max(self.fit.objective, 1.0):
             self.best = found
-        return found
 
     def _linear(self, j: int, at: float) -> Floats:
         """The design with y_j ``at`` a value at which χ² of the linear model is least."""
