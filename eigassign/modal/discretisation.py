@@ -7,8 +7,16 @@ its modes, ‖z_j‖_K = 1, the true μ are at most the eigenvalues of
     [ diag(μ̂)  R ]        R Rᵀ = G,   G_jk = Σ_elements ρ_jᵀ S⁻¹ ρ_k,
     [ Rᵀ       X ],       ρ_j = M_bc v_j − μ̂_j K_bc v_j        (see `inner`),
 
-where X is not less than M on C: β = max μ inside an element. Where sections vary along elements, C
-reaches over nodes by some motion of the mesh, and X = β + Rᵀ diag(1/μ̂) R.
+where X is not less than M on C: β = max μ inside an element, with any motion of an end that is
+attached to nothing taken away, for to turn the point of a cone takes no energy. Where sections vary
+along elements, C reaches over nodes by some motion of the mesh, and X = β + Rᵀ diag(1/μ̂) R.
+
+Modes of reduced links leave something in the mesh as well (G₁ and β₁ of `truncation`), and C
+reaches into that by τ² = max bᵀ(K_bb − S)b / bᵀSb of tapers. For any t > 0 what both leave out is
+
+    G₁ + (1 + t) G + (1 + 1/t) τ² G₁ ,   β₁ + (√β + τ √β₁)² ;
+
+its bound over that of the links alone is the mesh's.
 """
 
 from __future__ import annotations
@@ -19,11 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.assembly.inside_links import Alike, MeshedLinks
+from eigassign.mechanism.assembly.inside_links import Alike, MeshedLinks, ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.inner import InnerPart, inner_parts
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.truncation import REFUSED
+from eigassign.modal.truncation import BESIDE as BESIDE_LINKS
+from eigassign.modal.truncation import REFUSED, LeftOut, truncation_bounds
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -39,19 +48,26 @@ class DiscretisationError:
 
 
 def discretisation_error(
-    parts: MeshedLinks, x: Floats, modes: Sequence[int]
+    parts: MeshedLinks, x: Floats, modes: Sequence[int], reduced: ReducedLinks | None = None
 ) -> DiscretisationError:
     """Bounds at samples x (n_samples, n_x); each costs an exact solve of the mesh."""
     pencil, pick, highest = parts.pencil, np.array(modes) - 1, max(modes)
     total = np.empty((len(x), len(modes)))
     of_links = np.empty((len(parts.links), len(x), len(modes)))
     theta = pencil.theta(x)
-    inside = _Inside(parts)
+    inside = _Inside(parts, reduced is None)
+    left_out = None if reduced is None else LeftOut(reduced)
     for s in range(len(x)):
         found = lowest_modes(pencil, theta[:, s : s + 1], highest, BESIDE)
         mu = 1.0 / found.lam[0]
-        gram, own, beta = inside.at(x[s], found.phi[0] * np.sqrt(mu), mu)
-        total[s] = _bounds(mu, gram, float(beta.max()), inside.tapered, highest, pencil)[pick]
+        z = found.phi[0] * np.sqrt(mu)
+        gram, own, beta = inside.at(x[s], z, mu)
+        most = float(beta.max())
+        bounds = _bounds(mu, gram, most, inside.tie, highest, pencil)
+        if left_out is not None:
+            left = (gram, most), left_out.at(x[s], z, mu)
+            bounds = np.maximum(bounds, _beside_links(mu, *left, inside.tie, highest, pencil))
+        total[s] = bounds[pick]
         room = np.maximum(mu[pick] - beta[:, None], 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 0.5 * own[:, pick] / (room * mu[pick])
@@ -61,7 +77,7 @@ def discretisation_error(
 
 
 def _bounds(
-    mu: Floats, gram: Floats, beta: float, tapered: bool, highest: int, pencil: Pencil
+    mu: Floats, gram: Floats, beta: float, tie: float, highest: int, pencil: Pencil
 ) -> Floats:
     """√(μ/μ̂) − 1 at most, for every mode up to ``highest``."""
     kept = len(mu)
@@ -69,18 +85,43 @@ def _bounds(
         kept, beta = kept - 1, max(beta, float(mu[-1]))
     values, turns = np.linalg.eigh(gram[:kept, :kept])
     R = turns * np.sqrt(np.maximum(values, 0.0))
-    X = beta * np.eye(kept) + (R.T @ (R / mu[:kept, None]) if tapered else 0.0)
+    X = beta * np.eye(kept) + (R.T @ (R / mu[:kept, None]) if tie > 0.0 else 0.0)
     top = np.linalg.eigvalsh(np.block([[np.diag(mu[:kept]), R], [R.T, X]]))[::-1][:highest]
     error = np.sqrt(np.maximum(top / mu[:highest], 1.0)) - 1.0
     return np.where((mu[:highest] > beta) & (error < REFUSED), error, np.inf)
 
 
+def _beside_links(
+    mu: Floats,
+    elements: tuple[Floats, float],
+    links: tuple[Floats, float],
+    tie: float,
+    highest: int,
+    pencil: Pencil,
+) -> Floats:
+    """The same of modes of reduced links, from G and β of the elements and of the links."""
+    (gram, beta), (of_links, beta_links) = elements, links
+    count = highest + BESIDE_LINKS
+    alone = truncation_bounds(mu[:count], of_links[:count, :count], beta_links, highest, pencil)
+    beta = beta_links + (np.sqrt(beta) + np.sqrt(tie * beta_links)) ** 2
+    both = np.empty(highest)
+    for k in range(highest):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.clip(np.nan_to_num(np.sqrt(tie * of_links[k, k] / gram[k, k])), 1e-9, 1e9)
+        whole = of_links + (1.0 + t) * gram + (tie + tie / t) * of_links
+        both[k] = _bounds(mu, whole, beta, tie, highest, pencil)[k]
+    known = np.isfinite(alone)
+    return np.where(known, (1.0 + both) / (1.0 + np.where(known, alone, 0.0)) - 1.0, 0.0)
+
+
 class _Inside:
     """The elements' inner parts; those of one sample serve the next where they are the same."""
 
-    def __init__(self, parts: MeshedLinks) -> None:
+    def __init__(self, parts: MeshedLinks, whole: bool) -> None:
         self.parts = parts
-        self.key, self.tapered = np.zeros(0), False
+        # of reduced links, nodes that are free do not move by themselves
+        self.free = parts.free if whole else np.zeros_like(parts.free)
+        self.key, self.tie = np.zeros(0), 0.0
         self.inner: list[tuple[Ints, Ints, InnerPart]] = []  # which, as which of the part
 
     def at(self, x: Floats, z: Floats, mu: Floats) -> tuple[Floats, Floats, Floats]:
@@ -94,17 +135,18 @@ class _Inside:
             rho = part.mass[like] @ d - part.stiffness[like] @ (mu * d)
             answer = part.inverse[like] @ rho
             gram += np.einsum("nbj,nbk->jk", rho, answer)
-            np.add.at(own, self.parts.owners[which], (rho * answer).sum(axis=1))
-            np.maximum.at(beta, self.parts.owners[which], part.beta[like])
+            owners = self.parts.owners[which]
+            np.add.at(own, owners, (rho * answer).sum(axis=1))
+            np.maximum.at(beta, owners, part.beta[like, self.free[which]])
         return 0.5 * (gram + gram.T), own, beta
 
     def _update(self, elements: list[Alike]) -> None:
         key = np.concatenate([np.append(each.values, each.h) for each in elements])
         if np.array_equal(key, self.key):
             return
-        self.key, self.inner, self.tapered = key, [], False
+        self.key, self.inner, self.tie = key, [], 0.0
         for each in elements:
-            self.tapered |= each.values.shape[1] > 1
             once, like = each.different()
             for part in inner_parts(once.profile(), once.h, self.parts.space):
                 self.inner.append((each.elements, like, part))
+                self.tie = max(self.tie, float(part.tie.max()))

@@ -154,7 +154,7 @@ class Model:
         x = self.x(q, y)
         if self.meshed is None:
             return np.zeros((len(x), len(modes)))
-        return discretisation_error(self.meshed, x, modes).total
+        return discretisation_error(self.meshed, x, modes, self.reduced).total
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
         """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.

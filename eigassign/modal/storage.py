@@ -90,7 +90,7 @@ def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
     shapes that do not fit each other, for it is evaluated once, at an expansion point of its own.
     """
     try:
-        model = _Reader(arrays).whole()
+        model: ReducedModel = _Reader(arrays).whole()
         _check(model)
         if model.widened is not None:
             _check(model.widened)

@@ -56,17 +56,45 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
     truncated mode may lie below the mode asked for. Cost: one factor of each link's interior for
     each different y, and one exact solve of the reduced mechanism for each sample.
     """
-    pencil = parts.pencil
-    out = np.empty((len(x), len(modes)))
-    pick = np.array(modes) - 1
-    designs, which = np.unique(x[:, pencil.n_joints :], axis=0, return_inverse=True)
-    for k in range(len(designs)):
-        (samples,) = np.nonzero(which.ravel() == k)
-        values = parts.values(x[samples[0]])
-        interiors = [_interior(parts, link, values) for link in range(len(parts.links))]
-        for s in samples:
-            out[s] = _at(parts, interiors, x[s], max(modes))[pick]
+    pencil, pick, highest = parts.pencil, np.array(modes) - 1, max(modes)
+    out, left_out = np.empty((len(x), len(modes))), LeftOut(parts)
+    _, which = np.unique(x[:, pencil.n_joints :], axis=0, return_inverse=True)
+    for s in np.argsort(which.ravel(), kind="stable"):
+        found = lowest_modes(pencil, pencil.theta(x[s : s + 1]), highest, BESIDE)
+        mu = 1.0 / found.lam[0]
+        gram, beta = left_out.at(x[s], found.phi[0] * np.sqrt(mu), mu)
+        out[s] = truncation_bounds(mu, gram, beta, highest, pencil)[pick]
     return out
+
+
+class LeftOut:
+    """What reduced links leave out; the interiors of one sample serve the next of its design."""
+
+    def __init__(self, parts: ReducedLinks) -> None:
+        self.parts, self.design = parts, np.full(1, np.nan)
+        self.interiors: list[_LinkInterior] = []
+
+    def at(self, x: Floats, z: Floats, mu: Floats) -> tuple[Floats, float]:
+        """G (count, count) of modes z, ‖z‖_K = 1, at x (n_x,), and β."""
+        pencil, values = self.parts.pencil, self.parts.values(x)
+        if not np.array_equal(x[pencil.n_joints :], self.design):
+            self.design = x[pencil.n_joints :]
+            every = range(len(self.parts.links))
+            self.interiors = [_interior(self.parts, link, values) for link in every]
+        gram, pull = np.zeros((len(mu), len(mu))), np.zeros_like(z)
+        for k, one in enumerate(self.interiors):
+            B = self.parts.motion(k, values)
+            v = np.asarray(B @ z)
+            a = np.vstack([v, -mu * v])
+            gram += a.T @ one.gram @ a
+            n_b = len(one.drawn)
+            pull += np.asarray(B[:n_b].T @ (one.drawn @ a))
+        g = pull[pencil.elastic]
+        if g.any():
+            theta = pencil.theta(x[None])[:, 0]
+            K = principal(pencil, pencil.stiffness @ theta, pencil.elastic)
+            gram += SAFETY * (g.T @ factorise(K).solve(g))  # gᵀ S⁻¹ g
+        return 0.5 * (gram + gram.T), max(one.beta for one in self.interiors)
 
 
 def _interior(parts: ReducedLinks, k: int, values: Sequence[Floats]) -> _LinkInterior:
@@ -89,30 +117,9 @@ def _interior(parts: ReducedLinks, k: int, values: Sequence[Floats]) -> _LinkInt
     return _LinkInterior(X.T @ solved, drawn, largest_left_out(K_ii, M_ii, factor, T[i, n_b:]))
 
 
-def _at(parts: ReducedLinks, interiors: Sequence[_LinkInterior], x: Floats, highest: int) -> Floats:
-    """Bounds (highest,) at one sample."""
-    pencil = parts.pencil
-    theta = pencil.theta(x[None])
-    found = lowest_modes(pencil, theta, highest, BESIDE)
-    mu = 1.0 / found.lam[0]
-    z = found.phi[0] * np.sqrt(mu)
-    values = parts.values(x)
-    gram, pull = np.zeros((len(mu), len(mu))), np.zeros_like(z)
-    for k, one in enumerate(interiors):
-        B = parts.motion(k, values)
-        v = np.asarray(B @ z)
-        a = np.vstack([v, -mu * v])
-        gram += a.T @ one.gram @ a
-        n_b = len(one.drawn)
-        pull += np.asarray(B[:n_b].T @ (one.drawn @ a))
-    g = pull[pencil.elastic]
-    if g.any():
-        K = principal(pencil, pencil.stiffness @ theta[:, 0], pencil.elastic)
-        gram += SAFETY * (g.T @ factorise(K).solve(g))  # gᵀ S⁻¹ g
-    return _bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
-
-
-def _bounds(mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil) -> Floats:
+def truncation_bounds(
+    mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil
+) -> Floats:
     """√(μ/μ̂) − 1 at most, for every mode up to ``highest``."""
     kept = len(mu)
     if kept < len(pencil.elastic) and kept > highest:  # the last stands for all above it

@@ -28,6 +28,7 @@ from eigassign.mechanism.assembly.build import (
 )
 from eigassign.mechanism.assembly.inside_links import meshed_links, reduced_links
 from eigassign.mechanism.assembly.total_mass import total_mass
+from eigassign.mechanism.elements.craig_bampton import used_nodes
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
@@ -89,7 +90,7 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
         poses = build_link_frames(file, parameters, motion)
         reduced = reduced_links(parameters, local[0], pencil)
         placed = [
-            (p.link, link, local[1].meshes[p.link])
+            (p.link, link, local[1].meshes[p.link], used_nodes(file, p.link))
             for p, link in zip(motion.placements, local[0], strict=True)
         ]
         meshed = meshed_links(parameters, placed, file.mechanism.space, pencil)

@@ -88,6 +88,24 @@ def test_it_holds_for_few_elements_of_strong_tapers_with_shear() -> None:
     assert error < model.discretisation_error([], [], (1,))[0, 0] < 1.02 * error
 
 
+@pytest.mark.parametrize("n", [4, 60])
+@pytest.mark.parametrize("point", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("shape", ["wedge", "cone"])
+def test_pointed_wedges_and_cones_are_bounded(shape: str, point: float, n: int) -> None:
+    # at the point no energy holds the end of the last element
+    tree = cantilever("planar", n, section={"start": "a", "end": "b"}, shear=True)
+    for name, d in (("a", 0.1), ("b", 0.1 * point)):
+        circle = {"shape": "circle", "diameter": d}
+        wedge = {"shape": "rectangle", "width": 0.05, "height": d}
+        tree["mechanism"]["sections"][name] = wedge if shape == "wedge" else circle
+    case = case_of(tree)
+    fine = build_model(refined(case.file, 160.0 / n)[0]).frequencies([], [], 3)[0]
+    error = case.model().frequencies([], [], 3)[0] / fine - 1.0
+    bound = case.model().discretisation_error([], [], (1, 2, 3))[0]
+    assert (bound >= error - 1e-9).all()
+    assert (bound < 2.0 * error + 1e-9).all()
+
+
 def test_modes_beside_one_that_errs_much_are_bounded_too() -> None:
     # steep tapers hanging on one another: what mode 1 misses pushes the others the other way
     tree = cantilever("spatial", 3, section={"start": "a", "end": "b"}, shear=True)

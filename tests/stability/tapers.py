@@ -1,6 +1,9 @@
 """Random strong tapers of few elements, with shear and without, judged against fine meshes.
 
-``python tests/stability/tapers.py [how many [first seed]]`` prints true errors and those stated.
+As they are, or with their links reduced to few modes.
+
+``python tests/stability/tapers.py [reduced] [how many [first seed]]`` prints true
+errors and those stated.
 """
 
 from __future__ import annotations
@@ -12,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from chains import Tree, case_of
 
-from eigassign.mechanism import refined
+from eigassign.errors import MechanismError
+from eigassign.mechanism import refined, with_reduction
 from eigassign.modal import rounding_error
 from eigassign.study import build_model
 
@@ -91,6 +95,45 @@ def judged(seed: int) -> Judged:
     return Judged(seed, true, stated, rounding_error(fine.pencil, fine.x([], [])[0], 3))
 
 
+def judged_reduced(seed: int) -> Judged | None:
+    """Three modes of tapers of 3 to 12 elements with their links reduced, mesh and links together.
+
+    On an elastic joint, and with a spring at a tip, of some; None where nothing is reduced.
+    """
+    rng = np.random.default_rng([seed, 13])
+    tree, n = tapers(rng), int(rng.integers(3, 13))
+    mechanism = tree["mechanism"]
+    for link in mechanism["links"].values():
+        link["elements"] = n
+    if rng.random() < 0.4:
+        mechanism["joints"]["j0"] |= {"type": "revolute", **_axis(mechanism["space"])}
+        tree["coordinates"]["q"] = {"joint": "j0", "drive": {"stiffness": 10 ** rng.uniform(2, 6)}}
+    if rng.random() < 0.4:
+        kind = str(rng.choice(["rotational", "translational"]))
+        tip = f"l{len(mechanism['links']) - 1}.end"
+        mechanism["springs"] = {"s": {"between": [tip, "ground"], kind: 10 ** rng.uniform(2, 7)}}
+    file, whole = case_of(tree).file, case_of(tree).model()
+    q, count = np.zeros(len(whole.q_names)), 3
+    cut = whole.frequencies(q, [], count)[0, -1] * 10 ** rng.uniform(-0.5, 0.8)
+    model = build_model(with_reduction(file, dict.fromkeys(mechanism["links"], float(cut))))
+    if model.reduced is None or model.n_dof - model.n_rigid < count:
+        return None
+    fine = build_model(refined(file, max(FINE / n, 4.0))[0])
+    try:
+        exact, hz = (each.frequencies(q, [], count)[0] for each in (fine, model))
+    except MechanismError:  # fewer modes have mass
+        return None
+    mesh, links = (
+        error(q, [], (1, 2, 3))[0] for error in (model.discretisation_error, model.truncation_error)
+    )
+    stated = (1.0 + mesh) * (1.0 + links) - 1.0
+    return Judged(seed, hz / exact - 1.0, stated, rounding_error(fine.pencil, fine.x(q, [])[0], 3))
+
+
+def _axis(space: str) -> Tree:
+    return {} if space == "planar" else {"axis": [0.0, 0.0, 1.0]}
+
+
 def figures(found: Sequence[Judged]) -> str:
     """How true errors compare with those stated."""
     true, stated, lost = (
@@ -109,5 +152,9 @@ def figures(found: Sequence[Judged]) -> str:
 
 
 if __name__ == "__main__":
-    count, first = (int(a) for a in (*sys.argv[1:], *("300", "0")[len(sys.argv) - 1 :]))
-    sys.stdout.write(figures([judged(seed) for seed in range(first, first + count)]) + "\n")
+    reduced = sys.argv[1:2] == ["reduced"]
+    given = sys.argv[2 if reduced else 1 :]
+    count, first = (int(a) for a in (*given, *("300", "0")[len(given) :]))
+    judge = judged_reduced if reduced else judged
+    each = (judge(seed) for seed in range(first, first + count))
+    sys.stdout.write(figures([one for one in each if one is not None]) + "\n")

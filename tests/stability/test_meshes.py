@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from meshes import ROUND_OFF, mesh
-from tapers import judged
+from tapers import figures, judged, judged_reduced
 
 SEEDS = 230
 FACTOR = 1.01  # of tapers; see docs/accuracy.md
@@ -17,6 +17,19 @@ FACTOR = 1.01  # of tapers; see docs/accuracy.md
 def test_random_tapers_of_few_elements_keep_what_they_state() -> None:
     for each in map(judged, range(200)):
         assert (each.true <= each.stated + each.round_off).all(), each.seed
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(6), pytest.param(range(550), marks=pytest.mark.slow)], ids=len
+)
+def test_meshes_and_reductions_of_links_together_keep_what_they_state(seeds: range) -> None:
+    """A mode of reduced links is stiffer than the mesh's: its shape is not that of the mesh."""
+    found = [each for each in map(judged_reduced, seeds) if each is not None]
+    sys.stdout.write(figures(found) + "\n")
+    for each in found:
+        assert (each.true <= each.stated + each.round_off).all(), each.seed
+    stated = np.concatenate([each.stated for each in found])
+    assert np.isfinite(stated).mean() > 0.8
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ For the bounds of what reduced links and meshes leave out; nothing is compiled b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -81,6 +81,7 @@ class MeshedLink(NamedTuple):
     name: str
     local: LocalLink
     mesh: LinkMesh
+    used: Ints  # the local dofs of nodes that something else is attached to
 
 
 class Alike(NamedTuple):
@@ -125,6 +126,21 @@ class MeshedLinks:
         """The link that each element belongs to, (n,)."""
         count = [sum(len(strand.profiles) for strand in link.mesh.strands) for link in self.links]
         return np.repeat(np.arange(len(count)), count)
+
+    @cached_property
+    def free(self) -> Ints:
+        """The end of each element that is attached to nothing: the first (1), the last (2), 0."""
+        out = []
+        for link in self.links:
+            rows = [np.array(list(strand.slots)) for strand in link.mesh.strands]
+            ends = np.concatenate([np.stack([row[:-1], row[1:]], axis=1) for row in rows])
+            ends[ends < 0] = link.mesh.n_local  # what a planar node has not
+            shared = np.bincount(ends.ravel(), minlength=link.mesh.n_local + 1) > 1
+            shared[link.used] = True
+            shared[-1] = False
+            alone = ~shared[ends].any(axis=2)
+            out.append(np.where(alone[:, 1], 2, alone[:, 0].astype(np.intp)))
+        return np.concatenate(out)
 
     def elements(self, values: Sequence[Floats]) -> list[Alike]:
         """The elements, kind by kind."""
@@ -193,14 +209,17 @@ class _Kind(NamedTuple):
 
 def meshed_links(
     parameters: ModelParameters,
-    links: Sequence[tuple[str, LocalLink, LinkMesh]],
+    links: Sequence[tuple[str, LocalLink, LinkMesh, Collection[str]]],
     space: str,
     pencil: Pencil,
 ) -> MeshedLinks | None:
-    """The links (name, place, mesh) that consist of beams; None without any."""
+    """The links (name, place, mesh, used nodes) that consist of beams; None without any."""
     found = []
-    for name, local, mesh in links:
+    for name, local, mesh, nodes in links:
         whole = mesh if mesh.reduction is None else mesh.reduction.mesh
         if whole.strands:
-            found.append(MeshedLink(name, local, whole))
+            # what travels along a link is attached to no node of it, "", and may be anywhere
+            taken = [whole.nodes[node] for node in whole.nodes if node in nodes or "" in nodes]
+            used = np.concatenate(taken)
+            found.append(MeshedLink(name, local, whole, used))
     return MeshedLinks(tuple(found), space, parameters, pencil) if found else None

@@ -40,7 +40,8 @@ class InnerPart(NamedTuple):
     stiffness: Floats  # K_bc (n, n_b, n_c)
     mass: Floats  # M_bc
     inverse: Floats  # S⁻¹ (n, n_b, n_b)
-    beta: Floats  # (n,): the largest bᵀ M_bb b / bᵀ S b, in s²
+    beta: Floats  # (n, 3): the largest bᵀ M_bb b / bᵀ S b, in s², and where an end is free
+    tie: Floats  # (n,): the largest bᵀ (K_bb − S) b / bᵀ S b, of tapers
 
 
 class _Energy(NamedTuple):
@@ -123,13 +124,25 @@ def _part(
         for group in (strains, motions)
     )
     c, b = slice(len(dofs)), slice(len(dofs), None)
-    S = K[:, b, b]
+    taken = np.zeros_like(K[:, b, b])
     if len(profile) > 1:
-        S = S - K[:, b, c] @ np.linalg.pinv(K[:, c, c], rcond=1e-10, hermitian=True) @ K[:, c, b]
+        taken = K[:, b, c] @ np.linalg.pinv(K[:, c, c], rcond=1e-10, hermitian=True) @ K[:, c, b]
+    S = K[:, b, b] - taken
+    half, masses = len(dofs) // 2, [M[:, b, b]] * 3
+    if len(profile) > 1:
+        for k, end in enumerate((slice(half), slice(half, 2 * half)), start=1):
+            follows = np.linalg.solve(M[:, end, end], M[:, end, b])
+            masses[k] = M[:, b, b] - M[:, b, end] @ follows
+    beta = np.stack([_largest(mass, S) for mass in masses], axis=1)
+    inverse = np.linalg.inv(S)
+    return InnerPart(dofs, scale, K[:, b, c], M[:, b, c], inverse, beta, _largest(taken, S))
+
+
+def _largest(A: Floats, S: Floats) -> Floats:
+    """The largest bᵀ A b / bᵀ S b of n pairs of matrices, (n,)."""
     root = np.linalg.cholesky(S)
-    ratio = np.linalg.solve(root, np.linalg.solve(root, M[:, b, b]).transpose(0, 2, 1))
-    beta = np.asarray(np.linalg.eigvalsh(0.5 * (ratio + ratio.transpose(0, 2, 1)))[:, -1])
-    return InnerPart(dofs, scale, K[:, b, c], M[:, b, c], np.linalg.inv(S), beta)
+    ratio = np.linalg.solve(root, np.linalg.solve(root, A).transpose(0, 2, 1))
+    return np.asarray(np.linalg.eigvalsh(0.5 * (ratio + ratio.transpose(0, 2, 1)))[:, -1])
 
 
 def _matrix(energy: _Energy, profile: Profile, h: Floats) -> Floats:
