@@ -10,7 +10,8 @@ how well promises are kept. The answer is judged by first-order optimality of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from time import monotonic
@@ -38,6 +39,9 @@ TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doub
 OPTIMAL = 1e-7  # stationarity that is accepted
 ROUND_OFF = 1e-12  # of F
 PAYS = 0.5  # optima not seen yet: where no more are expected, no further start is made
+# Designs met from which curvature is gathered, for each parameter: with stale residuals instead,
+# 4 of 4 starts with 30 parameters ended after 100 steps, with these after 36 to 72 at an optimum
+MET_AGAIN = 2
 NEAR = 1e-4  # of the bounds: a step longer than this that promises nothing teaches curvature
 
 
@@ -142,11 +146,16 @@ class _Run:
         self.region = TrustRegion(FIRST, np.zeros((self.box.n, self.box.n)), 0.0)
         self.steps: list[StepRecord] = []
         self.appraisals = 0
+        self.met: deque[DesignPoint] = deque(maxlen=MET_AGAIN * self.box.n)
+        self.multipliers: Floats | None = None  # of the last program
 
     def placed(self, z: Floats) -> DesignPoint:
         """The design at z, appraised."""
         self.appraisals += 1
-        return DesignPoint.of(self.problem, self.box, z, self.problem.appraise(self.box.y(z)))
+        seen = self.problem.appraise(self.box.y(z))
+        place = DesignPoint.of(self.problem, self.box, z, seen)
+        self.met.append(place)
+        return place
 
     def unbalanced(self, place: DesignPoint) -> float:
         """The stationarity of a place."""
@@ -156,7 +165,11 @@ class _Run:
         self, place: DesignPoint, spoilt: tuple[DesignPoint, ProposedStep] | None = None
     ) -> ProposedStep | None:
         """The step of the program there, or its correction after a ``spoilt`` one."""
+        if spoilt is None:
+            self.region = replace(self.region, S=_curvature(place, self.met, self.multipliers))
         move, self.region = step_program(self.problem, self.box, place, self.region, spoilt)
+        if move is not None:
+            self.multipliers = move.multipliers
         return move
 
     def taken(self, place: DesignPoint, move: ProposedStep) -> DesignPoint | None:
@@ -182,12 +195,7 @@ class _Run:
                 radius = min(2.0 * radius, LARGEST)
             elif fall < 0.25 * move.promised:
                 radius = max(0.5 * length, SMALLEST)
-        S = (
-            self.region.S
-            if reached is None
-            else _with_curvature(self.region.S, place, reached, move)
-        )
-        self.region = replace(self.region, radius=radius, S=S)
+        self.region = replace(self.region, radius=radius)
         return reached if taken else None
 
     def _reached(self, place: DesignPoint, move: ProposedStep) -> DesignPoint | None:
@@ -220,23 +228,30 @@ class _Run:
         return fall >= -paid and self.unbalanced(reached) <= 0.5 * self.unbalanced(place)
 
 
-def _with_curvature(
-    S: Floats, place: DesignPoint, reached: DesignPoint, move: ProposedStep
+def _curvature(
+    place: DesignPoint, met: Iterable[DesignPoint], multipliers: Floats | None
 ) -> Floats:
-    """S with S d = (J⁺ − J)ᵀ w + (C⁺ − C)ᵀ μ, by a symmetric rank-one update.
+    """S with S d = (J(z + d) − J(z))ᵀ r + (C(z + d) − C(z))ᵀ μ for the designs z + d met.
 
-    w are the multipliers of the residuals, or of squares these themselves. Of rows at kinks the
-    mean of both branches is taken, which is smooth.
+    By symmetric rank-one updates, the nearest last, so that it holds there best. They are made anew
+    at every place: with residuals and multipliers of earlier ones S would be out of date, above all
+    where residuals fall. In the worst case the multipliers of residuals take the place of r. Of
+    rows at kinks the mean of both branches is taken, which is smooth.
     """
-    d, weights = reached.z - place.z, move.multipliers
-    if reached.squared:
-        weights = np.append(reached.seen.residual, weights[reached.m :])
-    before, after = (p.smooth_slopes(move.expected.behind) for p in (place, reached))
-    rest = (after - before).T @ weights - S @ d
-    along = float(rest @ d)
-    if abs(along) <= 1e-8 * np.linalg.norm(rest) * np.linalg.norm(d):
-        return S
-    return np.asarray(S + np.outer(rest, rest) / along)
+    weights = np.zeros(len(place.values)) if multipliers is None else multipliers
+    if place.squared:
+        weights = np.append(place.seen.residual, weights[place.m :])
+    S = np.zeros((len(place.z), len(place.z)))
+    others = ((np.linalg.norm(one.z - place.z), one) for one in met)
+    for length, other in sorted(others, key=lambda each: -each[0]):
+        d = other.z - place.z
+        behind = place.at(d).behind
+        after, before = (weights @ one.smooth_slopes(behind) for one in (other, place))
+        rest = after - before - S @ d
+        along = float(rest @ d)
+        if abs(along) > 1e-8 * np.linalg.norm(rest) * length:
+            S += np.outer(rest, rest) / along
+    return S
 
 
 # --- Several starts

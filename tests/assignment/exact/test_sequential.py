@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -265,3 +265,33 @@ def test_steps_go_on_until_the_limit_is_met_to_round_off() -> None:
         found = minimise(asked, np.array([start]))
         # 1e-9 of excess, where it falls by 0.18 per unit of y
         assert found.y[0] == pytest.approx(1.0 / 0.36 - 1.0, abs=1e-8)
+
+
+def chain(wanted: Sequence[float], n: int = 15) -> DesignProblem:
+    """A chain of n masses on n springs, all to be chosen, whose load grows along the way."""
+    D = np.eye(n) - np.eye(n, k=-1)
+
+    def appraise(y: np.ndarray) -> Appraisal:
+        residual, slopes = [], []
+        for load in np.linspace(0.5, 1.5, 4):
+            masses = np.append(y[n:-1], y[-1] + load)
+            K = D.T @ (y[:n, None] * D)
+            lam, phi = eigh(K, np.diag(masses), subset_by_index=[0, len(wanted) - 1])
+            f = np.sqrt(lam)
+            residual += list(f / wanted - 1.0)
+            rates = np.vstack([(D @ phi) ** 2, -lam * phi**2]) / (2.0 * f * wanted)
+            slopes += list(rates.T)
+        share = 1.0 / np.sqrt(len(residual))
+        none = np.zeros(0), np.zeros((0, 2 * n))
+        return Appraisal(share * np.array(residual), share * np.array(slopes), *none)
+
+    return DesignProblem(appraise, np.repeat([1.0, 0.1], n), np.repeat([30.0, 3.0], n))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.8])
+def test_thirty_parameters_that_few_residuals_feel_end_first_order_optimal(share: float) -> None:
+    """Residuals of 12 rows fall a thousandfold on the way: curvature must keep up with them."""
+    asked = chain([0.2, 0.45, 0.7])
+    found = minimise(asked, asked.lower + share * (asked.upper - asked.lower))
+    assert found.end is End.OPTIMAL
+    assert stationarity(asked, found.y, found.seen) <= 1e-7
