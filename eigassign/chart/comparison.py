@@ -269,7 +269,7 @@ def _chosen(within: Advice, superlative: str, found: ChartPoint | None) -> Advic
     total, worst = found.cost_s(within.evaluations), found.everywhere.worst_relative
     words = (
         f"{within.words} the {superlative} is {found.method} ({kind_of(found.family)}). It takes "
-        f"{time_in_words(total)} in all and is off by {_share(worst)} at most"
+        f"{time_in_words(total)} in all and is off by {_share(worst)} at worst"
         f"{'; it is set up anew for every design' if found.at_once > 1 else ''}"
     )
     chosen = replace(within, method=found.method, parameters=found.parameters, words=words)
@@ -289,7 +289,7 @@ def _beside_auto(
         auto = AutoTakes(own.method, worst, total, own.parameters["choosing_s"])
         says = (
             f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
-            f"{_share(worst)} at most, after {time_in_words(auto.choosing_s)} of choosing"
+            f"{_share(worst)} at worst, after {time_in_words(auto.choosing_s)} of choosing"
         )
     return advice if auto is None else replace(advice, auto=auto, words=f"{advice.words}. {says}")
 

@@ -150,6 +150,8 @@ def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
     several = scene.trajectory is not None and scene.trajectory.several
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
     where = "along all trajectories" if several else where
+    if scene.trajectory is not None and len(q) < len(scene.path.q):
+        where = f"at {len(q)} samples {where}"
     lines = []
     for mode, error in zip(scene.modes, estimate, strict=True):
         stated = (

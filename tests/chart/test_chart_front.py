@@ -123,7 +123,7 @@ def test_advice_is_a_sentence_that_says_what_the_method_does_and_that_auto_refus
     assert found.words.startswith(
         "for 152 evaluations within 1 % of exact the quickest is stations linear 3 (interpolation"
     )
-    assert "and is off by 0.001 % at most" in found.words
+    assert "and is off by 0.001 % at worst" in found.words
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, 1.0, 1, 1.0, 0.0)
     refused = {"auto 1e-02": "no expansion of order up to 4"}
     (found,) = advise([stations], asked, Request((1e-2,), evaluations=152), refused)
