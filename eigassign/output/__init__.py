@@ -40,6 +40,7 @@ __all__, __getattr__, __dir__ = face(
         "previous": "EarlierResult Known",
         "reports.chart": "chart_tables write_chart",
         "reports.page": "page write_modes write_run",
+        "reports.verdict": "verdict_of",
         "documents": "results_document to_json",
         "result_files": "sample_files",
         "schema": "FILES NUMBERS results_schema",

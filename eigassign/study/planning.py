@@ -115,7 +115,9 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     k = central_sample(poses @ joint_map(model).T)
     q0 = with_middle_loads(file, trajectory.q[k, :n])
     point = shown_point(model.q_names, q0, file.q_units)
-    why = f"the most central: its farthest other sample is nearer than any other's{of_loads}"
+    few = len(poses[:: 1 + len(poses) // MANY_SAMPLES])
+    seen = "" if few == len(poses) else f" (of {few})"
+    why = f"the most central: no other sample is nearer to its farthest one{seen}{of_loads}"
     return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
 
 

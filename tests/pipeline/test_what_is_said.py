@@ -1,0 +1,113 @@
+"""Sentences of a run that claim something, each held against what makes it true."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from chains import Tree, case_of, two_link
+
+from eigassign.output import verdict_of
+from eigassign.pipeline import Options, Result, solve_case
+
+HELD = ({"stiffness": 2e4}, {"stiffness": 4e3})
+ELBOW = {"parameter": "bodies.elbow_mass.mass", "min": 0.0, "max": 0.25}
+TOOL = {"parameter": "bodies.tool_mass.mass", "min": 0.0, "max": 0.25}
+
+
+def run(targets: list[Tree], elements: tuple[int, int] = (2, 2), **more: Any) -> Result:
+    tree = two_link(elements=elements, drives=HELD, masses=(0.1, 0.1))
+    tree["trajectory"] = {"points": [[0.1, 0.5], [0.6, 1.5]], "duration": 1.0, "samples": 12}
+    tree |= {"design": {"m1": ELBOW, "m2": TOOL}, "targets": targets} | more
+    return solve_case(case_of(tree), Options(use_cache=False, study="none"))
+
+
+def page(result: Result) -> str:
+    screen = verdict_of(result.results)
+    assert screen is not None
+    return " ".join(screen.trust)
+
+
+def finely(result: Result, modes: int) -> np.ndarray:
+    """Exact frequencies of the answer with 16 elements a link."""
+    tree = two_link(elements=(16, 16), drives=HELD, masses=(0.1, 0.1))
+    model = case_of(tree | {"design": {"m1": ELBOW, "m2": TOOL}}).model()
+    return model.frequencies(result.results.q, list(result.design.values()), modes)
+
+
+def test_bounds_and_limits_that_the_answer_lies_on_are_those_and_no_others() -> None:
+    result = run([{"mode": 1, "at_least": 10.0}, {"mode": 2, "frequency": 70.0}])
+    notes = " ".join(result.results.notes)
+    for row in result.results.design:
+        for side, bound in (("lower", row.lower), ("upper", row.upper)):
+            named = re.search(rf"lies on its {side} bound of [m12, ]*{row.name}", notes)
+            assert (named is not None) == (abs(row.optimal - bound) <= 1e-7)
+    met = "just meets mode 1 at least" in notes
+    assert met == (abs(result.results.targets[0].exact_hz.min() / 10.0 - 1.0) <= 1e-7)
+
+
+def test_the_page_says_how_far_frequencies_can_be_trusted() -> None:
+    result = run([{"mode": 3, "at_most": 900.0}, {"mode": 1, "at_least": 5.0}])
+    said = page(result)
+    assert "solved exactly at all 12 samples" in said
+    (share,) = re.findall(r"modes asked for too high by ([0-9.]+) % at most, at 9 of them", said)
+    fine = finely(result, 3)[:, [2, 0]]
+    coarse = np.column_stack([target.exact_hz for target in result.results.targets])
+    assert 0.0 < (coarse / fine - 1.0).max() <= 0.01 * float(share)
+
+
+def test_a_search_that_time_has_ended_is_not_called_done() -> None:
+    result = run([{"mode": 1, "frequency": 12.0}], assignment={"seconds": 1e-9})
+    assert "The search was ended before it was done." in page(result)
+    row = result.results.assignment
+    assert row is not None
+    assert "time used up" in row.reason
+    assert "time used up" in row.optimality.words
+
+
+@pytest.mark.parametrize("order", [1, 4])
+def test_an_expansion_that_misleads_is_said_to(order: int) -> None:
+    """About the lightest design, a straight line foresees far too low frequencies."""
+    expansion = {"order": order, "q": [0.3, 1.0], "y": [0.0, 0.0]}
+    heavy = {name: {**one, "max": 20.0} for name, one in (("m1", ELBOW), ("m2", TOOL))}
+    result = run(
+        [{"mode": 1, "frequency": 6.0}],
+        assignment={"method": "one_shot"}, expansion=expansion, design=heavy,
+    )  # fmt: skip
+    (target,), said = result.results.targets, " ".join(result.results.warnings)
+    far = target.approximation_error > result.results.tolerance
+    assert ("the prediction that the optimum rests on" in said) == far
+    before, after = target.error.initial.rms_relative, target.error.exact.rms_relative
+    assert ("the initial design is nearer" in said) == (after > before)
+    row = result.results.assignment
+    assert row is not None
+    assert (row.verdict == "do_not_use") or not far
+    assert row.optimality.words == "the optimum of the linearised problem only"
+
+
+PEAKS = {
+    "d": {"parameter": "sections.thin.diameter", "min": 0.005, "max": 0.12},
+    "m2": {"parameter": "bodies.tool_mass.mass", "min": 0.05, "max": 1.0},
+}
+
+
+@pytest.mark.parametrize(("share", "word"), [(0.999, "reached"), (1.05, "unreachable")])
+def test_out_of_reach_is_what_no_design_of_a_grid_comes_near(share: float, word: str) -> None:
+    """Mode 1 is highest for a diameter between the bounds."""
+    tree = two_link(elements=(1, 1), drives=HELD)
+    mechanism = tree["mechanism"]
+    mechanism["sections"]["thin"] = {"shape": "circle", "diameter": 0.1}
+    mechanism["links"]["fore"]["section"] = "thin"
+    tree["trajectory"] = {"points": [[0.0, 0.5], [0.5, 1.0]], "duration": 1.0, "samples": 2}
+    tree |= {"design": PEAKS, "targets": [{"mode": 1, "at_least": 1.0}]}
+    case = case_of(tree)
+    designs = np.column_stack([np.linspace(0.005, 0.12, 400), np.full(400, 0.05)])
+    q = np.repeat(case.trajectory.q[:1], 400, axis=0)
+    best = float(case.model().frequencies(q, designs, 1).max())
+    tree["targets"] = [{"mode": 1, "at_least": share * best}]
+    row = solve_case(case_of(tree), Options(use_cache=False, study="none")).results.assignment
+    assert row is not None
+    assert row.verdict == word, row.reason
+    assert ("no design found from 3 starts" in row.reason) == (word == "unreachable")
