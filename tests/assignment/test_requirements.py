@@ -11,7 +11,9 @@ import pytest
 from small_case import TEXT
 
 from eigassign.assignment import (
+    Frequencies,
     Requirement,
+    Requirements,
     Solved,
     followed_modes,
     named_design,
@@ -230,3 +232,19 @@ def test_a_followed_mode_is_named_at_a_pose_and_design(
         np.testing.assert_allclose(found, q, rtol=1e-14)
     (one,) = requirements_of(file, path)
     assert (one.followed, one.modes, one.terms) == (followed, (), ((-1, 1.0),))
+
+
+def test_a_difference_that_is_round_off_is_none(wanted: Read) -> None:
+    """Of the design's own numbers and of frequencies; what is more than that stays."""
+    rng = np.random.default_rng(0)
+    y = 10.0 ** rng.uniform(-6, 12, 200)
+    beside = y * (1.0 + rng.choice([-1, 1], 200) * np.finfo(float).eps)
+    apart = y * (1.0 + 1e-14)
+    (limit,) = wanted("{mode: 1, at_least: 50}")
+    n = len(limit.lower)
+    asked = Requirements((limit,), np.ones(n), least_change=(y, 1e-3 * y))
+    hz = np.full((n, 1), 50.0 * (1.0 + np.finfo(float).eps))
+    found = Frequencies(hz, np.zeros((n, 1, 200)))
+    assert not asked.appraise(beside, found).residual.any()
+    assert not asked.appraise(beside, found).excess.any()
+    assert asked.appraise(apart, found).residual.all()

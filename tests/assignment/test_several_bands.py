@@ -166,10 +166,9 @@ def are_clear(problem: Problem, designs: Floats, between: int = 0) -> Floats:
             below, upper = ((hz[:, rows] < edge).sum(axis=2) for edge in (own.low, own.high))
             good = (np.ptp(below, axis=1) == 0) & (below == upper).all(axis=1)
             if between:
-                good &= [
-                    _above_of_fine_mesh(model, poses[rows], y, int(k[0]), own.high)
-                    for y, k in zip(designs[clear], below, strict=True)
-                ]
+                each = zip(designs[clear], below[:, 0], strict=True)
+                fine = [_above_of_fine_mesh(model, poses[rows], y, k, own.high) for y, k in each]
+                good &= np.array(fine, dtype=bool)
             clear[clear], hz = good, hz[good]
     return clear
 

@@ -184,3 +184,25 @@ def test_a_band_that_can_be_met_at_the_samples_alone_is_not_called_infeasible() 
     verdict, reason = said(solve_case(swinging(band)))
     assert verdict in ("do_not_use", "reached")
     assert verdict == "reached" or "not clear" in reason
+
+
+def test_a_band_that_is_clear_but_for_what_the_mesh_leaves_open_says_both_shares() -> None:
+    coarse = {**TWO_LINKS["mechanism"], "links": {}}
+    for name, link in TWO_LINKS["mechanism"]["links"].items():
+        coarse["links"][name] = {**link, "elements": 1}
+    design = {"k1": {**K1, "min": 19999, "max": 20001}}
+    plain = case_of(design, [{"mode": 1, "at_least": 1}], mechanism=coarse)
+    hz = plain.model().frequencies(plain.trajectory.q, plain.initial_design, count=3)
+    band = {"keep_out": [0.9 * hz[:, 2].min(), 0.9995 * hz[:, 2].min()]}
+    verdict, reason = said(solve_case(case_of(design, [band], mechanism=coarse)))
+    assert verdict == "do_not_use"
+    assert re.search(r"clear by 0\.0\d+ % as modelled", reason)
+    assert "more elements" in reason
+
+
+def test_tolerances_are_told_of_bands_above_the_modes_that_are_shown() -> None:
+    design = {"k1": {**K1, "min": 2000, "tolerance": "5 %"}, "motor": MOTOR}
+    result = solve_case(case_of(design, [{"keep_out": [9, 9.2]}, {"keep_out": [60, 70]}]))
+    assert said(result)[0] == "reached"
+    assert result.results.meaning is not None
+    assert result.results.meaning.tolerance is not None

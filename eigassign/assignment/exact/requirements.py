@@ -28,6 +28,7 @@ from eigassign.assignment.requirements.requirement import (
     Frequencies,
     Requirement,
     Solved,
+    difference,
     time_shares,
 )
 
@@ -92,7 +93,7 @@ class Requirements:
         residuals = [rows.at(y, found) for rows in self.residuals]
         if self.least_change is not None:
             reference, width = self.least_change
-            residuals.append(((y - reference) / width, np.diag(1.0 / width)))
+            residuals.append((difference(y, reference) / width, np.diag(1.0 / width)))
         residual, slopes = _stacked(residuals, len(y))
         excess = _stacked([rows.at(y, found) for rows in self.excesses], len(y))
         return Appraisal(residual, slopes, *excess, self._pairs(found, len(residual)))

@@ -39,6 +39,8 @@ Ints = NDArray[np.intp]
 Edges = tuple[Floats, Floats]
 # of a design y (n_y,): its value, or one at each sample, and the slopes ((n,) n_y)
 Quantity = Callable[[Floats], tuple[float | Floats, Floats]]
+# of a number that two or three operations have rounded, such as a design put into its bounds
+ROUND_OFF = 4.0 * np.finfo(np.float64).eps
 Terms = tuple[tuple[int | Quantity, float], ...]
 
 
@@ -305,7 +307,7 @@ class EdgeRows:
     def at(self, y: Floats, found: Frequencies) -> tuple[Floats, Floats]:
         """The rows and their slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
         value, slopes = self.of.value(y, found)
-        return self.scale * (value - self.edge), self.scale[:, None] * slopes
+        return self.scale * difference(value, self.edge), self.scale[:, None] * slopes
 
     def least(self, low: Floats, high: Floats) -> Floats:
         """The rows (n,) that no curve between two is below; of a goal in magnitude."""
@@ -342,6 +344,12 @@ class EdgeRows:
                 gap=np.abs(hz / own - 1.0),
                 larger=np.equal(neighbour < mode, scale > 0.0),
             )
+
+
+def difference(a: Floats, b: Floats) -> Floats:
+    """a − b (n,), 0 where it is round-off of what it is the difference of."""
+    found = a - b
+    return np.where(np.abs(found) <= ROUND_OFF * np.maximum(np.abs(a), np.abs(b)), 0.0, found)
 
 
 def time_shares(goals: Sequence[Requirement], time_weights: Floats) -> tuple[Floats, ...]:

@@ -15,7 +15,7 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.study.accuracy import model_errors
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.clearance import error_between
+from eigassign.study.design.clearance import check_clear, error_between
 from eigassign.study.design.conclusions import extreme, is_proved
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import Task, variant_of
@@ -24,7 +24,6 @@ from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
     CatalogueRow,
-    ClearanceRow,
     CombinationRow,
     LimitRow,
     LocalOptimum,
@@ -67,7 +66,7 @@ def assignment_row(
         answer = replace(answer, conflict=None)
     optimality = _optimality(scene, answer)
     conflicting = () if answer.conflict is None else answer.conflict.names
-    unproved = [_why_unproved(row) for row in clearances if not row.clear]
+    unproved = () if found is None else tuple(_why_unproved(scene, found))
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
@@ -203,12 +202,28 @@ def _too_coarse(
     )
 
 
-def _why_unproved(row: ClearanceRow) -> str:
-    """Its label; and what to do where it is for what the model is too high by."""
-    if row.raised is not None and row.room + row.raised <= 0.0:
-        return row.label
-    how = "not bounded" if row.raised is None else f"{100 * row.raised:.2g} % too high at most"
-    return f"{row.label} (what mesh and reduced links do to the mode above it: {how}; {FINER})"
+def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
+    """Say which bands are not clear, and what the model leaves open where they are clear in it."""
+    y = found.best.y
+    q = scene.path.at(y)[0]
+    for band, row in zip(found.task.bands, found.clearances, strict=True):
+        if row.clear:
+            continue
+        of_model = check_clear(scene.model, band, row.below, q[band.rows], y, 0.0)
+        if not of_model.clear:
+            yield row.label
+            continue
+        how = (
+            "by more than can be told" if row.raised is None else f"by up to {_percent(row.raised)}"
+        )
+        yield (
+            f"{row.label} (clear by {_percent(of_model.room)} as modelled, where mesh and reduced "
+            f"links raise the mode above it {how}: {FINER})"
+        )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
 
 
 def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> CatalogueRow | None:

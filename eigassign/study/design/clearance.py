@@ -45,13 +45,19 @@ STILL = (
 
 
 def check_clear(
-    model: Model, band: ForbiddenBand, below: int, q: Floats, y: Floats
+    model: Model,
+    band: ForbiddenBand,
+    below: int,
+    q: Floats,
+    y: Floats,
+    raised: float | None = None,
 ) -> ClearanceRow:
     """Judge a band along one trajectory, of poses q (n, n_q) at its rows and design y (n_y,).
 
-    ``below`` is k. Raises what the exact solves raise.
+    ``below`` is k; e is ``raised``, or else what can be proved of it. Raises what the exact solves
+    raise.
     """
-    motion = _Motion(model, band, below, q, y)
+    motion = _Motion(model, band, below, q, y, raised)
     counted, room = motion.counted(), motion.least_room()
     raised = motion.raised if np.isfinite(motion.raised) else None
     return ClearanceRow(band.label, below, counted and room > 0.0, room, counted, raised)
@@ -82,6 +88,7 @@ class _Motion:
     below: int
     q: Floats
     y: Floats
+    given: float | None = None  # e
 
     @cached_property
     def above(self) -> int | None:
@@ -91,6 +98,8 @@ class _Motion:
     @cached_property
     def raised(self) -> float:
         """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
+        if self.given is not None:
+            return self.given
         if self.above == 0 or (self.model.meshed is None and self.model.reduced is None):
             return 0.0
         if self.above is None:

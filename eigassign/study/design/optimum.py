@@ -175,6 +175,12 @@ class _Tree:
             if best.was is None:
                 open_ += self.divided(best)
                 continue
+            if (
+                MET < missed <= 2.0 * MARGIN and not best.drawn
+            ):  # but for the margin it may be clear
+                best = self.branch(
+                    best.below, [best.best.y], (Margin(),) * len(self.counts), best.was, DRAWN
+                )
             rows = _clearances(self.task, best.below, best.best.y)
             if missed > MET or not wanting(rows):
                 answer = best

@@ -51,7 +51,7 @@ def study_tolerance(
     lower, upper = y - spread, y + spread
     lower = np.where(effect != 0.0, np.maximum(lower, np.minimum(y, 0.0)), lower)
     drawn = np.flatnonzero((spread > 0.0) & (effect == 0.0))
-    designs, ranges = y[None], _exact(scene, own)
+    designs, ranges = y[None], _exact(scene, own, exact.hz.shape[1])
     how = "followed" if own else "proved"
     if len(drawn):
         from scipy.stats import qmc  # half a second, and most runs draw nothing
@@ -117,9 +117,9 @@ def _how(wanted: Requirement, how: str) -> str:
     return "bounded" if how == "proved" and len(wanted.terms) != 1 else how
 
 
-def _exact(scene: Scene, own: Sequence[Follower]) -> Ranges:
+def _exact(scene: Scene, own: Sequence[Follower], count: int) -> Ranges:
     def ranges(y: Floats) -> tuple[Solved, Solved]:
-        found = solve_design(scene, own, y)
+        found = solve_design(scene, own, y, count)
         return found, found
 
     return ranges
