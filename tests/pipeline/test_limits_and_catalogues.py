@@ -136,6 +136,15 @@ def test_catalogues_give_the_combination_that_brute_force_gives() -> None:
         assert one.objective == pytest.approx(found[tuple(one.choices.values())], rel=1e-9)
 
 
+def test_a_search_of_catalogues_without_time_proves_nothing_and_says_so() -> None:
+    row = solve_case(with_lists("0, 80 g", "28 mm", "assignment: {seconds: 1e-9}\n"))
+    found = row.results.assignment
+    assert found is not None
+    assert found.optimality.kind == "local"
+    assert "of 6 combinations of the catalogues; time used up" in found.optimality.words
+    assert "unfinished: time used up" in found.reason
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hz", [170.0, 185.0, 200.0, 230.0])
 def test_so_they_do_of_hundreds_whatever_is_wanted(hz: float) -> None:

@@ -236,8 +236,8 @@ STOPPED = (End.SECONDS, End.INTERRUPTED)
 class Chosen:
     """The best combinations met, the best first: their rows, and each with its exact optimum.
 
-    ``search`` is None where time ran out or Ctrl-C came before all was searched. ``settled``: of
-    each of all ``count`` combinations it is known that it is not better.
+    ``search`` is None where time ran out or Ctrl-C came before all was searched, and ``ended`` says
+    which. ``settled``: of each of all ``count`` combinations it is known that it is not better.
     """
 
     rows: tuple[Rows, ...]
@@ -246,6 +246,7 @@ class Chosen:
     appraisals: int
     count: int
     settled: bool
+    ended: End | None
 
 
 def combinations(
@@ -260,7 +261,11 @@ def combinations(
 
 
 class _StoppedError(Exception):
-    """Time ran out inside the tree."""
+    """The search was ended, by the clock or by Ctrl-C."""
+
+    def __init__(self, end: End) -> None:
+        super().__init__(end.value)
+        self.end = end
 
 
 def choose(
@@ -283,10 +288,15 @@ def choose(
     """
     exact = _Exact(problem, catalogues, starts, steps, deadline, progress, lacking)
     count = prod(map(len, exact.root))
+    search, ended = None, None
     try:
         search = exact.searched() if count > MOST else exact.enumerated()
-    except (_StoppedError, AccuracyError):
-        search = None
+    except _StoppedError as stopped:
+        ended = stopped.end
+    except AccuracyError:  # of a tree, in which no combination was met in time
+        ended = End.SECONDS
+    except KeyboardInterrupt:
+        ended = End.INTERRUPTED
     if not exact.fixed and exact.solved(exact.nearest(exact.root, starts[0])) is None:
         raise AccuracyError(
             "catalogues: no combination was met that the mechanism can be solved at"
@@ -294,7 +304,7 @@ def choose(
     best = best_first(sorted(exact.fixed), exact.worth)[:KEEP]
     optima = tuple(exact.fixed[rows] for rows in best)
     settled = search is not None and count <= MOST and exact.is_listed
-    return Chosen(tuple(best), optima, search, exact.appraisals, count, settled)
+    return Chosen(tuple(best), optima, search, exact.appraisals, count, settled, ended)
 
 
 class _Exact(CatalogueProblem):
@@ -352,7 +362,7 @@ class _Exact(CatalogueProblem):
             if not ahead:
                 break
             if time.monotonic() > self.deadline:
-                raise _StoppedError
+                raise _StoppedError(End.SECONDS)
             first = ahead[0]
             if problem.least is not None and level[first] < levels:
                 alike = order[level[order] == level[first]]
@@ -365,7 +375,7 @@ class _Exact(CatalogueProblem):
                 self.progress(f"catalogues: {len(self.fixed)} of {len(every)} combinations solved")
                 alike, found = np.array([first]), self.solved(every[first])
                 if found is not None and found.end in STOPPED:
-                    raise _StoppedError
+                    raise _StoppedError(found.end)
                 none = np.inf, np.inf
                 violation[first], value[first] = self.worth(every[first]) if found else none
             level[alike] += 1
@@ -421,7 +431,7 @@ class _Exact(CatalogueProblem):
         if found is None:
             return None
         if found.end in STOPPED:
-            raise _StoppedError
+            raise _StoppedError(found.end)
         value = self.value(found)
         return None if value is None else (found.y, value)
 

@@ -289,6 +289,9 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
             words = "no design meets all limits, or misses them by less"
         words = f"the problem is convex: {words}"
         return OptimalityRow("proved", best.stationarity, None, words)
+    if chosen is not None:
+        words = f"the best found of {chosen.count} combinations of the catalogues; {best.end.value}"
+        return OptimalityRow("local", best.stationarity, None, words)
     count = len(found.optima)
     which = f"best of {count} local optima" if count > 1 else "only local optimum"
     words = f"the {which} from {many}"

@@ -400,6 +400,7 @@ def _search_catalogues(
         optima=chosen.optima,
         starts=relaxed.starts or min(len(near), RELAXED),
         exact_solves=chosen.appraisals * len(task.scene.path.q) + relaxed.exact_solves,
+        ended=chosen.ended,
         lost=tuple(variant.response.lost),
         chosen=chosen,
     )
