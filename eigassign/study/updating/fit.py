@@ -340,12 +340,12 @@ def _direction(change: Floats, y: Floats, problem: UpdateProblem) -> Unidentifie
 
 
 def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bool) -> str:
-    """ "E has no effect"; "m1 and m2 only as m1 + 0.5 m2"; or how they change, in per cent.
+    """ "E can change unnoticed"; "m1 and m2 only as m1 + 0.5 m2"; or how they change, in per cent.
 
     ``relative`` is the change by the values, None where one of these is 0.
     """
     if len(change) == 1:
-        return f"{next(iter(change))} has no effect on what was measured"
+        return f"{next(iter(change))} can change from bound to bound unnoticed"
     *most, last = change
     together = f"{', '.join(most)} and {last} can change together unnoticed"
     if relative is not None and np.ptp(relative) <= 1e-2 * np.abs(relative).max():
