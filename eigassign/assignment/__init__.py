@@ -26,6 +26,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.design_problem": "Appraisal DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Requirements",
+        "exact.optima": "Tally with_end",
         "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
         "linear": "LinearConstraint LinearModel",

@@ -7,6 +7,7 @@ Reading order:
     stationarity    first-order optimality, also where modes meet
     step            one program in a trust region, until it misses no rows
     sequential      the steps in a row, and the local optimum that they lead to
+    optima          which ends of several searches are one optimum, and how many are not seen
     requirements    a set of requirements as such a problem
     identification  parameters from measured frequencies, their covariance and intervals
 """

@@ -11,7 +11,7 @@ how well promises are kept. The answer is judged by first-order optimality of th
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from time import monotonic
@@ -268,13 +268,3 @@ def unseen(starts: int, found: int) -> float:
     w (n − 1)/(n − w − 2) − w (Boender, Rinnooy Kan); infinite for n ≤ w + 2.
     """
     return found * (found + 1) / (starts - found - 2) if starts > found + 2 else np.inf
-
-
-def distinct(optima: Sequence[Optimum], problem: DesignProblem) -> tuple[Optimum, ...]:
-    """Optima by violation, then F, those of the same design (to 1e-3 of the bounds) once."""
-    width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
-    kept: list[Optimum] = []
-    for found in best_first(optima, worth):
-        if all(np.abs((found.y - other.y) / width).max(initial=0.0) > 1e-3 for other in kept):
-            kept.append(found)
-    return tuple(kept)

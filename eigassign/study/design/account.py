@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.catalogues.branching import CatalogueSearch
 from eigassign.assignment.catalogues.choosing import MOST, Chosen
 from eigassign.assignment.exact.design_problem import MET, ON
+from eigassign.assignment.exact.optima import NOTHING
 from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.study.accuracy import model_errors
@@ -279,7 +280,6 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
         )
         return OptimalityRow("bounded", None, gap, words)
     best, chosen = found.best, found.chosen
-    many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
     if chosen is not None and chosen.search is not None:
         return _of_catalogues(found, chosen, chosen.search)
     if chosen is None and is_proved(scene, found):
@@ -292,14 +292,29 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     if chosen is not None:
         words = f"the best found of {chosen.count} combinations of the catalogues; {best.end.value}"
         return OptimalityRow("local", best.stationarity, None, words)
-    count = len(found.optima)
-    which = f"best of {count} local optima" if count > 1 else "only local optimum"
-    words = f"the {which} from {many}"
+    words = _of_starts(found)
     if found.untried:
         words += f"; {found.untried} choices of the numbers of modes below the bands were not tried"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
     return OptimalityRow("local", best.stationarity, None, words)
+
+
+def _of_starts(found: Found) -> str:
+    """Say how many optima the starts led to, and how many more are to be expected."""
+    best, tally = found.best, found.tally
+    if tally is None or not tally.optima:
+        return f"the best design that {found.starts} start{'s' * (found.starts > 1)} led to"
+    many = f"{tally.starts} start{'s' * (tally.starts > 1)}"
+    which = f"best of {tally.optima} local optima" if tally.optima > 1 else "only local optimum"
+    words = f"the {which} that {many} found"
+    exact = found.variant.problem.prices is None and best.seen.violation <= MET
+    if exact and best.objective <= NOTHING:
+        return f"{words}; nothing that is asked is missed, so that no design is better"
+    if not np.isfinite(tally.unseen):
+        return f"{words}, too few to tell how many more there are"
+    unseen = f"{tally.unseen:.1g}" if tally.unseen < 1.0 else f"{tally.unseen:.0f}"
+    return f"{words}; about {unseen} more are expected unseen"
 
 
 def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:

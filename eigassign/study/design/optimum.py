@@ -17,6 +17,7 @@ from eigassign.assignment.catalogues.branching import KEEP, ListedValues
 from eigassign.assignment.catalogues.choosing import MOST, RELAXED, Chosen, choose, combinations
 from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
+from eigassign.assignment.exact.optima import NOTHING, SAME, Tally
 from eigassign.assignment.exact.sequential import Optimum, minimise, worth
 from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
@@ -26,8 +27,6 @@ from eigassign.study.design.clearance import check_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import (
-    NOTHING,
-    SAME,
     Searched,
     coarse_to_fine,
     continued,
@@ -70,6 +69,7 @@ class Found:
     initial: tuple[float, float]  # violation and objective of the initial design
     clearances: tuple[ClearanceRow, ...]  # of every band along every trajectory
     starts: int
+    tally: Tally | None  # of the variant; None of catalogues
     exact_solves: int
     searches: int
     chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
@@ -226,17 +226,20 @@ class _Tree:
     def account(self, answer: _Branch, others: Sequence[Searched]) -> Found:
         """The answer with what it was chosen among, and how much work that was."""
         scene, (best, *more) = self.task.scene, answer.searched.optima
+        variant = answer.searched.variant
+        own = [one.tally for one in self.made if one.variant.below == variant.below and one.tally]
         ended = self.made[-1].ended
         return Found(
             task=self.task,
             counts=self.counts,
             choices=len(self.every) or self.size((None,) * len(self.counts)),
-            variant=answer.searched.variant,
+            variant=variant,
             optima=(best if ended is None else replace(best, end=ended), *more),
             variants=(answer.searched, *others),
-            initial=_initial(scene, answer.searched.variant),
+            initial=_initial(scene, variant),
             clearances=_clearances(self.task, answer.below, best.y),
             starts=sum(one.starts for one in self.made),
+            tally=max(own, key=lambda tally: tally.starts, default=None),
             exact_solves=len(scene.path.q)
             + sum(one.exact_solves for one in self.made)
             + sum(

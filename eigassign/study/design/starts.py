@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
-from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
+from eigassign.assignment.exact.optima import FINISHED, NOTHING, Tally, with_end
+from eigassign.assignment.exact.sequential import PAYS, End, Optimum, minimise, worth
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.response import ReducedModels
@@ -27,11 +29,12 @@ from eigassign.study.design.variants import (
 )
 
 Floats = NDArray[np.float64]
-STARTS = 12  # with `starts: auto`, at most
+STARTS = 100  # with `starts: auto`, at most
+# Exact solves of a search after which `starts: auto` ends: a count, so that no answer depends on
+# the clock; 100 starts of 20 steps on 24 samples take 50 000
+SOLVES = 50_000
 FEW = 24  # samples on which starts are followed, of more than twice as many
 SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
-SAME = 1e-4  # relative, in F: optima of the same worth
-NOTHING = 1e-14  # of F: no error
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,9 @@ class Searched:
     """The optima found of one variant, and how much work that was."""
 
     variant: PosedProblem
-    optima: tuple[Optimum, ...] = ()
+    optima: tuple[Optimum, ...] = ()  # distinct ones, the best first
     starts: int = 0
+    tally: Tally | None = None  # None where no start was made
     ended: End | None = None  # by the clock or by Ctrl-C
     exact_solves: int = 0
     lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
@@ -80,18 +84,18 @@ def search_starts(
     for start in _in_turn(first, search.variant, starts) if spread else starts:
         progress(f"  from start {made + search.starts + 1}")
         search = replace(_after(search, start, keys.steps, deadline), starts=search.starts + 1)
-        if search.ended or (keys.starts == "auto" and _agree(search)):
+        if search.ended or (keys.starts == "auto" and _is_enough(search)):
             break
     responses = [search.variant.response]
     for level in levels[1:]:
         if not search.ended:
             progress("  from what was found, on all samples and exactly")
         refined = replace(search, variant=variant_of(level, below), optima=())
-        search = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
+        finer = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
+        search = replace(finer, tally=search.tally)
         responses.append(search.variant.response)
     return replace(
         search,
-        optima=distinct(search.optima, search.variant.problem),
         exact_solves=sum(response.exact_solves for response in responses),
         lost=tuple(line for response in responses for line in response.lost),
     )
@@ -109,6 +113,10 @@ def _after(
     problem, optima = search.variant.problem, search.optima
     try:
         found = minimise(problem, start, 0 if search.ended else steps, deadline)
+        stopped = found.end if found.end in (End.SECONDS, End.INTERRUPTED) else None
+        ended = search.ended or stopped
+        found = found if before is None else continued(before, found)
+        apart = with_end(optima, found, None if ended else problem)
     except KeyboardInterrupt:
         if search.ended:  # pressed again
             raise
@@ -118,9 +126,9 @@ def _after(
         if not optima and before is None:
             raise
         return search
-    stopped = found.end if found.end in (End.SECONDS, End.INTERRUPTED) else None
-    found = found if before is None else continued(before, found)
-    return replace(search, optima=(*optima, found), ended=search.ended or stopped)
+    known, there = search.tally or Tally(), sum(one.end in FINISHED for one in apart)
+    tally = Tally(known.starts + (found.end in FINISHED), there)
+    return replace(search, optima=apart, tally=tally, ended=ended)
 
 
 def _refined(
@@ -128,7 +136,7 @@ def _refined(
 ) -> Searched:
     """The optima on a finer level from ``coarse`` ones; or the initial design, if it is better."""
     problem = search.variant.problem
-    for optimum in distinct(coarse, problem)[:3]:  # the best few
+    for optimum in coarse[:3]:  # the best few
         search = _after(search, optimum.y, steps, deadline, optimum)
         if search.ended:
             break
@@ -151,42 +159,42 @@ def continued(before: Optimum, found: Optimum) -> Optimum:
 # --- Whether more starts would help
 
 
-def _agree(search: Searched) -> bool:
-    """True where enough starts led to the best optimum: more where others were seen.
+def _is_enough(search: Searched) -> bool:
+    """True where more starts are not expected to lead to more optima, or exact solves are used up.
 
     No errors at all cannot be improved; a price, which may be negative, can.
     """
-    if not search.optima:
+    if search.tally is None:
         return False
-    optima, problem = search.optima, search.variant.problem
-    violation, value = worth(best_first(optima, worth)[0])
-    if problem.prices is None and violation <= MET and value <= NOTHING:
+    violation, value = worth(search.optima[0])
+    if search.variant.problem.prices is None and violation <= MET and value <= NOTHING:
         return True
-    least = value + SAME * abs(value) + NOTHING
-    same = [o for o in optima if o.seen.violation <= violation + MET and o.objective <= least]
-    return len(same) >= (3 + len(problem.lower) // 2) * len(distinct(optima, problem))
+    return search.tally.unseen <= PAYS or search.variant.response.exact_solves > SOLVES
 
 
 # --- Starts
 
 
 def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Iterator[Floats]:
-    """The first starts, then spread designs, those that promise most first.
+    """The first starts, then by turns those that promise most of a sample, and spread ones.
 
-    Of a design only frequencies at fewest samples are solved to judge it: all of them are less work
-    than a start. Where modes are followed or reduced models lead, it is more: there none is judged.
+    What promises most leads to good optima; what is expected not to be seen rests on designs that
+    are spread. Of a design only frequencies at fewest samples are solved to judge it: all of them
+    are less work than a start. Where modes are followed or reduced models lead, it is more: there
+    none is judged.
     """
     yield from starts
     most = most_starts(task.scene.file) - len(starts)
     if most <= 0:
         return
+    box, spread = UnitBox.of(variant.problem), spread_designs(task.scene.bounds, most, 0)
     if task.models is not None or task.followers:
-        yield from spread_designs(task.scene.bounds, most, 0)
+        yield from spread
         return
-    box, fewest = UnitBox.of(variant.problem), thinned(task, 8) or task
+    fewest = thinned(task, 8) or task
     asked = variant_of(fewest, tuple(k for _, k in variant.below))
     ranked: list[tuple[tuple[float, float], Floats]] = []
-    for y in spread_designs(task.scene.bounds, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
+    for y in spread_designs(task.scene.bounds, min(SCREENED * box.n, MOST_SCREENED), 1):
         z = box.inside(box.z(y))
         try:
             seen = asked.without_slopes(box.y(z))
@@ -199,4 +207,6 @@ def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Ite
     for _, z in sorted(ranked, key=lambda one: one[0]):
         alone = all(np.abs(z - other).max(initial=0.0) > 0.2 for other in apart)  # of the bounds
         (apart if alone else near).append(z)
-    yield from (box.y(z) for z in [*apart, *near][:most])
+    promising = [box.y(z) for z in (*apart, *near)]
+    turns = zip_longest(promising, spread)
+    yield from islice((y for turn in turns for y in turn if y is not None), most)

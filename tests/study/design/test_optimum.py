@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import SHIPPED, scene_of
+from scenes import SHIPPED, automatic, scene_of
 
 from eigassign.assignment import End, requirements_of
 from eigassign.modal import Model
@@ -125,3 +125,18 @@ def test_the_initial_design_is_handed_on_as_the_search_has_solved_it(tmp_path: P
     assert solved is not None
     np.testing.assert_allclose(solved.hz, scene.exact(scene.initial, 4), rtol=1e-11)
     assert found.initial_solved(5) is None  # one mode is assigned, and three above it shown
+
+
+def test_starts_go_on_until_no_half_optimum_more_is_expected(tmp_path: Path) -> None:
+    tally = found_of(tmp_path, SHIPPED, []).tally
+    assert tally is not None
+    assert (tally.starts, tally.optima, tally.unseen) == (7, 1, 0.5)
+
+
+def test_two_masses_at_one_place_make_no_optima_distinct(tmp_path: Path) -> None:
+    """Their sum alone is felt: every start ends at another design of one valley."""
+    second = ("    tool_mass: {at: forearm.end, mass: 0}", "    more: {at: forearm.end, mass: 0}")
+    more = ("  m2: {", "  m3: {parameter: bodies.more.mass, min: 0, max: 250 g}\n  m2: {")
+    tally = found_of(tmp_path, automatic((second[0], "\n".join(second)), more), []).tally
+    assert tally is not None
+    assert (tally.starts, tally.optima) == (7, 1)
