@@ -37,8 +37,8 @@ class AssignmentKeys(Part):
             linear limits
         objective: the mean square error, or the largest weighted error
         starts: number of designs to start from; the first are the initial design and the one shot,
-            the others the most promising of a sample. `auto` goes on until enough of them lead to
-            the best optimum, 12 at most
+            the others by turns the most promising of a sample and spread ones. `auto` goes on
+            while more than half an optimum is expected unseen, to 100 starts at most
         steps: at most so many from each start
         seconds: at most so long; no limit unless given
         max_error: how far a frequency may be from its target; 2 % unless given. If it is given, a
