@@ -47,9 +47,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-SEARCHES = (
-    100  # searches with some of the bands: from then on a branch goes on in its likeliest part
-)
+SEARCHES = 100  # of branches: from then on only the best goes on, in its likeliest part
 PROMISING = 1  # designs all over the bounds from which a branch is searched too
 DRAWN = 6  # times that the limits of a branch are drawn in
 FEW = 5  # branches of an ended search that are completed
@@ -173,14 +171,15 @@ class _Tree:
             if missed > MET and unclear:
                 break
             if best.was is None:
+                if len(self.made) > SEARCHES:
+                    self.untried += sum(self.size(one.below) for one in open_ if one.was is None)
+                    open_ = [one for one in open_ if one.was is not None]
                 open_ += self.divided(best)
                 continue
-            if (
-                MET < missed <= 2.0 * MARGIN and not best.drawn
-            ):  # but for the margin it may be clear
-                best = self.branch(
-                    best.below, [best.best.y], (Margin(),) * len(self.counts), best.was, DRAWN
-                )
+            if self.counts and MET < missed <= 2.0 * MARGIN and not best.drawn:
+                none = (Margin(),) * len(self.counts)  # but for the margin it may be met
+                best = self.branch(best.below, [best.best.y], none, best.was, DRAWN)
+                missed = best.best.seen.violation
             rows = _clearances(self.task, best.below, best.best.y)
             if missed > MET or not wanting(rows):
                 answer = best
