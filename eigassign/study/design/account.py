@@ -63,7 +63,8 @@ def assignment_row(
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else found.clearances
     limits = tuple(_limits(scene, answer.y))
-    if all(one.satisfied for one in (*targets, *limits)):  # what round-off misses contradicts not
+    if all(t.satisfied for t in targets) and all(row.satisfied for row in limits):
+        # what only round-off misses contradicts nothing
         answer = replace(answer, conflict=None)
     optimality = _optimality(scene, answer)
     conflicting = () if answer.conflict is None else answer.conflict.names
