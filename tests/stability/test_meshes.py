@@ -29,7 +29,7 @@ def test_meshes_and_reductions_of_links_together_keep_what_they_state(seeds: ran
     for each in found:
         assert (each.true <= each.stated + each.round_off).all(), each.seed
     stated = np.concatenate([each.stated for each in found])
-    assert np.isfinite(stated).mean() > 0.8
+    assert np.isfinite(stated).mean() > 0.75
 
 
 @pytest.mark.slow

@@ -118,9 +118,7 @@ class ReducedModel(ReducedPencil):
         refused = ~np.isfinite(error).all(axis=1)
         if refused.any() and self.wider is not None:
             q, y = x[refused, : self.n_q], x[refused, self.n_q :]
-            with suppress(
-                EigassignError
-            ):  # where more vectors cannot be evaluated it stays refused
+            with suppress(EigassignError):  # of more vectors, which may not be evaluated there
                 better, estimate = self.wider.frequencies(q, y), self.wider.error_estimate(q, y)
                 beside = error_beside(self.frequencies(q, y), better, estimate)
                 beside[beside > REFUSED] = np.inf
