@@ -43,6 +43,53 @@ def random_case(seed: int) -> str:
     return str(yaml.safe_dump(case, sort_keys=False))
 
 
+def many_parameters(seed: int) -> str:
+    """The case of this seed with 6 to 12 parameters and two or three modes at few samples."""
+    rng = np.random.default_rng([seed, 77])
+    while True:
+        family = FAMILIES[int(rng.integers(len(FAMILIES)))]
+        case = family(rng)
+        case["title"] = f"Many parameters {seed}: {family.__name__.replace('_', ' ')}"
+        poses = [[_short(x) for x in pose] for pose in case.pop("poses")]
+        samples = int(rng.integers(5, 9))
+        case["trajectory"] = {"points": poses, "duration": 1.0, "samples": samples}
+        found = list(_candidates(case, rng))
+        if len(found) < 6:
+            continue
+        count = int(rng.integers(6, min(12, len(found)) + 1))
+        chosen = [found[k] for k in sorted(rng.choice(len(found), count, replace=False))]
+        case["design"] = {
+            f"y{k}": {"parameter": path, "min": low, "max": high}
+            for k, (path, low, high) in enumerate(chosen)
+        }
+        try:
+            case["targets"] = _of_two_or_three_modes(case, rng)
+        except ea.EigassignError:
+            continue
+        return str(yaml.safe_dump(case, sort_keys=False))
+
+
+def _of_two_or_three_modes(case: Tree, rng: Random) -> list[Tree]:
+    """Targets that one design has, in the mean or along the way, that others have, or none has."""
+    loaded = load_text(str(yaml.safe_dump(case, sort_keys=False)))
+    path, model = loaded.trajectory, loaded.model()
+    curves = np.array([model.frequencies(path.q, _drawn(case, rng), 4) for _ in range(8)])
+    modes = sorted(int(k) for k in rng.choice(4, int(rng.integers(2, 4)), replace=False))
+    kind = str(rng.choice(["profile", "mean", "mixed", "unreachable"]))
+    targets: list[Tree] = []
+    for j, mode in enumerate(modes):
+        curve = curves[j if kind == "mixed" else 0, :, mode]
+        frequency: Any = _short(curve.mean() * (1.2 if kind == "unreachable" else 1.0))
+        if kind == "profile":
+            at = np.linspace(0.0, 1.0, 4)
+            hz = [_short(x) for x in np.interp(at, path.time_s, curve)]
+            frequency = {"time": at.tolist(), "frequency": hz}
+        targets.append({"mode": mode + 1, "frequency": frequency})
+        if rng.random() < 0.4:
+            targets[-1]["weight"] = _short(10 ** rng.uniform(-1.0, 1.0))
+    return targets
+
+
 def load_text(text: str) -> ea.Case:
     """The case of a case file's text."""
     with tempfile.TemporaryDirectory() as folder:
