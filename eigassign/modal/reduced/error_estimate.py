@@ -55,7 +55,7 @@ SAFETY = 4.0
 # none.
 LOST = 0.2
 # How far μ of a mode may have moved since the expansion point, as a factor. 1 refuses 2.7 % more of
-# those softened; 1 to 16: none is below.
+# those softened, none is below; nor is any of 1 855 in space, loops and alike with 4 or 16.
 MARGIN = 2.0
 # How far μ of a mode that is no longer represented may have moved, as a factor. 1, 2 or 8: a mode
 # is missed in `test_links_that_know_nothing_of_each_other_hide_no_mode`.
