@@ -164,7 +164,8 @@ class _Tree:
     def found(self) -> Found:
         """The best settled branch, and what it was chosen among."""
         open_ = list(self.roots())
-        answer, unclear = None, []
+        answer: _Branch | None = None
+        unclear: list[_Branch] = []
         while open_ and answer is None and not self.stopped:
             best, *open_ = best_first(open_, _promise)
             missed = best.best.seen.violation
@@ -282,8 +283,8 @@ class _Tree:
         nearest = [int(own.argmin()) for own in errors]
         open_ = [k for k, n in enumerate(branch.below) if n is None and errors[k].min() > missed]
         if not open_:
-            below = zip(branch.below, nearest, strict=True)
-            settled = tuple(n if own is None else own for own, n in below)
+            both = zip(branch.below, nearest, strict=True)
+            settled = tuple(n if own is None else own for own, n in both)
             yield self.branch(settled, [branch.best.y, *self.starts], was=branch.below)
             return
         band = max(open_, key=lambda k: float(errors[k].min()))

@@ -254,8 +254,8 @@ def counts_of(
         q = np.array([scene.path.at(y)[0] for y in designs])
         each = []
         for band in bands:
-            ends = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
-            first = replace(band, **dict(zip(("lower", "upper"), ends, strict=True)))
+            lower, upper = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
+            first = replace(band, lower=lower, upper=upper)
             each.append(first.below(all_below(scene, [first], q[:, band.rows.start], designs)))
     except EigassignError:
         alone = designs[:, None] if len(designs) > 1 else ()
