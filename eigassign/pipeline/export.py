@@ -49,7 +49,7 @@ def export(
     with case.located():
         x = _samples(case)
         made = reduce_adaptively(case.model().pencil, x, accuracy, modes)
-    reduced, files = made.reduced, save_reduced(made.reduced, path, case.file.title)
+    reduced, files = made.reduced, save_reduced(made.reduced, path, case.file.title, x)
     return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.worst, len(x))
 
 

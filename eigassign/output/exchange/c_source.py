@@ -18,7 +18,7 @@ _HERE = Path(__file__).parent
 _TABLES = (
     "kinds", "numbers", "first_atom", "atoms", "weights", "functions", "first_output", "outputs",
     "first_known", "known", "to_program", "shift", "stiffness_terms", "stiffness", "mass_terms",
-    "mass", "modes",
+    "mass", "modes", "lower", "upper",
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
@@ -16,20 +17,26 @@ from eigassign.output.exchange.c_source import c_source, identifier
 from eigassign.output.exchange.tape import reduced_tape
 from eigassign.output.store.atomic import replace_synced
 
-FORMAT = "eigassign reduced model 1"
+FORMAT = "eigassign reduced model 2"
 ENDINGS = (".npz", ".mat", ".c")
 _HERE = Path(__file__).parent
 _OURS = b"eigassign"  # in every reader
 
 
-def write_exchange(reduced: ReducedModel, path: Path, title: str = "") -> tuple[Path, Path]:
+def write_exchange(
+    reduced: ReducedModel,
+    path: Path,
+    title: str = "",
+    within: NDArray[np.float64] | None = None,
+) -> tuple[Path, Path]:
     """Write ``path``, whose ending is one of `ENDINGS`, and its reader beside it.
 
-    arm.npz with arm_frequencies.py, arm.mat with arm_frequencies.m, arm.c with arm.h. Raises
+    arm.npz with arm_frequencies.py, arm.mat with arm_frequencies.m, arm.c with arm.h. These answer
+    between the samples ``within`` (n, n_x), see `reduced_tape`. Raises
     UsageError for numbers that are not finite, StorageError where they cannot be written or where
     a file that is no such reader has the reader's name.
     """
-    tape, name = reduced_tape(reduced), identifier(path.stem)
+    tape, name = reduced_tape(reduced, within), identifier(path.stem)
     if not all(np.isfinite(values).all() for values in tape.values()):
         raise UsageError("the reduced model has numbers that are not finite")
     about = _about(reduced, title or path.stem)

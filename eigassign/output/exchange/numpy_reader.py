@@ -1,11 +1,11 @@
 """Frequencies of a reduced model of eigassign from its .npz file, by NumPy alone.
 
     model = read("arm.npz")
-    frequencies(model, q, y)  # Hz, one for each of model["modes"]
+    frequencies(model, q, y)  # Hz, one for each of model["modes"]; NaN where there are none
+    answer(model, q, y)  # the same, and 0 or the code of what is wrong: DOMAIN, LOOP, INDEFINITE
 
-q in rad or m and y in SI units, as the case orders them. Near the
-poses and designs that the model was made for (model["points"] among them); it does not estimate its
-error.
+q in rad or m and y in SI units, as the case orders them, between model["lower"] and model["upper"]:
+the poses and designs that the model was made for. It does not estimate its error.
 """
 
 from __future__ import annotations
@@ -28,25 +28,46 @@ def read(path: str) -> Model:
         return {name: file[name] for name in file.files}
 
 
+DOMAIN, LOOP, INDEFINITE = 1, 2, 3
+
+
+class RefusedError(ValueError):
+    """No answer; its first argument is the code of why."""
+
+
 def frequencies(model: Model, q: ArrayLike, y: ArrayLike) -> Floats:
-    """(n_modes,) in Hz at q (n_q,) and y (n_y,); ValueError where there are none."""
-    K, M = matrices(model, q, y)
+    """(n_modes,) in Hz at q (n_q,) and y (n_y,); NaN where there are none."""
+    return answer(model, q, y)[0]
+
+
+def answer(model: Model, q: ArrayLike, y: ArrayLike) -> tuple[Floats, int]:
+    """`frequencies` and 0; or NaN and the code of why: DOMAIN, LOOP, INDEFINITE.
+
+    These are: q or y is not where the model was made for; a closed loop cannot be closed there; K
+    is not positive definite.
+    """
+    try:
+        K, M = matrices(model, q, y)
+    except RefusedError as error:
+        return np.full(len(model["modes"]), np.nan), error.args[0]
     try:
         inverse = np.linalg.inv(np.linalg.cholesky(K))
     except np.linalg.LinAlgError:
-        raise ValueError("the stiffness matrix is not positive definite") from None
+        return np.full(len(model["modes"]), np.nan), INDEFINITE
     mu = np.linalg.eigvalsh(inverse @ M @ inverse.T)[::-1]
-    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[model["modes"] - 1])))
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[model["modes"] - 1]))), 0
 
 
 def matrices(model: Model, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """K and M (k, k) of K φ = (2 π f)² M φ, rigid-body motion projected out."""
+    """K and M (k, k) of K φ = (2 π f)² M φ, rigid-body motion projected out; else RefusedError."""
     x = np.concatenate([np.ravel(q), np.ravel(y)]).astype(float)
     if len(x) != model["n_q"][0] + model["n_y"][0]:
         raise ValueError("q or y has another length than the model's")
+    if not ((x >= model["lower"]) & (x <= model["upper"])).all():
+        raise RefusedError(DOMAIN, "q or y is not where the model was made for")
     theta = np.append(1.0, run(model, 0, model["to_program"] @ x + model["shift"]))
     if not np.isfinite(theta).all():
-        raise ValueError("q or y is outside the domain of a section or length")
+        raise RefusedError(DOMAIN, "q or y is outside the domain of a section or length")
     k, f = model["size"][0], model["rigid"][0]
     K = _square(theta[model["stiffness_terms"]] @ model["stiffness"], k)
     M = _square(theta[model["mass_terms"]] @ model["mass"], k + f)
@@ -80,7 +101,10 @@ def run(model: Model, f: int, arguments: Floats) -> Floats:
             elif kind == 6:
                 n = int(number)
                 A, B = a[: n * n].reshape(n, n), a[n * n :].reshape(n, -1)
-                values.extend(np.linalg.solve(A, B).ravel())
+                try:
+                    values.extend(np.linalg.solve(A, B).ravel())
+                except np.linalg.LinAlgError:
+                    raise RefusedError(LOOP, "a closed loop is at a dead point") from None
             else:
                 values.extend(close(model, int(number), a))
     first, last = model["first_output"][f : f + 2]
@@ -94,12 +118,12 @@ def close(model: Model, f: int, a: Floats) -> Floats:
     a0, p0 = known[:-size], known[-size:]
     far = np.abs(a - a0).max(initial=0.0)
     if not far < FARTHEST:
-        raise ValueError("a closed loop cannot be followed so far")
+        raise RefusedError(LOOP, "a closed loop cannot be followed so far")
     for refinement in REFINEMENTS:
         p = _followed(model, f, a0, p0, a, refinement * max(int(np.ceil(far / STEP)), 1))
         if p is not None:
             return p
-    raise ValueError("a closed loop cannot be closed, or is at a dead point")
+    raise RefusedError(LOOP, "a closed loop cannot be closed, or is at a dead point")
 
 
 def _followed(model: Model, f: int, a0: Floats, p: Floats, a: Floats, steps: int) -> Floats | None:

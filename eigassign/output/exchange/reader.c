@@ -277,6 +277,10 @@ int @NAME@_matrices(const double *q, const double *y, double *K, double *M)
 {
     double z[N_Z + 1], theta[N_THETA], all[N_ALL * N_ALL];
     int status;
+    for (int j = 0; j < N_Q + N_Y; j++) {
+        double x = j < N_Q ? q[j] : y[j - N_Q];
+        if (!(x >= LOWER[j] && x <= UPPER[j])) return OUTSIDE;
+    }
     for (int i = 0; i < N_Z; i++) {
         z[i] = SHIFT[i];
         for (int j = 0; j < N_Q; j++) z[i] += TO_PROGRAM[i * (N_Q + N_Y) + j] * q[j];
@@ -309,6 +313,7 @@ int @NAME@_matrices(const double *q, const double *y, double *K, double *M)
 int @NAME@_frequencies(const double *q, const double *y, double *hz)
 {
     double K[SIZE * SIZE], M[SIZE * SIZE], mu[SIZE], e[SIZE];
+    for (int i = 0; i < N_MODES; i++) hz[i] = NAN;
     int status = @NAME@_matrices(q, y, K, M);
     if (status != OK) return status;
     if (!cholesky(SIZE, K, SIZE)) return INDEFINITE;

@@ -13,7 +13,7 @@
 
 /* What the functions return. */
 #define @MACRO@_OK 0
-#define @MACRO@_DOMAIN 1   /* q or y is outside the domain of a section or length */
+#define @MACRO@_DOMAIN 1   /* q or y is not where the model was made for, or no section has it */
 #define @MACRO@_LOOP 2     /* a closed loop cannot be closed there, or is at a dead point */
 #define @MACRO@_INDEFINITE 3 /* K is not positive definite, or a free coordinate moves no mass */
 
@@ -21,7 +21,7 @@
 extern "C" {
 #endif
 
-/* hz[N_MODES]: frequencies in Hz at q[N_Q] and y[N_Y]. */
+/* hz[N_MODES]: frequencies in Hz at q[N_Q] and y[N_Y]; NaN where it does not return 0. */
 int @NAME@_frequencies(const double *q, const double *y, double *hz);
 
 /* K[SIZE * SIZE], M[SIZE * SIZE] of K phi = (2 pi f)^2 M phi, rigid-body motion projected out. */

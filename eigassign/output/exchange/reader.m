@@ -1,8 +1,10 @@
-function [hz, K, M] = @NAME@(q, y)
+function [hz, K, M, status] = @NAME@(q, y)
 % Frequencies of a reduced model of eigassign, from @FILE@ beside this file.
 %
 %   hz = @NAME@(q, y)           in Hz, one for each of its modes
 %   [hz, K, M] = @NAME@(q, y)   and K, M of K phi = (2 pi f)^2 M phi
+%   [hz, ~, ~, status] = @NAME@(q, y)   0, or why hz is NaN: 1 q or y is not where the model was
+%       made for, 2 a closed loop cannot be closed there, 3 K is not positive definite
 %
 % @ABOUT@
 % q in rad or m and y in SI units, as vectors. It does not estimate its error.
@@ -14,6 +16,23 @@ function [hz, K, M] = @NAME@(q, y)
     if numel(x) ~= model.n_q + model.n_y
         error('eigassign:length', 'q or y has another length than that of the model');
     end
+    [hz, K, M, status] = deal(nan(numel(model.modes), 1), [], [], 0);
+    if ~all(x >= model.lower(:) & x <= model.upper(:))
+        status = 1;
+        return
+    end
+    try
+        [hz, K, M] = solved(model, x);
+    catch problem
+        names = {'eigassign:domain', 'eigassign:loop', 'eigassign:indefinite'};
+        status = find(strcmp(problem.identifier, names));
+        if isempty(status)
+            rethrow(problem)
+        end
+    end
+end
+
+function [hz, K, M] = solved(model, x)
     z = reshape(model.shift, [], 1);
     if ~isempty(x) && ~isempty(z)
         z = z + model.to_program * x;
@@ -28,7 +47,10 @@ function [hz, K, M] = @NAME@(q, y)
     e = 1:k;
     f = k+1:size(M, 1);
     M = M(e, e) - M(e, f) * (M(f, f) \ M(f, e));
-    L = chol((K + K') / 2, 'lower');
+    [L, fails] = chol((K + K') / 2, 'lower');
+    if fails
+        error('eigassign:indefinite', 'the stiffness matrix is not positive definite');
+    end
     A = L \ (L \ M)';
     mu = sort(eig((A + A') / 2), 'descend');
     hz = 1 ./ (2 * pi * sqrt(mu(double(model.modes(:)))));

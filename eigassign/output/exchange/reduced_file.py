@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eigassign.errors import StorageError, UsageError
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
@@ -11,14 +14,20 @@ from eigassign.output.exchange.files import ENDINGS, write_exchange
 from eigassign.output.store.array_file import DamagedError, get, put
 
 
-def save_reduced(reduced: ReducedModel, path: str | Path, title: str = "") -> tuple[Path, ...]:
+def save_reduced(
+    reduced: ReducedModel,
+    path: str | Path,
+    title: str = "",
+    within: NDArray[np.float64] | None = None,
+) -> tuple[Path, ...]:
     """Write ``reduced`` to ``path``, whole or not at all; the files. Raises StorageError.
 
-    The ending .npz, .mat or .c asks for the `exchange` formats, any other for HDF5.
+    The ending .npz, .mat or .c asks for the `exchange` formats, which answer between the samples
+    ``within`` (n, n_x) alone, any other for HDF5.
     """
     path = Path(path)
     if path.suffix in ENDINGS:
-        return write_exchange(reduced, path, title)
+        return write_exchange(reduced, path, title, within)
     meta = {
         "what": "reduced model",
         "modes": ", ".join(map(str, reduced.modes)),

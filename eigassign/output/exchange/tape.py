@@ -28,18 +28,29 @@ from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]
 LINEAR, PRODUCT, POWER, SINE, COSINE, EXPONENTIAL, SOLVE, CLOSE = range(8)
+ROUND_OFF = 1e-9  # of a limit of q or y, by which digits may be lost on the way to a reader
 _ONE = {"power": POWER, "exponential": EXPONENTIAL}
 
 
-def reduced_tape(reduced: ReducedModel) -> dict[str, Array]:
+ANYWHERE = 1e300  # stands for no limit: a number that every language can write
+
+
+def reduced_tape(reduced: ReducedModel, within: Array | None = None) -> dict[str, Array]:
     """Everything that frequencies follow from, as int64 and float64 arrays by name.
 
+    ``within`` (n, n_x) are the samples (q, y) that the model was judged at: readers refuse what is
+    not between the ``lower`` and ``upper`` ends of these.
     ``stiffness`` (n_terms, k (k + 1)/2) and ``mass`` are lower triangles row by row; their terms
     belong to ``stiffness_terms`` and ``mass_terms`` of θ, of which θ_0 = 1.
     """
     tape = _Tape()
     tape.function(reduced.program)
     k, total = reduced.size, reduced.mass.shape[1]
+    n_x = reduced.n_q + reduced.n_y
+    ends = np.array([np.full(n_x, -ANYWHERE), np.full(n_x, ANYWHERE)])
+    if within is not None:
+        ends = np.array([within.min(axis=0), within.max(axis=0)])
+        ends += [[-ROUND_OFF], [ROUND_OFF]] * np.maximum(*np.abs(ends))
     rows, columns = np.tril_indices(k), np.tril_indices(total)
     return {
         "n_q": _integers([reduced.n_q]),
@@ -48,6 +59,8 @@ def reduced_tape(reduced: ReducedModel) -> dict[str, Array]:
         "size": _integers([k]),
         "rigid": _integers([total - k]),
         "points": reduced.points,
+        "lower": ends[0],
+        "upper": ends[1],
         "to_program": reduced.to_program,
         "shift": reduced.shift,
         "stiffness_terms": _integers(reduced.stiffness_terms),

@@ -143,6 +143,29 @@ def test_the_c_function_refuses_what_eigassign_refuses(tmp_path: Path) -> None:
 
 
 @needs_compiler
+def test_an_exported_model_has_no_answer_where_it_was_not_judged(tmp_path: Path) -> None:
+    case = ea.load_case(CASES / "two_link.yaml")
+    for ending in ("npz", "c"):
+        command = [sys.executable, "-m", "eigassign", "export", CASES / "two_link.yaml"]
+        subprocess.run([*command, tmp_path / f"arm.{ending}"], check=True)
+    reader = runpy.run_path(str(tmp_path / "arm_frequencies.py"))
+    model = reader["read"](str(tmp_path / "arm.npz"))
+    made = tmp_path / "model.so"
+    command = [str(COMPILER), "-std=c99", "-fPIC", "-shared", str(tmp_path / "arm.c")]
+    subprocess.run([*command, "-o", str(made), "-lm"], check=True)
+    function = ctypes.CDLL(str(made)).arm_frequencies
+    q, y = case.trajectory.q[40], np.array([0.1, 0.2])
+    for design, code in ((y, 0), (np.array([0.1, 0.25]), 0), (np.array([0.1, 0.26]), 1), (-y, 1)):
+        hz = np.zeros(1)
+        given = (a.ctypes.data_as(ctypes.c_void_p) for a in (q, design, hz))
+        assert function(*given) == code
+        answer, told = reader["answer"](model, q, design)
+        assert told == code
+        assert np.isnan(hz).all() == np.isnan(answer).all() == (code == 1)
+    assert reader["answer"](model, q + 3.0, y)[1] == 1
+
+
+@needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm_6r", "scissor_lift", "palletiser", "superelement_arm"])
 def test_larger_c_sources_agree_too(name: str, tmp_path: Path) -> None:
@@ -154,8 +177,12 @@ def test_numpy_refuses_what_eigassign_refuses(tmp_path: Path) -> None:
     ea.save_reduced(reduced, tmp_path / "arm.npz")
     reader = runpy.run_path(str(tmp_path / "arm_frequencies.py"))
     model, frequencies = reader["read"](str(tmp_path / "arm.npz")), reader["frequencies"]
+    hz, code = reader["answer"](model, q[0] + 1e4, y[0])
+    assert np.isnan(hz).all()
+    assert code == reader["LOOP"]
+    assert np.isnan(frequencies(model, q[0] + 1e4, y[0])).all()
     with pytest.raises(ValueError, match="cannot be followed so far"):
-        frequencies(model, q[0] + 1e4, y[0])
+        reader["matrices"](model, q[0] + 1e4, y[0])
     with pytest.raises(ValueError, match="another length"):
         frequencies(model, q[0][:0], y[0])
 
