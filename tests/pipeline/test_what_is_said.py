@@ -111,3 +111,16 @@ def test_out_of_reach_is_what_no_design_of_a_grid_comes_near(share: float, word:
     assert row is not None
     assert row.verdict == word, row.reason
     assert ("no design found from 3 starts" in row.reason) == (word == "unreachable")
+
+
+def test_a_limit_that_the_mesh_alone_may_miss_is_not_proved_to_be_out_of_reach() -> None:
+    """Of one element each: with the heaviest tip mode 2 is missed by less than the mesh's error."""
+    coarse = run([{"mode": 2, "at_most": 1.0}], elements=(1, 1))
+    lowest = float(coarse.results.targets[0].exact_hz.max())
+    within = run([{"mode": 2, "at_most": lowest * (1.0 - 1e-5)}], elements=(1, 1)).results
+    assert finely(coarse, 2)[:, 1].max() < lowest * (1.0 - 1e-5)
+    assert within.assignment is not None
+    assert within.assignment.verdict == "do_not_use"
+    assert "give the links more elements" in within.assignment.reason
+    assert coarse.results.assignment is not None
+    assert coarse.results.assignment.verdict == "unreachable"

@@ -72,19 +72,24 @@ def assignment_row(
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
+    undecided = dict(_undecided(targets, exact, of_model, accepted))
+    beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
+    doubts = [] if trusted else [UNTRUSTED]
+    if undecided and (len(beyond) < len(unreachable) or set(conflicting) & set(undecided)):
+        doubts += undecided.values() if not beyond else ()
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
     said = verdict(
         Facts(
             targets=targets,
             merits=(initial, optimal),
             limits=limits,
-            doubts=() if trusted else (UNTRUSTED,),
+            doubts=doubts,
             unproved=(
                 *_too_coarse(targets, exact, of_model, largest),
                 *_missed_between(scene, answer.y, targets, largest),
                 *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
-            unreachable=unreachable,
+            unreachable=beyond,
             conflict=_in_words(scene, answer, optimality.kind == "proved"),
             of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
             unfinished="" if found is None or found.best.end not in ended else found.best.end.value,
@@ -202,6 +207,30 @@ def _too_coarse(
         f"{label}: mesh and reduced links raise the frequencies {how}{missed}, and "
         f"{100 * accepted:.3g} % are accepted: {FINER}"
     )
+
+
+def _undecided(
+    targets: Sequence[TargetStudy], exact: Solved, of_model: Mapping[int, float], accepted: float
+) -> Iterator[tuple[str, str]]:
+    """Yield the targets that are missed by less than mesh and reduced links may raise their modes.
+
+    Each with the words for it: a finer mesh may meet them.
+    """
+    for target in targets:
+        too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
+        if target.satisfied or not too_high > 0.0 or not target.asked.terms:
+            continue
+        own = exact.hz / (1.0 + too_high), exact.followed / (1.0 + too_high), exact.numbers
+        least = float(target.asked.least_errors(Solved(*own), exact).max())
+        if least > (accepted if target.asked.is_goal else MET):
+            continue
+        missed = target.error.exact.max_relative
+        how = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "more than can be told"
+        yield (
+            target.label,
+            f"{target.label}: missed by {100 * missed:.3g} %, and mesh and reduced links raise the "
+            f"frequencies by {how}: {FINER}",
+        )
 
 
 def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:

@@ -109,10 +109,12 @@ def find_answer(
 def _band_notes(found: Found) -> Iterator[str]:
     """Say what came of the numbers of modes below the bands, where there was a choice."""
     if found.choices > 1:
+        stand = f"{found.searches} searches, each with some of the bands, stand for the others"
+        if found.untried == found.choices:
+            stand = f"{found.searches} searches with some of the bands were ended before"
         yield (
             f"of {found.choices} choices of the numbers of modes below the bands "
-            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: "
-            f"{found.searches} searches, each with some of the bands, stand for the others"
+            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: {stand}"
         )
     for one in found.variants[:SAID] if len(found.variants) > 1 else ():
         below = ((band, k) for band, k in one.variant.below if k is not None)
