@@ -137,7 +137,7 @@ NEAR = 2.0  # factor by which another power must be better than one that is quic
 # Of given solves, which are not added to: of 686 fits of 4 to 24 solves over modes that meet or
 # come close six had errors up to 2.6 times what the coefficients and the values held out show.
 SCARCE = 3.0
-WORTHLESS = 1.0  # estimate from which a fit of given solves is refused
+WORTHLESS = 0.5  # what these show from which a fit of given solves is refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +221,7 @@ def interpolate(
             break
         if not len(fresh):
             refuse("more do not help")
-    if accuracy is None and not rounds[-1][1] < WORTHLESS:
+    if accuracy is None and not rounds[-1][1] < SCARCE * WORTHLESS:
         refuse("")
     between = MISSED * _missed_between(axes, space, hz, own, found.power)
     asked = len(hz) + len(held)
