@@ -217,3 +217,33 @@ def test_a_trajectory_that_rests_among_others_is_a_constant(
     np.testing.assert_array_equal(fit.frequencies(spin[3], Y0)[0], fit.along()[len(q)])
     with pytest.raises(UsageError, match="nothing to fit"):
         ea.fit(model, [spin, spin], Y0, **how)  # type: ignore[arg-type]
+
+
+def test_of_modes_that_meet_between_few_solves_the_error_is_covered() -> None:
+    """Of two cantilevers with nothing between them, a mass on one takes mode 1 from the other."""
+    mechanism = {
+        "space": "planar",
+        "materials": {"al": {"youngs_modulus": 70e9, "density": 2700.0}},
+        "sections": {
+            name: {"shape": "circle", "diameter": diameter}
+            for name, diameter in (("a", 0.0132036), ("b", 0.0138914))
+        },
+        "links": {
+            name: {"length": length, "material": "al", "section": name, "elements": 2}
+            for name, length in (("a", 1.0874180), ("b", 0.9496104))
+        },
+        "joints": {
+            f"j{name}": {"type": "fixed", "base": "ground", "follower": f"{name}.start"}
+            for name in "ab"
+        },
+        "bodies": {name: {"at": f"{name[1]}.end", "mass": 0.2} for name in ("ma", "mb")},
+    }
+    design = {"y": {"parameter": "bodies.ma.mass", "min": 0.0, "max": 1.0}}
+    tree = {"title": "t", "mechanism": mechanism, "coordinates": {}, "design": design}
+    model = ea.load_case(
+        {**tree, "expansion": {"order": 2}, "targets": [{"mode": 1, "frequency": 20.0}]}
+    ).model()
+    fit = ea.fit(model, np.zeros(0), ea.Box([0.0], [1.0]), solves=6)
+    y = np.linspace(0.0, 1.0, 201)[:, None]
+    error = off(model, fit, np.zeros((len(y), 0)), y)
+    assert 0.02 < error <= fit.error_estimate
