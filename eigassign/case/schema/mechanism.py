@@ -173,6 +173,7 @@ class Mechanism(Part):
     Keys:
         space: `planar`: vectors are `[x, y]`, parts are turned by `angle`; `spatial`: `[x, y, z]`,
             and `orientation`
+        gravity: m/s², or `none`: left out on purpose
         materials: of beams
         sections: cross-sections of beams
         links: beams, rigid bodies, frames of beams, and parts given by matrices
@@ -183,6 +184,7 @@ class Mechanism(Part):
     """
 
     space: Literal["planar", "spatial"]
+    gravity: Vector | Literal["none"] | None = None
     materials: Named[Material] = FrozenDict()
     sections: Named[Section] = FrozenDict()
     links: OneOrMoreNamed[Link]

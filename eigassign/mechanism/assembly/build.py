@@ -12,6 +12,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
+from eigassign.mechanism.assembly.gravity.weight import add_weight, swinging
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.rigid_body_modes import separated
@@ -59,6 +60,10 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
+    if isinstance(case.mechanism.gravity, tuple):
+        g = np.array([*case.mechanism.gravity, 0.0][:3])
+        motion = swinging(case, parameters, motion, links, g)
+        add_weight(stiffness, case, parameters, motion, links, nodes, g)
     _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,13 +62,35 @@ def add_links(K: AffineEntries, M: AffineEntries, links: Sequence[LocalLink], n_
         numbers = known[kind] if kind in known else known.setdefault(kind, _constants(link))
         for k, k_s in zip(link.stiffness, numbers.stiffness, strict=True):
             _add_elastic(K, k, k_s, link)  # Qᵀ k Q
-        for m, m_s in zip(link.mass, numbers.mass, strict=True):
-            _add_elastic(M, m, m_s, link)  # Qᵀ m Q
-        if link.twist.shape[1]:
-            T = [[(n_u + k, rate) for k, rate in enumerate(row)] for row in link.twist.tolist()]
-            for coefficient, momentum in numbers.momenta:
-                _add_mixed(M, coefficient, momentum, link, T)  # Qᵀ m N T and its transpose
-            M.add_corner(n_u, multiply(link.twist.T, multiply(numbers.inertia, link.twist)))
+        _add_whole(M, link.mass, numbers, link, n_u)
+
+
+def add_stressed(
+    K: AffineEntries, link: LocalLink, terms: Sequence[Term], columns: Ints, n_u: int
+) -> None:
+    """K += Bᵀ k_σ B of one link, which resists rigid motions, too: those of the ``columns``."""
+    twist = link.twist.copy()
+    twist[:, np.setdiff1d(np.arange(twist.shape[1]), columns)] = 0.0
+    moved = replace(link, mass=terms, twist=twist)
+    _add_whole(K, terms, _constants(moved), moved, n_u)
+
+
+def _add_whole(
+    target: AffineEntries, terms: Sequence[Term], numbers: _Constants, link: LocalLink, n_u: int
+) -> None:
+    """Bᵀ a B with all of B = [Q, N T], a the matrices that ``numbers`` has as masses."""
+    for a, a_s in zip(terms, numbers.mass, strict=True):
+        _add_elastic(target, a, a_s, link)  # Qᵀ a Q
+    if link.twist.shape[1]:
+        T = [[(n_u + k, rate) for k, rate in enumerate(row)] for row in link.twist.tolist()]
+        for coefficient, momentum in numbers.momenta:
+            _add_mixed(target, coefficient, momentum, link, T)  # Qᵀ a N T and its transpose
+        target.add_corner(n_u, multiply(link.twist.T, multiply(numbers.inertia, link.twist)))
+
+
+def inertia(link: LocalLink) -> Objects:
+    """Nᵀ m N (n_twist, n_twist) about the link's origin: of a reduced one the whole mass."""
+    return _constants(link).inertia
 
 
 @dataclass(frozen=True, eq=False)

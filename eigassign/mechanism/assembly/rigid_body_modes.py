@@ -49,7 +49,12 @@ def separated(
         return replace(motion, rigid=rigid)
     moved = tuple(replace(p, twist=multiply(p.twist, change)) for p in motion.placements)
     rates = replace(motion.coordinates, rates=motion.coordinates.rates @ change)
-    return replace(motion, placements=moved, coordinates=rates, rigid=rigid)
+    passive = motion.passive_rates
+    if passive is not None:
+        passive = multiply(passive, change)
+    return replace(
+        motion, placements=moved, coordinates=rates, rigid=rigid, passive_rates=passive
+    )
 
 
 def _rows(

@@ -318,6 +318,24 @@ def rotary_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
     return _mass(ROTATION, plane, degree)
 
 
+@cache
+def _slope_products(plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
+    """∫ P_l w' w'ᵀ dξ of one plane, w' per ξ: powers of Φ by powers of h."""
+    slopes = tuple(shape[:, 1:] * np.arange(1.0, shape.shape[1]) for shape in DEFLECTION)
+    return _mass(slopes, plane, degree)
+
+
+def stretched_slopes(
+    force: Scalar, bent: Shear, plane: str, degree: int, h: Scalar
+) -> list[ElementTerm]:
+    """Affine terms of ∫ N w' w'ᵀ dx in one plane for the axial force N = ``force`` P_l [N].
+
+    For Φ = 0 and constant N they are N/(30 h) [[36, 3h, −36, 3h], …] (Przemieniecki, §15.2).
+    """
+    scale = force if _is_zero(bent.phi) else force * (bent.phi + 1.0) ** -2.0
+    return _polynomial(scale, bent, _slope_products(plane, degree), (h**-1.0, 1.0, h))
+
+
 def _mass(shapes: tuple[Floats, ...], plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
     """The integrals of the products that go with 1, Φ, Φ², s, Φ s, s²."""
     plain, sheared, skewed = shapes

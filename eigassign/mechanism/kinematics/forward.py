@@ -110,6 +110,15 @@ class Kinematics:
     coordinates: CoordinateMap
     passive: tuple[Scalar, ...] = ()  # the loops' passive freedoms as functions of (q, y)
     rigid: tuple[int, ...] = ()  # columns that nothing resists
+    passive_rates: Objects | None = None  # P (n_passive, n_columns) of loops
+
+    @property
+    def rates(self) -> Objects:
+        """The rates of all freedoms per column, (n_freedoms, n_columns)."""
+        rates = self.coordinates.rates.astype(object)
+        if self.passive_rates is not None:
+            rates[len(rates) - len(self.passive_rates) :] = self.passive_rates
+        return rates
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -230,15 +239,16 @@ class _Placing:
         own = self.tree.of_joint(edge.joint)
         joint = self.case.mechanism.joints[edge.joint]
         if own:
-            return _walked(joint, edge.turned, [self.values[k] for k in own])
+            return walked(joint, edge.turned, [self.values[k] for k in own])
         keys = ("type", "angle", "orientation", "position")
         alike = (*(str(getattr(joint, key, None)) for key in keys), edge.turned)
         if alike not in self._rigid:
-            self._rigid[alike] = _walked(joint, edge.turned, [])
+            self._rigid[alike] = walked(joint, edge.turned, [])
         return self._rigid[alike]
 
 
-def _walked(joint: Any, backwards: bool, values: Sequence[Scalar]) -> JointMotion:
+def walked(joint: Any, backwards: bool, values: Sequence[Scalar]) -> JointMotion:
+    """Motion of a joint with its mounting and position, from base to follower or backwards."""
     motion = _mounted(joint, mounting(joint), joint_motion(joint, values))
     position = vector(getattr(joint, "position", None) or (0.0, 0.0))
     motion = motion._replace(translation=position + motion.translation)

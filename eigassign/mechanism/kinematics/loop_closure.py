@@ -77,7 +77,7 @@ def _close_loops(
         return twist[:, :n] + multiply(twist[:, n:], P) if P.size else twist[:, :n]
 
     placements = tuple(replace(p, twist=narrowed(p.twist)) for p in free.placements)
-    return replace(free, placements=placements)
+    return replace(free, placements=placements, passive_rates=P)
 
 
 def _bind_passive(

@@ -81,6 +81,11 @@ def _combined(
     return total
 
 
+def scaled(a: Objects, factor: Scalar) -> Objects:
+    """A vector times a scalar."""
+    return np.array([value * factor for value in a.tolist()], dtype=object)
+
+
 def present(a: Objects | Floats) -> NDArray[np.bool_]:
     """Mask of the entries that are not the plain number zero."""
     return np.array([some(value) for value in a.ravel().tolist()], dtype=bool).reshape(a.shape)

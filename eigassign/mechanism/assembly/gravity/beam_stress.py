@@ -1,0 +1,129 @@
+"""Geometric stiffness k_σ of a beam element from the forces at its ends and its own weight.
+
+With the motion of its nodes (d, θ)_a, (d, θ)_b (θ rotation vectors), D = d_b − d_a, h its length, a
+frame that follows the chord and the mean roll turns by ρ; in it the ends turn by θ̄. To second order
+
+    ρ_z = D_y/h − D_x D_y/h² − ρ_x ρ_y/2,   ρ_y = −D_z/h + D_x D_z/h² + ρ_x ρ_z/2,
+    θ̄ = θ − ρ − ρ × θ/2,   θ̄_ax + θ̄_bx = 0.
+
+The forces N(ξ) along it, T of torsion and the moments M_a, M_b of its ends, the weight p per length
+do the work of second order
+
+    Π₂ = ½ ∫ N |w'|² dx + T (θ̄_bx − θ̄_ax)₂ + Σ_ends M · θ̄₂ − ∫ p · (ρ × w̄) dx,
+
+w' the slopes of the deflection, w̄ the deflection from the chord; of p, what lies along the beam is
+in N already. k_σ is its Hessian, in the element's dofs and axes as in `beam`: linear in all forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.elements.beam import (
+    DEFLECTION,
+    LEGENDRE,
+    ElementTerm,
+    Shear,
+    stretched_slopes,
+)
+from eigassign.mechanism.kinematics.rotations import Objects, some
+from eigassign.series.expression import Scalar
+
+Floats = NDArray[np.float64]
+X, Y, Z = range(3)
+
+
+@dataclass(frozen=True)
+class ElementForces:
+    """What acts on an element, in its axes.
+
+    ``axial`` are the Legendre coefficients of N(ξ) [N], ``torque`` is T [N m], ``moments`` (2, 3)
+    those on its ends a and b [N m], ``weight`` (n_legendre, 3) its own per length [N/m].
+    """
+
+    axial: Sequence[Scalar]
+    torque: Scalar
+    moments: Objects
+    weight: Objects
+
+
+def stress_terms(
+    forces: ElementForces, h: Scalar, bent: tuple[Shear, Shear], planar: bool
+) -> list[ElementTerm]:
+    """Affine terms of k_σ (12, 12); h in m."""
+    terms: list[ElementTerm] = []
+    for degree, N in enumerate(forces.axial):
+        for plane, each in zip("z" if planar else "zy", bent, strict=False):
+            terms += stretched_slopes(N, each, plane, degree, h) if some(N) else []
+    works = [(forces.moments[end, Z], moment_work(end, Z), 0) for end in (0, 1)]
+    if not planar:
+        works += [(forces.moments[end, Y], moment_work(end, Y), 0) for end in (0, 1)]
+        works.append((forces.torque, moment_work(1, X) - moment_work(0, X), 0))
+        works += [
+            (p[axis], load_work(axis, degree), 2)
+            for degree, p in enumerate(forces.weight)
+            for axis in (Y, Z)
+        ]
+    return terms + [
+        ElementTerm(value * h ** float(power - k), matrix)
+        for value, matrices, power in works
+        for k, matrix in enumerate(matrices)
+        if some(value) and matrix.any()
+    ]
+
+
+@cache
+def moment_work(end: int, axis: int) -> Floats:
+    """Hessian of θ̄₂ of an end about an axis: what goes with 1, 1/h and 1/h², (3, 12, 12)."""
+    D, turns, rho = _motions()
+    mean = 0.5 * (turns[0] + turns[1])
+    over_square = np.zeros((2, 3, 12, 12))  # D_x D_y and D_x D_z over h²
+    over_square[:, 2] = [_product(D[X], D[i])[0] for i in (Y, Z)]
+    frame = (
+        -0.5 * _crossed(rho, mean, X),  # no mean roll is left
+        over_square[1] + 0.5 * _product(rho[X], rho[Z]),
+        -over_square[0] - 0.5 * _product(rho[X], rho[Y]),
+    )
+    return np.asarray(-frame[axis] - 0.5 * _crossed(rho, turns[end], axis))
+
+
+@cache
+def load_work(axis: int, degree: int) -> Floats:
+    """Hessian of −∫ P_l (ρ × w̄)_axis dx/h²: what goes with 1, 1/h and 1/h², (3, 12, 12).
+
+    (ρ × w̄)_y = −ρ_x w̄_z, (ρ × w̄)_z = ρ_x w̄_y; w̄_y = Σ h S θ̄_z, w̄_z = −Σ h S θ̄_y. The shapes S
+    are those without shear: what shear adds vanishes with the square of h.
+    """
+    _, turns, rho = _motions()
+    products = [np.convolve(S, LEGENDRE[degree]) for S in DEFLECTION[0][[1, 3]]]
+    shares = [float(p @ (1.0 / np.arange(1.0, len(p) + 1.0))) for p in products]
+    local = sum(share * (own[axis] - rho[axis]) for share, own in zip(shares, turns, strict=True))
+    return np.asarray(-_product(rho[X], np.asarray(local)))
+
+
+def _motions() -> tuple[Floats, Floats, Floats]:
+    """D, (θ_a, θ_b) and ρ to first order; each a form (2, 12): what goes with 1 and with 1/h."""
+    forms = np.zeros((12, 2, 12))
+    forms[:, 0] = np.eye(12)
+    D, turns = forms[6:9] - forms[:3], np.stack([forms[3:6], forms[9:]])
+    rho = np.stack([0.5 * (turns[0, X] + turns[1, X]), -D[Z, ::-1], D[Y, ::-1]])
+    return D, turns, rho
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """Hessian of a product of forms (2, 12), by powers of 1/h, (3, 12, 12)."""
+    out = np.zeros((3, 12, 12))
+    for i, j in np.ndindex(2, 2):
+        out[i + j] += np.outer(a[i], b[j]) + np.outer(b[j], a[i])
+    return out
+
+
+def _crossed(a: Floats, b: Floats, axis: int) -> Floats:
+    """Hessian of (a × b)_axis, (3, 12, 12)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    return _product(a[i], b[j]) - _product(a[j], b[i])

@@ -1,0 +1,251 @@
+"""All terms of K_g, added to the entries of K: beams, arms and joints under the weight of a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.assembly.affine_entries import AffineEntries
+from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed, inertia
+from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
+from eigassign.mechanism.assembly.gravity.curvature import add_arm, add_joint
+from eigassign.mechanism.assembly.gravity.statics import Statics, handed, statics
+from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, NodeMotions
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
+from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walked
+from eigassign.mechanism.kinematics.loop_closure import reference
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
+from eigassign.mechanism.kinematics.rotations import (
+    DOFS,
+    Floats,
+    Objects,
+    cross,
+    multiply,
+    present,
+    scaled,
+    some,
+    vector,
+)
+from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, split
+from eigassign.series.expression import Scalar
+
+Ints = NDArray[np.intp]
+
+
+def add_weight(
+    K: AffineEntries,
+    case: CaseFile,
+    parameters: ModelParameters,
+    motion: Kinematics,
+    links: Sequence[LocalLink],
+    nodes: NodeMotions,
+    gravity: Floats,
+) -> None:
+    """K += K_g for gravity g (3,) in m/s².
+
+    Raises MechanismError where the internal forces are not known.
+    """
+    known = parameters.with_passive(motion.passive)
+    local = {p.link: link for p, link in zip(motion.placements, links, strict=True)}
+    found = statics(case, parameters, motion, local, gravity)
+    columns = np.setdiff1d(np.arange(len(motion.columns)), motion.rigid)
+    weight = _Weight(K, case, known, motion, nodes, found, set(columns.tolist()))
+    for name, link in local.items():
+        terms = weight.stressed(name)
+        if terms:
+            add_stressed(K, link, terms, columns, nodes.count)
+        weight.add_arms(name)
+    for edge in (*motion.tree.edges, *motion.tree.loops):
+        weight.add_joint(edge)
+
+
+def swinging(
+    case: CaseFile,
+    parameters: ModelParameters,
+    motion: Kinematics,
+    links: Sequence[LocalLink],
+    gravity: Floats,
+) -> Kinematics:
+    """The motion, of whose rigid columns those stay on which the weight works in no pose."""
+    if not motion.rigid:
+        return motion
+    g = {p.link: multiply(p.world_rotation.T, gravity) for p in motion.placements}
+    kept, work = list(DOFS[case.mechanism.space]), np.zeros(len(motion.columns), dtype=object)
+    for placement, link in zip(motion.placements, links, strict=True):
+        pull = np.concatenate([g[placement.link], np.zeros(3, dtype=object)])[kept]
+        work = work + multiply(placement.twist[kept].T, multiply(inertia(link), pull))
+    table = parameters.compiled(work[list(motion.rigid)])
+    z = reference(case, parameters)[:, None]
+    spread = np.random.default_rng(0).uniform(-0.4, 0.4, (len(z), 6))
+    values = table(z + spread * np.maximum(np.abs(z), 1.0))[0]
+    still = np.abs(values).max(axis=0) < 1e-9
+    return replace(motion, rigid=tuple(np.array(motion.rigid)[still].tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Weight:
+    """The weight of a mechanism and the motions on which it works."""
+
+    K: AffineEntries
+    case: CaseFile
+    parameters: ModelParameters  # passive freedoms known
+    motion: Kinematics
+    nodes: NodeMotions
+    statics: Statics
+    columns: set[int]  # that are no rigid motions
+
+    # --- motions
+
+    def rows(self, node: NodeName) -> MotionRows:
+        """The whole motion of a node in its link's axes: elastic rows and columns of N T."""
+        if node == GROUND:
+            return [{} for _ in range(6)]
+        rigid = shifted(self.motion.placement(node[0]).twist, self._place(node))
+        rows = [dict(row) for row in self.nodes.rows(node)]
+        for a, k in zip(*np.nonzero(present(rigid)), strict=True):
+            if int(k) in self.columns:
+                rows[a][self.nodes.count + int(k)] = rigid[a, k]
+        return rows
+
+    def _place(self, node: NodeName) -> Objects:
+        if node[1] == "@origin":
+            return np.zeros(3, dtype=object)
+        return node_position(self.case, self.parameters, self.motion.tree, node)
+
+    # --- arms
+
+    def add_arms(self, link: str) -> None:
+        """What hangs on a link beside its nodes: its bodies, and of a rigid one all there is."""
+        g = self.statics.g[link]
+        rigid = "@origin" in self.nodes.meshes[link].nodes
+        for key, body in self.case.mechanism.bodies.items():
+            at = split(body.at)
+            if at[0] == link:
+                arm = vector(getattr(body, "offset", None) or (0.0,))
+                mass = self.parameters.number(f"bodies.{key}.mass", body.mass)
+                if rigid:
+                    arm, at = arm + self._place(at), (link, "@origin")
+                add_arm(self.K, self.rows(at)[3:], scaled(g, mass), arm)
+        if not rigid:
+            return
+        data: Any = self.case.mechanism.links[link]
+        turn = self.rows((link, "@origin"))[3:]
+        mass = self.parameters.number(f"links.{link}.mass", data.mass)
+        add_arm(self.K, turn, scaled(g, mass), vector(getattr(data, "center", None) or (0.0,)))
+        for node, wrench in self.statics.on_nodes[link]:
+            add_arm(self.K, turn, wrench[:3], self._place((link, node)))
+
+    # --- joints
+
+    def add_joint(self, edge: JointEdge) -> None:
+        """What a joint's follower does to second order, as the file has it."""
+        written, wrench = edge.written, self.statics.through[edge.joint]
+        if written.base == GROUND:
+            return
+        own = self.motion.tree.of_joint(edge.joint)
+        values = [self.parameters.freedom(k) for k in own]
+        joint = walked(self.case.mechanism.joints[edge.joint], False, values)
+        if edge.turned:
+            back = joint.rotation
+            wrench = handed(wrench * -1.0, back, joint.translation)
+        freedoms = np.concatenate(np.split(joint.freedoms, 2), axis=1)
+        turned = np.concatenate(np.split(multiply(joint.rotation, freedoms), 2, axis=1))
+        rows = [self._own_motion(k) for k in own]
+        add_joint(self.K, self.rows(written.base), rows, turned, joint.translation, wrench)
+
+    def _own_motion(self, freedom: int) -> MotionRow:
+        """The motion of one freedom of a joint, elastic and with the coordinates."""
+        named = self.motion.tree.freedoms[freedom]
+        row = dict(self.nodes.passive.get((named.joint, named.component), {}))
+        for k, rate in enumerate(self.motion.rates[freedom]):
+            if some(rate) and k in self.columns:
+                row[self.nodes.count + k] = rate
+        return row
+
+    # --- beams
+
+    def stressed(self, name: str) -> list[Term]:
+        """k_σ of a link from the forces inside it, in its local dofs."""
+        mesh = self.nodes.meshes[name]
+        whole = mesh if mesh.reduction is None else mesh.reduction.mesh
+        match link_type(self.case, name):
+            case "rigid":
+                return []
+            case "beam":
+                terms = self._beam(name, whole)
+            case kind:
+                message = f"is a {kind}, whose inner forces under gravity are not modelled yet"
+                raise MechanismError(f"mechanism.links.{name}", message)
+        if mesh.reduction is None:
+            return terms
+        T = mesh.reduction.basis
+        return [Term(c, sparse.csr_array(T.T @ (A @ T))) for c, A in terms]
+
+    def _beam(self, name: str, mesh: LinkMesh) -> list[Term]:
+        (strand,) = mesh.strands
+        turn, planar = strand.axes, self.nodes.space == "planar"
+        out = Entries((mesh.n_local, mesh.n_local))
+        beyond = np.zeros(6, dtype=object)  # on the end of an element, about its last node
+        on_nodes = self._on_nodes(name, mesh, strand)
+        R = np.kron(np.eye(4), turn)
+        for k in range(len(strand.profiles) - 1, -1, -1):
+            h = strand.points[k + 1][0] - strand.points[k][0]
+            beyond = beyond + on_nodes[k + 1]
+            weight = [beam.mass for beam in strand.profiles[k]][:3]
+            g = multiply(turn, self.statics.g[name])
+            p = np.array([scaled(g, m) for m in weight], dtype=object)
+            forces, beyond = _through_element(beyond, turn, p, h)
+            dofs = np.append(strand.slots[k], strand.slots[k + 1])
+            for coefficient, matrix in stress_terms(forces, h, strand.shear[k], planar):
+                turned = R.T @ matrix @ R
+                i, j = np.nonzero(np.abs(turned) > 1e-14 * np.abs(turned).max())
+                kept = (dofs[i] >= 0) & (dofs[j] >= 0)
+                out.add(coefficient, dofs[i][kept], dofs[j][kept], turned[i, j][kept])
+        return out.terms()
+
+    def _on_nodes(self, name: str, mesh: LinkMesh, strand: Strand) -> list[Objects]:
+        """Wrenches on the nodes of a row, the bodies' weight among them, in the link's axes."""
+        first = {int(slots[0]): k for k, slots in enumerate(strand.slots)}
+        acting = [np.zeros(6, dtype=object) for _ in strand.slots]
+        for node, wrench in self.statics.on_nodes[name]:
+            acting[first[int(mesh.nodes[node][0])]] += wrench
+        for key, body in self.case.mechanism.bodies.items():
+            link, node = split(body.at)
+            if link == name:
+                mass = self.parameters.number(f"bodies.{key}.mass", body.mass)
+                F = scaled(self.statics.g[name], mass)
+                arm = vector(getattr(body, "offset", None) or (0.0,))
+                wrench = np.concatenate([F, cross(arm, F)])
+                acting[first[int(mesh.nodes[node][0])]] += wrench
+        return acting
+
+
+def _through_element(
+    beyond: Objects, turn: Floats, p: Objects, h: Scalar
+) -> tuple[ElementForces, Objects]:
+    """The forces in an element, and the wrench about its first node of it and all beyond.
+
+    ``beyond`` is about its last node in the link's axes, p (n_legendre, 3) its weight per length in
+    its own.
+    """
+    F, M = multiply(turn, beyond[:3]), multiply(turn, beyond[3:])
+    axial = [F[0], *(0.0 for _ in range(len(p) + 1))]
+    for degree, load in enumerate(p[:, 0]):  # ∫ P_l dξ from ξ to 1
+        share = load * h * (0.5 / (2 * degree + 1))
+        axial[degree - 1 if degree else 0] += share
+        axial[degree + 1] += share * -1.0
+    weight = scaled(p[0], h)
+    # ∫ ξ P_l dξ = 1/2, 1/6 for l = 0, 1
+    first = p[0] * 0.5 + (p[1] * (1.0 / 6.0) if len(p) > 1 else 0.0)
+    along = np.array([1.0, 0.0, 0.0], dtype=object)
+    M_a = M + scaled(cross(along, F), h) + scaled(cross(along, first), h * h)
+    forces = ElementForces(axial, M[0], np.array([M_a * -1.0, M], dtype=object), p)
+    total = np.concatenate([multiply(turn.T, F + weight), multiply(turn.T, M_a)])
+    return forces, total
