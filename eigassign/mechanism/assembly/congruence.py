@@ -106,7 +106,7 @@ class _Constants:
 def _constants(link: LocalLink) -> _Constants:
     slots = list(link.carried)
     momenta = [
-        (m.coefficient * N.coefficient, (m.matrix @ N.matrix).toarray())
+        (m.coefficient * N.coefficient, _without_roundoff(m.matrix, N.matrix))
         for m, N in itertools.product(link.mass, link.rigid)
     ]
     J = np.zeros((len(link.twist), len(link.twist)), dtype=object)
@@ -120,6 +120,13 @@ def _constants(link: LocalLink) -> _Constants:
         momenta,
         J,
     )
+
+
+def _without_roundoff(A: sparse.csr_array, N: sparse.csr_array) -> Floats:
+    """A N, with zero where what adds up cancels."""
+    product = (A @ N).toarray()
+    product[np.abs(product) < 1e-13 * (abs(A) @ abs(N)).toarray()] = 0.0
+    return np.asarray(product)
 
 
 def _add_elastic(target: AffineEntries, a: Term, a_s: Floats, link: LocalLink) -> None:

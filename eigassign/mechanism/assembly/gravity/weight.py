@@ -34,7 +34,7 @@ from eigassign.mechanism.kinematics.rotations import (
     vector,
 )
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, split
-from eigassign.series.expression import Scalar
+from eigassign.series.expression import Scalar, atom_of, one_atom, parts
 
 Ints = NDArray[np.intp]
 
@@ -199,15 +199,17 @@ class _Weight:
             h = strand.points[k + 1][0] - strand.points[k][0]
             beyond = beyond + on_nodes[k + 1]
             weight = [beam.mass for beam in strand.profiles[k]][:3]
-            g = multiply(turn, self.statics.g[name])
+            g = multiply(turn, np.array([one_atom(v) for v in self.statics.g[name]]))
             p = np.array([scaled(g, m) for m in weight], dtype=object)
             forces, beyond = _through_element(beyond, turn, p, h)
             dofs = np.append(strand.slots[k], strand.slots[k + 1])
-            for coefficient, matrix in stress_terms(forces, h, strand.shear[k], planar):
+            for whole, matrix in stress_terms(forces, h, strand.shear[k], planar):
                 turned = R.T @ matrix @ R
                 i, j = np.nonzero(np.abs(turned) > 1e-14 * np.abs(turned).max())
                 kept = (dofs[i] >= 0) & (dofs[j] >= 0)
-                out.add(coefficient, dofs[i][kept], dofs[j][kept], turned[i, j][kept])
+                place = dofs[i][kept], dofs[j][kept]
+                for atom, factor in parts(whole):
+                    out.add(atom_of(whole, atom) * factor, *place, turned[i, j][kept])
         return out.terms()
 
     def _on_nodes(self, name: str, mesh: LinkMesh, strand: Strand) -> list[Objects]:
@@ -215,7 +217,7 @@ class _Weight:
         first = {int(slots[0]): k for k, slots in enumerate(strand.slots)}
         acting = [np.zeros(6, dtype=object) for _ in strand.slots]
         for node, wrench in self.statics.on_nodes[name]:
-            acting[first[int(mesh.nodes[node][0])]] += wrench
+            acting[first[int(mesh.nodes[node][0])]] += np.array([one_atom(v) for v in wrench])
         for key, body in self.case.mechanism.bodies.items():
             link, node = split(body.at)
             if link == name:
