@@ -12,6 +12,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
+from eigassign.mechanism.assembly.gravity.statics import hangs_on_stiffness
 from eigassign.mechanism.assembly.gravity.weight import add_weight, swinging
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -63,7 +64,10 @@ def build_pencil(
     if isinstance(case.mechanism.gravity, tuple):
         g = np.array([*case.mechanism.gravity, 0.0][:3])
         motion = swinging(case, parameters, motion, links, g)
-        add_weight(stiffness, case, parameters, motion, links, nodes, g)
+        coarse = None
+        if hangs_on_stiffness(case, motion):
+            coarse = local_links(in_few_elements(case), parameters, motion)
+        add_weight(stiffness, case, parameters, motion, links, nodes, g, coarse)
     _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
 
@@ -76,6 +80,22 @@ def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
 def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> CaseFile:
     """The case with other frequencies (Hz) to which links are reduced; None leaves one whole."""
     return _with_links(case, "reduce_to", frequencies)
+
+
+def in_few_elements(case: CaseFile) -> CaseFile:
+    """The case with one element for each beam whose section does not vary, and no link reduced."""
+
+    def few(part: Any) -> Any:
+        update = {"reduce_to": None} if getattr(part, "reduce_to", None) is not None else {}
+        if hasattr(part, "elements") and isinstance(part.section, str):
+            update["elements"] = 1
+        if hasattr(part, "beams"):
+            update["beams"] = type(part.beams)({n: few(beam) for n, beam in part.beams.items()})
+        return part.model_copy(update=update)
+
+    same_kind: Any = type(case.mechanism.links)
+    links = same_kind({name: few(link) for name, link in case.mechanism.links.items()})
+    return replace(case, mechanism=case.mechanism.model_copy(update={"links": links}))
 
 
 def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:

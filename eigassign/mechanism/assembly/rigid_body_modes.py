@@ -52,9 +52,7 @@ def separated(
     passive = motion.passive_rates
     if passive is not None:
         passive = multiply(passive, change)
-    return replace(
-        motion, placements=moved, coordinates=rates, rigid=rigid, passive_rates=passive
-    )
+    return replace(motion, placements=moved, coordinates=rates, rigid=rigid, passive_rates=passive)
 
 
 def _rows(

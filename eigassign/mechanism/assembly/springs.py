@@ -8,9 +8,9 @@ with the elastic *and* the rigid motion of its link.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,21 @@ def resists(stiffness: Scalar) -> bool:
     return not is_constant(stiffness) or stiffness != 0.0
 
 
+class SpringMotion(NamedTuple):
+    """A spring, the motions of its two nodes at the place of the second, in its axes.
+
+    ``rotation`` turns its axes into those of the world, where ``arm`` runs from node to node.
+    """
+
+    start: NodeName
+    end: NodeName
+    stiffness: Sequence[Scalar]
+    here: MotionRows
+    there: MotionRows
+    rotation: Objects
+    arm: Objects
+
+
 @dataclass(frozen=True, eq=False)
 class SpringEnds:
     """The motions of both ends of every spring over [u; q̇], the q̇ numbered from ``first`` on."""
@@ -63,11 +78,16 @@ class SpringEnds:
 
     def all(self) -> Iterator[tuple[Scalar, MotionRow, MotionRow]]:
         """Stiffness and motions of both ends, six rows for every spring, in the spring's axes."""
+        for spring in self.each():
+            yield from zip(spring.stiffness, spring.here, spring.there, strict=True)
+
+    def each(self) -> Iterator[SpringMotion]:
+        """The springs one by one."""
         springs: Any = self.case.mechanism.springs
         for name, spring in springs.items():
-            ends = [GROUND if end == "ground" else split(end) for end in spring.between]
+            start, end = (GROUND if e == "ground" else split(e) for e in spring.between)
             stiffness = self._stiffness(f"springs.{name}", spring)
-            yield from zip(stiffness, *self._motions(spring, *ends), strict=True)
+            yield self._motions(start, end, mounting(spring), stiffness)
 
     def _stiffness(self, path: str, spring: Any) -> list[Scalar]:
         """Six values k_t, k_r per axis; a number stands for every axis of the space."""
@@ -85,16 +105,16 @@ class SpringEnds:
         return out
 
     def _motions(
-        self, spring: Any, start: NodeName, end: NodeName
-    ) -> tuple[MotionRows, MotionRows]:
+        self, start: NodeName, end: NodeName, mount: Objects, stiffness: Sequence[Scalar]
+    ) -> SpringMotion:
         """Motion of both ends in the spring's axes, the first carried to the second."""
-        here, there = self._in_world(start), self._in_world(end)
+        here, there, arm = self._in_world(start), self._in_world(end), np.zeros(3, dtype=object)
         if end != GROUND:
             arm = self._place(end) - self._place(start)
             here = apply(carried(np.eye(3).astype(object), arm), here)
-        R = multiply(self.motion.placement(start[0]).world_rotation, mounting(spring))
+        R = multiply(self.motion.placement(start[0]).world_rotation, mount)
         seen = carried(R, np.zeros(3, dtype=object))
-        return apply(seen, here), apply(seen, there)
+        return SpringMotion(start, end, stiffness, apply(seen, here), apply(seen, there), R, arm)
 
     def _local(self, node: NodeName) -> Objects:
         return node_position(self.case, self.parameters, self.motion.tree, node)

@@ -16,7 +16,7 @@ import itertools
 import numpy as np
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
-from eigassign.mechanism.assembly.node_motion import MotionRows
+from eigassign.mechanism.assembly.node_motion import MotionRows, combined
 from eigassign.mechanism.kinematics.rotations import Objects, multiply, present, skew
 
 
@@ -50,12 +50,24 @@ def add_joint(
         add_bilinear(target, np.array([[work]], dtype=object), [own[i]], [own[j]])
 
 
-def add_bilinear(
-    target: AffineEntries, work: Objects, left: MotionRows, right: MotionRows
+def add_spring(
+    target: AffineEntries, here: MotionRows, there: MotionRows, arm: Objects, force: Objects
 ) -> None:
+    """Hessian of (F, M) · what a spring stretches by to second order, in its axes.
+
+    With D the motion of its second node against the first, θ₁, θ₂ their turns and d the arm:
+    −θ₁ × D + θ₁ × (θ₁ × d)/2 and −θ₁ × θ₂/2. ``here`` are the rows of the first node itself.
+    """
+    F, M = force[:3], force[3:]
+    apart = [combined(b, a, -1.0) for a, b in zip(here[:3], there[:3], strict=True)]
+    add_arm(target, here[3:], F * -1.0, arm)
+    add_bilinear(target, skew(F), here[3:], apart)  # −F · (θ × D) = θᵀ [F]× D
+    add_bilinear(target, skew(M) * 0.5, here[3:], there[3:])
+
+
+def add_bilinear(target: AffineEntries, work: Objects, left: MotionRows, right: MotionRows) -> None:
     """Hessian of aᵀ C b, a and b the motions of two sets of rows."""
     for i, j in zip(*np.nonzero(present(work)), strict=True):
         a, b = list(left[i].items()), list(right[j].items())
         if a and b:
             target.add_product(work[i, j], a, b)
-

@@ -6,8 +6,9 @@ the wrenches λ of their closing joints, which make the passive freedoms p feel 
 
     J_pᵀ λ = −Σ_links T_pᵀ W,
 
-J_p the rates of the loops' gaps, T_p the twists per ṗ: as many equations as unknowns, or the
-internal forces would hang on stiffnesses, which is refused.
+J_p the rates of the loops' gaps, T_p the twists per ṗ. Where that leaves λ open, loops that close
+at nodes that deform have the forces that these put on them (`elastic`), as springs have, and among
+rigid links the least λ is as good as any, for no motion feels the difference.
 """
 
 from __future__ import annotations
@@ -20,22 +21,37 @@ import numpy as np
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
+from eigassign.mechanism.assembly.gravity.elastic import sagging
+from eigassign.mechanism.assembly.node_motion import NodeMotions
+from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
+from eigassign.mechanism.kinematics.loop_closure import passive_motion
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, cross, multiply
-from eigassign.mechanism.kinematics.topology import JointEdge, NodeName
+from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName
+
+Coarse = tuple[Mapping[str, LocalLink], NodeMotions]
 
 
 @dataclass(frozen=True)
 class Statics:
     """``on_nodes``: what acts on the nodes of each link but its own weight, about each node;
     ``through``: what the follower of each joint, as it is walked, puts on its base node; both in
-    the axes of the link that it acts on. ``g`` are the links' own axes' gravity, m/s².
+    the axes of the link that it acts on. ``g`` is gravity in those of each link, m/s². ``springs``
+    with their forces (F, M) in their own axes.
     """
 
     g: Mapping[str, Objects]
     on_nodes: Mapping[str, Sequence[tuple[str, Objects]]]
     through: Mapping[str, Objects]
+    springs: Sequence[tuple[SpringMotion, Objects]]
+
+
+def hangs_on_stiffness(case: CaseFile, motion: Kinematics) -> bool:
+    """True where statics alone do not tell the forces."""
+    tree, width = motion.tree, len(DOFS[case.mechanism.space])
+    redundant = tree.n_elastic > 0 and width * len(tree.loops) != len(tree.passive)
+    return redundant or bool(case.mechanism.springs)
 
 
 def statics(
@@ -44,23 +60,36 @@ def statics(
     motion: Kinematics,
     links: Mapping[str, LocalLink],
     gravity: Floats,
+    coarse: Coarse | None,
 ) -> Statics:
     """Wrenches through the joints of a mechanism under its weight, as functions of (q, y).
 
-    Raises MechanismError for loops whose internal forces statics alone do not give.
+    ``coarse`` is the mechanism in as few elements as may be, where `hangs_on_stiffness`.
     """
-    kept = list(DOFS[case.mechanism.space])
+    known, kept = parameters.with_passive(motion.passive), list(DOFS[case.mechanism.space])
     g = {p.link: multiply(p.world_rotation.T, gravity) for p in motion.placements}
     own = {name: np.zeros(6, dtype=object) for name in g}
     for name, link in links.items():
         pull = np.concatenate([g[name], np.zeros(3, dtype=object)])[kept]
         own[name][kept] = multiply(inertia(link), pull)
-    found = _Wrenches(case, parameters.with_passive(motion.passive), motion, dict(own))
-    for edge, wrench in _closing(case, parameters, motion, own):
+    found = _Wrenches(case, known, motion, own, {name: [] for name in own})
+    springs: list[tuple[SpringMotion, Objects]] = []
+    loops = motion.tree.loops
+    if coarse is not None:
+        named, nodes = coarse
+        ends = list(SpringEnds(case, known, motion, nodes.rows, nodes.count).each())
+        sag = sagging(named, nodes, ends, g, known.recorder)
+        springs = [(spring, sag.stretched(spring)) for spring in ends]
+        for spring, force in springs:
+            found.stretch(spring, force)
+        for edge in loops[: motion.tree.n_elastic]:
+            found.close(edge, sag.on_node(edge.follower) - found.acting_on(edge.follower))
+        loops = loops[motion.tree.n_elastic :]
+    for edge, wrench in _closing(known, motion, loops, found):
         found.close(edge, wrench)
     for placement in reversed(motion.placements):
         found.hang(placement.edge)
-    return Statics(g, found.on_nodes, found.through)
+    return Statics(g, found.on_nodes, found.through, springs)
 
 
 @dataclass
@@ -71,11 +100,20 @@ class _Wrenches:
     parameters: ModelParameters
     motion: Kinematics
     total: dict[str, Objects]  # of each link and all that hangs on it, about its origin
-    on_nodes: dict[str, list[tuple[str, Objects]]] = field(init=False)
+    on_nodes: dict[str, list[tuple[str, Objects]]]
     through: dict[str, Objects] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        self.on_nodes = {name: [] for name in self.total}
+    def acting_on(self, node: NodeName) -> Objects:
+        """The sum of what acts on a node so far."""
+        found = [wrench for name, wrench in self.on_nodes[node[0]] if name == node[1]]
+        return np.asarray(sum(found, np.zeros(6, dtype=object)))
+
+    def stretch(self, spring: SpringMotion, force: Objects) -> None:
+        """A spring's force on the second of its nodes, and its opposite on the first."""
+        in_world = np.concatenate([multiply(spring.rotation, part) for part in np.split(force, 2)])
+        self._act_in_world(spring.end, in_world * -1.0)
+        lever = np.concatenate([np.zeros(3), cross(spring.arm, in_world[:3])])
+        self._act_in_world(spring.start, in_world + lever)
 
     def close(self, edge: JointEdge, wrench: Objects) -> None:
         """A wrench on the follower of a closing joint, and its opposite on the base."""
@@ -88,19 +126,23 @@ class _Wrenches:
     def hang(self, edge: JointEdge) -> None:
         """The follower with all that hangs on it, on its base."""
         placement = self.motion.placement(edge.follower[0])
-        at_root = shifted_wrench(self.total[placement.link], placement.root)
+        at_root = _about(self.total[placement.link], placement.root)
         self.on_nodes[placement.link].append((edge.follower[1], at_root * -1.0))
         on_base = handed(at_root, placement.rotation, placement.lever)
         self.through[edge.joint] = on_base
         self._act(edge.base, on_base)
 
+    def _act_in_world(self, node: NodeName, wrench: Objects) -> None:
+        if node != GROUND:
+            back = self.motion.placement(node[0]).world_rotation.T
+            self._act(node, np.concatenate([multiply(back, w) for w in np.split(wrench, 2)]))
+
     def _act(self, node: NodeName, wrench: Objects) -> None:
-        link, name = node
-        if link == "ground":
+        if node == GROUND:
             return
         place = node_position(self.case, self.parameters, self.motion.tree, node)
-        self.on_nodes[link].append((name, wrench))
-        self.total[link] = self.total[link] + shifted_wrench(wrench, place * -1.0)
+        self.on_nodes[node[0]].append((node[1], wrench))
+        self.total[node[0]] = self.total[node[0]] + _about(wrench, place * -1.0)
 
 
 def handed(wrench: Objects, rotation: Objects, lever: Objects) -> Objects:
@@ -109,36 +151,43 @@ def handed(wrench: Objects, rotation: Objects, lever: Objects) -> Objects:
     return np.concatenate([F, M + cross(lever, F)])
 
 
-def shifted_wrench(wrench: Objects, to: Objects) -> Objects:
-    """The wrench about another point of the same link: M − to × F."""
-    return np.concatenate([wrench[:3], wrench[3:] - cross(to, wrench[:3])])
+def _about(wrench: Objects, point: Objects) -> Objects:
+    """The wrench about another point of the same link: M − X × F."""
+    return np.concatenate([wrench[:3], wrench[3:] - cross(point, wrench[:3])])
 
 
 def _closing(
-    case: CaseFile, parameters: ModelParameters, motion: Kinematics, own: Mapping[str, Objects]
+    known: ModelParameters, motion: Kinematics, loops: Sequence[JointEdge], found: _Wrenches
 ) -> list[tuple[JointEdge, Objects]]:
-    """λ (6,) on the follower of every closing joint, in the follower's axes."""
-    if not motion.loops:
+    """λ (6,) on the follower of the closing joints that are left, in the follower's axes.
+
+    Of more rows than passive freedoms λ = −J (JᵀJ)⁻¹ G.
+    """
+    if not loops:
         return []
-    tree, coords = motion.tree, motion.coordinates
-    known = parameters.with_passive(motion.passive)
+    tree, coords, case = motion.tree, motion.coordinates, found.case
     values = [known.freedom(k) for k in range(len(tree.freedoms))]
     unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
     moved = walk(case, known, tree, coords, values, unit)
     kept = list(DOFS[case.mechanism.space])
-    J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops])
-    if J.shape[0] != J.shape[1]:
+    J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
+    G = sum(multiply(p.twist.T, found.total[p.link]) for p in moved.placements)
+    rows, columns = J.shape
+    if rows < columns:
         raise MechanismError(
-            f"mechanism.joints.{tree.loops[0].joint}",
-            "closes a loop in which the forces under gravity hang on the stiffness of its links "
-            f"({J.shape[0]} conditions, {J.shape[1]} passive freedoms): give its joints the "
-            "freedoms that are missing, or write gravity: none",
+            f"mechanism.joints.{loops[0].joint}",
+            "closes a loop that leaves its passive joints a motion of their own, which the weight "
+            "sets free: hold it, or write gravity: none",
         )
-    G = sum(multiply(p.twist.T, own[p.link]) for p in moved.placements)
-    solved = known.recorder.solve(J.T.tolist(), [[-value] for value in G])
+    if rows == columns:
+        right = np.array([[value] for value in G], dtype=object)
+        forces = passive_motion(known.recorder, J.T, right)[:, 0]
+    else:
+        right = np.array([[value] for value in G], dtype=object)
+        forces = multiply(J, passive_motion(known.recorder, multiply(J.T, J), right)[:, 0])
     out = []
-    for k, edge in enumerate(tree.loops):
+    for edge, force in zip(loops, np.split(forces, len(loops)), strict=True):
         wrench = np.zeros(6, dtype=object)
-        wrench[kept] = [row[0] for row in solved[len(kept) * k : len(kept) * (k + 1)]]
+        wrench[kept] = force
         out.append((edge, wrench))
     return out

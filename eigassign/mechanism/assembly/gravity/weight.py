@@ -15,17 +15,20 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed, inertia
 from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
-from eigassign.mechanism.assembly.gravity.curvature import add_arm, add_joint
+from eigassign.mechanism.assembly.gravity.curvature import add_arm, add_joint, add_spring
 from eigassign.mechanism.assembly.gravity.statics import Statics, handed, statics
-from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, NodeMotions
+from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, NodeMotions, apply
+from eigassign.mechanism.assembly.springs import SpringEnds
+from eigassign.mechanism.elements.beam import ElementTerm, element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walked
-from eigassign.mechanism.kinematics.loop_closure import reference
+from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.rotations import (
     DOFS,
     Floats,
     Objects,
+    carried,
     cross,
     multiply,
     present,
@@ -47,14 +50,18 @@ def add_weight(
     links: Sequence[LocalLink],
     nodes: NodeMotions,
     gravity: Floats,
+    coarse: tuple[Sequence[LocalLink], NodeMotions] | None,
 ) -> None:
-    """K += K_g for gravity g (3,) in m/s².
+    """K += K_g for gravity g (3,) in m/s²; ``coarse`` as in `statics`.
 
     Raises MechanismError where the internal forces are not known.
     """
     known = parameters.with_passive(motion.passive)
     local = {p.link: link for p, link in zip(motion.placements, links, strict=True)}
-    found = statics(case, parameters, motion, local, gravity)
+    few = None
+    if coarse is not None:
+        few = {p.link: c for p, c in zip(motion.placements, coarse[0], strict=True)}, coarse[1]
+    found = statics(case, parameters, motion, local, gravity, few)
     columns = np.setdiff1d(np.arange(len(motion.columns)), motion.rigid)
     weight = _Weight(K, case, known, motion, nodes, found, set(columns.tolist()))
     for name, link in local.items():
@@ -64,6 +71,7 @@ def add_weight(
         weight.add_arms(name)
     for edge in (*motion.tree.edges, *motion.tree.loops):
         weight.add_joint(edge)
+    weight.add_springs()
 
 
 def swinging(
@@ -169,6 +177,24 @@ class _Weight:
                 row[self.nodes.count + k] = rate
         return row
 
+    # --- springs
+
+    def add_springs(self) -> None:
+        """What the forces of springs do to second order."""
+        count, eye = self.nodes.count, np.eye(3).astype(object)
+        ends = SpringEnds(self.case, self.parameters, self.motion, self.nodes.rows, count).each()
+        for spring, (_, force) in zip(ends, self.statics.springs, strict=True):
+            here, there = (
+                [
+                    {i: c for i, c in row.items() if i < count or i - count in self.columns}
+                    for row in rows
+                ]
+                for rows in (spring.here, spring.there)
+            )
+            arm = multiply(spring.rotation.T, spring.arm)
+            here = apply(carried(eye, arm * -1.0), here)
+            add_spring(self.K, here, there, arm, force)
+
     # --- beams
 
     def stressed(self, name: str) -> list[Term]:
@@ -180,8 +206,10 @@ class _Weight:
                 return []
             case "beam":
                 terms = self._beam(name, whole)
-            case kind:
-                message = f"is a {kind}, whose inner forces under gravity are not modelled yet"
+            case "frame":
+                terms = self._frame(name, whole)
+            case _:
+                message = "has inner forces under gravity that are not modelled yet"
                 raise MechanismError(f"mechanism.links.{name}", message)
         if mesh.reduction is None:
             return terms
@@ -190,43 +218,101 @@ class _Weight:
 
     def _beam(self, name: str, mesh: LinkMesh) -> list[Term]:
         (strand,) = mesh.strands
-        turn, planar = strand.axes, self.nodes.space == "planar"
         out = Entries((mesh.n_local, mesh.n_local))
-        beyond = np.zeros(6, dtype=object)  # on the end of an element, about its last node
-        on_nodes = self._on_nodes(name, mesh, strand)
-        R = np.kron(np.eye(4), turn)
+        first = {int(slots[0]): k for k, slots in enumerate(strand.slots)}
+        acting = [np.zeros(6, dtype=object) for _ in strand.slots]
+        for node, wrench in self._on_nodes(name):
+            acting[first[int(mesh.nodes[node][0])]] += wrench
+        self._add_strand(out, name, strand, acting)
+        return out.terms()
+
+    def _frame(self, name: str, mesh: LinkMesh) -> list[Term]:
+        """The beams of a frame, each with the force at its end: K v = f with one node held."""
+        n, kept = len(mesh.strands[0].slots[0]), list(DOFS[self.nodes.space])
+        order: dict[int, int] = {}
+        for strand in mesh.strands:
+            for slots in (strand.slots[0], strand.slots[-1]):
+                order.setdefault(int(slots[0]), len(order))
+        K = np.zeros((n * len(order), n * len(order)), dtype=object)
+        f = np.zeros(n * len(order), dtype=object)
+        beams = []
+        for strand in mesh.strands:
+            at = [order[int(strand.slots[end][0])] for end in (0, -1)]
+            dofs = np.concatenate([np.arange(6 * k, 6 * k + 6) for k in at])
+            k_e, f_e = _whole_beam(strand, self.statics.g[name])
+            K[np.ix_(dofs, dofs)] += k_e
+            f[dofs] += f_e
+            beams.append((dofs, k_e, f_e))
+        for node, wrench in self._on_nodes(name):
+            k = order[int(mesh.nodes[node][0])]
+            f[6 * k : 6 * k + 6] += wrench
+        loose = [6 * k + d for k in range(1, len(order)) for d in kept]
+        v = np.zeros(len(f), dtype=object)
+        right = np.array([[-value] for value in f[loose]], dtype=object)
+        v[loose] = passive_motion(self.parameters.recorder, K[np.ix_(loose, loose)], right)[:, 0]
+        out = Entries((mesh.n_local, mesh.n_local))
+        for strand, (dofs, k_e, f_e) in zip(mesh.strands, beams, strict=True):
+            acting = [np.zeros(6, dtype=object) for _ in strand.slots]
+            force = (multiply(k_e, v[dofs]) - f_e)[6:]
+            acting[-1] = np.array([one_atom(value) for value in force])
+            self._add_strand(out, name, strand, acting)
+        return out.terms()
+
+    def _add_strand(
+        self, out: Entries, name: str, strand: Strand, acting: Sequence[Objects]
+    ) -> None:
+        """k_σ of a row of elements for what acts on its nodes, in the link's axes."""
+        turn, planar = strand.axes, self.nodes.space == "planar"
+        R, beyond = np.kron(np.eye(4), turn), np.zeros(6, dtype=object)  # about the last node
+        g = multiply(turn, np.array([one_atom(v) for v in self.statics.g[name]]))
         for k in range(len(strand.profiles) - 1, -1, -1):
-            h = strand.points[k + 1][0] - strand.points[k][0]
-            beyond = beyond + on_nodes[k + 1]
-            weight = [beam.mass for beam in strand.profiles[k]][:3]
-            g = multiply(turn, np.array([one_atom(v) for v in self.statics.g[name]]))
-            p = np.array([scaled(g, m) for m in weight], dtype=object)
-            forces, beyond = _through_element(beyond, turn, p, h)
+            along = multiply(turn, strand.points[k + 1] - strand.points[k])
+            p = np.array([scaled(g, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
+            forces, beyond = _through_element(beyond + acting[k + 1], turn, p, along[0])
             dofs = np.append(strand.slots[k], strand.slots[k + 1])
-            for whole, matrix in stress_terms(forces, h, strand.shear[k], planar):
+            for whole, matrix in stress_terms(forces, along[0], strand.shear[k], planar):
                 turned = R.T @ matrix @ R
                 i, j = np.nonzero(np.abs(turned) > 1e-14 * np.abs(turned).max())
                 kept = (dofs[i] >= 0) & (dofs[j] >= 0)
                 place = dofs[i][kept], dofs[j][kept]
                 for atom, factor in parts(whole):
                     out.add(atom_of(whole, atom) * factor, *place, turned[i, j][kept])
-        return out.terms()
 
-    def _on_nodes(self, name: str, mesh: LinkMesh, strand: Strand) -> list[Objects]:
-        """Wrenches on the nodes of a row, the bodies' weight among them, in the link's axes."""
-        first = {int(slots[0]): k for k, slots in enumerate(strand.slots)}
-        acting = [np.zeros(6, dtype=object) for _ in strand.slots]
-        for node, wrench in self.statics.on_nodes[name]:
-            acting[first[int(mesh.nodes[node][0])]] += np.array([one_atom(v) for v in wrench])
+    def _on_nodes(self, name: str) -> list[tuple[str, Objects]]:
+        """Wrenches on the nodes of a link, the bodies' weight among them, in its axes."""
+        acting = [
+            (node, np.array([one_atom(v) for v in wrench]))
+            for node, wrench in self.statics.on_nodes[name]
+        ]
         for key, body in self.case.mechanism.bodies.items():
             link, node = split(body.at)
             if link == name:
                 mass = self.parameters.number(f"bodies.{key}.mass", body.mass)
                 F = scaled(self.statics.g[name], mass)
                 arm = vector(getattr(body, "offset", None) or (0.0,))
-                wrench = np.concatenate([F, cross(arm, F)])
-                acting[first[int(mesh.nodes[node][0])]] += wrench
+                acting.append((node, np.concatenate([F, cross(arm, F)])))
         return acting
+
+
+def _whole_beam(strand: Strand, g: Objects) -> tuple[Objects, Objects]:
+    """Stiffness (12, 12) and weight (12,) of a straight beam of one section, in the link's axes."""
+    R = np.kron(np.eye(4), strand.axes)
+    h = float(np.linalg.norm((strand.points[-1] - strand.points[0]).astype(np.float64)))
+    k, m = (
+        _summed(terms, R)
+        for terms in (element_stiffness(strand.profiles[0], h), element_mass(strand.profiles[0], h))
+    )
+    still = np.zeros(3, dtype=object)
+    return k, multiply(m, np.concatenate([g, still, g, still]))
+
+
+def _summed(terms: Sequence[ElementTerm], R: Floats) -> Objects:
+    out = np.zeros((12, 12), dtype=object)
+    for coefficient, matrix in terms:
+        turned = R.T @ matrix @ R
+        for i, j in zip(*np.nonzero(turned), strict=True):
+            out[i, j] = out[i, j] + coefficient * float(turned[i, j])
+    return out
 
 
 def _through_element(
