@@ -324,13 +324,34 @@ def section(s: Tree) -> tuple[float, float, float, float, float, float]:
     )
 
 
+def bending(s: float, h: float) -> list[tuple[list[int], Array, Array, Array]]:
+    """Dofs, deflection, its slopes and curvature at s = x/h, per plane, over twelve and two dofs.
+
+    The two behind the twelve are the constant shear strains: the slopes are θ + γ.
+    """
+    out = []
+    for dofs, sign in (([1, 5, 7, 11, 12], 1.0), ([2, 4, 8, 10, 13], -1.0)):
+        flip = np.array([1, sign, 1, sign])
+        cubic = flip * [1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3),
+                        3 * s**2 - 2 * s**3, h * (s**3 - s**2)]  # fmt: skip
+        first = flip * [(6 * s**2 - 6 * s) / h, 1 - 4 * s + 3 * s**2,
+                        (6 * s - 6 * s**2) / h, 3 * s**2 - 2 * s]  # fmt: skip
+        second = flip * [(12 * s - 6) / h**2, (6 * s - 4) / h,
+                         (6 - 12 * s) / h**2, (6 * s - 2) / h]  # fmt: skip
+        shapes = [np.zeros(14) for _ in range(3)]
+        for whole, part in zip(shapes, (cubic, first, second), strict=True):
+            whole[dofs] = [*part, part @ (flip * [0, 1, 0, 1])]
+        out.append((dofs, *shapes))
+    return out
+
+
 def element(
     material: Tree, values: Callable[[float], tuple[float, ...]], h: float, sheared: bool
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """(12, 12) stiffness and mass in the element's axes, by Gauss quadrature.
 
     ``values`` are those of `section` at a share of the element. The shear strain is constant: an
-    inner unknown of its own, eliminated statically.
+    inner unknown of its own, eliminated statically by the third, (14, 12).
     """
     E, rho = material["youngs_modulus"], material["density"]
     G = material.get("shear_modulus", E / (2 + 2 * material.get("poissons_ratio", 0.3)))
@@ -343,21 +364,10 @@ def element(
             n[[dof, dof + 6]], dn[[dof, dof + 6]] = [1 - s, s], [-1 / h, 1 / h]
             k += w * stiff * np.outer(dn, dn)
             m += w * mass * np.outer(n, n)
-        planes = ((I_z, [1, 5, 7, 11, 12], 1.0), (I_y, [2, 4, 8, 10, 13], -1.0))
-        for I, dofs, sign in planes:  # noqa: E741
-            flip = np.array([1, sign, 1, sign])
-            cubic = flip * [1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3),
-                            3 * s**2 - 2 * s**3, h * (s**3 - s**2)]  # fmt: skip
-            first = flip * [(6 * s**2 - 6 * s) / h, 1 - 4 * s + 3 * s**2,
-                            (6 * s - 6 * s**2) / h, 3 * s**2 - 2 * s]  # fmt: skip
-            second = flip * [(12 * s - 6) / h**2, (6 * s - 4) / h,
-                             (6 - 12 * s) / h**2, (6 * s - 2) / h]  # fmt: skip
-            v, theta, bend, strain = (np.zeros(14) for _ in range(4))
-            slopes = flip * [0, 1, 0, 1]  # the deflection's slopes are θ + γ
-            v[dofs] = [*cubic, cubic @ slopes]
-            theta[dofs] = [*first, first @ slopes - 1]
-            bend[dofs] = [*second, second @ slopes]
+        for I, (dofs, v, slope, bend) in zip((I_z, I_y), bending(s, h), strict=True):  # noqa: E741
+            strain = np.zeros(14)
             strain[dofs[-1]] = 1
+            theta = slope - strain
             k += w * E * I * np.outer(bend, bend)
             m += w * rho * A * np.outer(v, v)
             if sheared:
@@ -366,7 +376,7 @@ def element(
     T = np.eye(14)[:, :12]
     if sheared:
         T[12:] = -np.linalg.solve(k[12:, 12:], k[12:, :12])
-    return T.T @ k @ T, T.T @ m @ T
+    return T.T @ k @ T, T.T @ m @ T, T
 
 
 # Assembly
@@ -482,7 +492,7 @@ class Builder:
 
         R = R @ turn(X, data.get("roll", 0.0))
         material = self.m["materials"][data["material"]]
-        k, m = element(material, values, h, data.get("shear", False))
+        k, m, _ = element(material, values, h, data.get("shear", False))
         T = np.kron(np.eye(4), R.T)
         dofs = np.r_[a : a + 6, b : b + 6]
         self.K.append((dofs, T.T @ k @ T))

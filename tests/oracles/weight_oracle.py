@@ -1,0 +1,535 @@
+"""Vibration under weight: second derivatives of the total potential of a plain frame in space.
+
+`spatial_oracle` gives nodes, elements and linear rows. Here every part has its nonlinear geometry,
+with a displacement and a rotation vector for every node in world axes:
+
+* a beam element has a frame that follows its chord and the mean roll of its ends; in it, deflections
+  are cubic (constant shear strain), strains linear with the work ½ ∫ N w'² of the bowing, N varying
+  along the element under its own weight, which hangs on the deflected shape;
+* bodies and rigid links are carried by rotation matrices; joints close with the rotation matrices of
+  their freedoms, which are unknowns; a rider stands on the shape of its beam, mean of both sides;
+* springs measure in axes that turn with their first node.
+
+The internal forces n and the multipliers μ of joints are those of linear statics with every
+coordinate held, at the geometry without sag, so that with strains ε(x) and closures c(x)
+
+    Π = n·ε + V + μ·c − τ·q,   ∂Π/∂x = 0,   K_T = K + ∂²Π/∂x²   on the motions that joints allow.
+
+Second derivatives are exact: numbers carry their gradients and Hessians (`Jet`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+from spatial_oracle import (
+    FREEDOMS,
+    NUMBER,
+    Array,
+    Builder,
+    Pose,
+    Tree,
+    X,
+    Y,
+    Z,
+    base_of,
+    bending,
+    cross,
+    dimensions,
+    element,
+    mount,
+    null_space,
+    place,
+    point,
+    section,
+    solve_pose,
+    split_coordinates,
+    turn,
+    unit,
+)
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
+POINTS, WEIGHTS = 0.5 * (POINTS + 1.0), 0.5 * WEIGHTS
+ROTATED = np.zeros((3, 3, 3))  # [θ]×, ij by component of θ
+ROTATED[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = -1.0
+ROTATED[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = 1.0
+ROTATED = ROTATED.transpose(0, 1, 2)
+
+
+# Numbers with first and second derivatives
+
+
+class Jet:
+    """An array v with its gradients g (…, n) and Hessians h (…, n, n) by n unknowns."""
+
+    __array_priority__ = 100.0
+
+    def __init__(self, v: Any, g: Array, h: Array) -> None:
+        self.v, self.g, self.h = np.asarray(v, float), g, h
+
+    def __getitem__(self, at: Any) -> Jet:
+        return Jet(self.v[at], self.g[at], self.h[at])
+
+    def __add__(self, other: Any) -> Jet:
+        if isinstance(other, Jet):
+            return Jet(self.v + other.v, self.g + other.g, self.h + other.h)
+        return Jet(self.v + other, self.g, self.h)
+
+    def __mul__(self, other: Any) -> Jet:
+        if isinstance(other, Jet):
+            return product(",->", self, other)
+        return Jet(self.v * other, self.g * other, self.h * other)
+
+    def __neg__(self) -> Jet:
+        return self * -1.0
+
+    def __sub__(self, other: Any) -> Jet:
+        return self + -other
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def of(self, f: float, slope: float, curve: float) -> Jet:
+        """A function of this single number, with its derivatives there."""
+        return Jet(f, slope * self.g, slope * self.h + curve * np.outer(self.g, self.g))
+
+
+def product(spec: str, a: Any, b: Any) -> Jet:
+    """An einsum of two arrays of which one at least is a Jet."""
+    left, out = spec.split("->")
+    p, q = left.split(",")
+    if not isinstance(b, Jet):
+        a, b, p, q = b, a, q, p
+    if not isinstance(a, Jet):
+        return Jet(
+            np.einsum(f"{p},{q}->{out}", a, b.v),
+            np.einsum(f"{p},{q}y->{out}y", a, b.g),
+            np.einsum(f"{p},{q}yz->{out}yz", a, b.h),
+        )
+    mixed = np.einsum(f"{p}y,{q}z->{out}yz", a.g, b.g)
+    return Jet(
+        np.einsum(f"{p},{q}->{out}", a.v, b.v),
+        np.einsum(f"{p}y,{q}->{out}y", a.g, b.v) + np.einsum(f"{p},{q}y->{out}y", a.v, b.g),
+        np.einsum(f"{p}yz,{q}->{out}yz", a.h, b.v)
+        + np.einsum(f"{p},{q}yz->{out}yz", a.v, b.h)
+        + mixed
+        + np.swapaxes(mixed, -1, -2),
+    )
+
+
+def unknowns(n: int) -> Jet:
+    return Jet(np.zeros(n), np.eye(n), np.zeros((n, n, n)))
+
+
+def stacked(parts: Sequence[Jet], axis: int = 0) -> Jet:
+    return Jet(*(np.stack([getattr(p, k) for p in parts], axis) for k in "vgh"))
+
+
+def times(A: Any, B: Any) -> Jet:
+    """Matrix by matrix."""
+    return product("ij,jk->ik", A, B)
+
+
+def by(A: Any, b: Any) -> Jet:
+    """Matrix by vector."""
+    return product("ij,j->i", A, b)
+
+
+def dot(a: Any, b: Any) -> Jet:
+    return product("i,i->", a, b)
+
+
+def along(a: Jet) -> tuple[Jet, Jet]:
+    """Length and direction of a vector."""
+    square = dot(a, a)
+    size = float(np.sqrt(square.v))
+    inverse = square.of(1 / size, -0.5 / size**3, 0.75 / size**5)
+    return square.of(size, 0.5 / size, -0.25 / size**3), product(",i->i", inverse, a)
+
+
+def crossed(theta: Jet) -> Jet:
+    return product("ijk,k->ij", ROTATED, theta)
+
+
+def rotated(theta: Jet) -> Jet:
+    """The matrix of a rotation vector that is zero in the pose."""
+    W = crossed(theta)
+    return W + times(W, W) * 0.5 + np.eye(3)
+
+
+def vector_of(R: Jet) -> Jet:
+    """The rotation vector of a matrix that is the unit matrix in the pose."""
+    return product("ijk,ij->k", 0.5 * ROTATED, R)
+
+
+def turned(axis: Array, angle: Jet) -> Jet:
+    """Rodrigues' formula."""
+    s, c = np.sin(angle.v), np.cos(angle.v)
+    W = cross(axis)
+    sine, cosine = angle.of(s, c, -s), angle.of(c, -s, -c)
+    return product(",ij->ij", sine, W) + product(",ij->ij", cosine * -1.0 + 1.0, W @ W) + np.eye(3)
+
+
+def moved_joint(joint: Tree, c: Jet) -> tuple[Jet, Jet]:
+    """Rotation and travel of the follower in base axes; of a rider those beside its place."""
+    kind, n, m = joint["type"], c.g.shape[1], mount(joint)
+    still = Jet(np.zeros(3), np.zeros((3, n)), np.zeros((3, n, n)))
+    plain = Jet(np.eye(3), np.zeros((3, 3, n)), np.zeros((3, 3, n, n)))
+    R, d = plain, still
+    if kind in ("revolute", "screw"):
+        a = unit(joint.get("axis"), Z)
+        R = turned(a, c[0])
+        if kind == "screw":
+            d = product(",i->i", c[0] * (joint["lead"] / (2 * np.pi)), a)
+    elif kind == "prismatic":
+        d = product(",i->i", c[0], unit(joint.get("axis"), X))
+    elif kind == "cylindrical":
+        a = unit(joint.get("axis"), Z)
+        R, d = turned(a, c[1]), product(",i->i", c[0], a)
+    elif kind == "universal":
+        a, b = (unit(v, Z) for v in joint["axes"])
+        R = times(turned(a, c[0]), turned(b, c[1]))
+    elif kind == "spherical":
+        R = times(times(turned(X, c[0]), turned(Y, c[1])), turned(Z, c[2]))
+    elif kind == "nut":
+        return times(turned(X, c[0] * (2 * np.pi / joint["lead"])), m), still
+    return times(m, R), by(m, d)
+
+
+# Parts
+
+
+@dataclass
+class Strained:
+    """Strains ε by the unknowns ``dofs``, with forces C ε; the multipliers' closures have none."""
+
+    dofs: Array
+    strain: Callable[[Jet], Jet]
+    stiffness: Array | None
+    rows: slice = field(default_factory=lambda: slice(0, 0))
+
+
+@dataclass
+class Beam:
+    """An element: axes (columns) and nodes in the world, local stiffness, shapes, ρA by share."""
+
+    dofs: Array
+    axes: Array
+    chord: Array
+    k: Array
+    T: Array
+    mass: Callable[[float], float]
+
+    @property
+    def h(self) -> float:
+        return float(np.linalg.norm(self.chord))
+
+    def local(self, x: Jet) -> tuple[Jet, Jet, Jet]:
+        """The element's frame (columns), its chord, and its twelve displacements in the frame."""
+        chord = x[6:9] - x[0:3] + self.chord
+        length, e1 = along(chord)
+        ends = [times(rotated(x[k : k + 3]), self.axes) for k in (3, 9)]
+        mean = (ends[0][:, 1] + ends[1][:, 1]) * 0.5
+        _, e2 = along(mean - product(",i->i", dot(mean, e1), e1))
+        e3 = by(crossed(e1), e2)
+        frame = stacked([e1, e2, e3], 1)
+        turns = [vector_of(product("ji,jk->ik", frame, end)) for end in ends]
+        zero = product(",i->i", x[0] * 0.0, np.ones(3))
+        stretch = product(",i->i", length + -self.h, X)
+        parts = [p[i] for p in (zero, turns[0], stretch, turns[1]) for i in range(3)]
+        return frame, chord, stacked(parts)
+
+    def shapes(self, s: float, order: int) -> Array:
+        """(2, 12): deflection (0), slope (1) or curvature (2) of both planes."""
+        return np.array([plane[1 + order] @ self.T for plane in bending(s, self.h)])
+
+    def weight(self, x: Jet, g: Array) -> Jet:
+        """−∫ ρA g · (displacement) dx."""
+        frame, chord, local = self.local(x)
+        total = x[0] * 0.0
+        for s, w in zip(POINTS, WEIGHTS, strict=True):
+            bent = by(frame[:, 1:], by(self.shapes(s, 0), local))
+            at = x[0:3] + chord * s + bent
+            total = total - dot(at, g) * (w * self.h * self.mass(s))
+        return total
+
+    def bowing(self, x: Jet, g: Array, pulled: float) -> Jet:
+        """½ ∫ N w'² dx; ``pulled`` is what the stretch alone gives on the last node."""
+        _, _, local = self.local(x)
+        p = self.axes[:, 0] @ g * self.h
+        last = pulled - p * sum(w * s * self.mass(s) for s, w in zip(POINTS, WEIGHTS, strict=True))
+        total = x[0] * 0.0
+        for s, w in zip(POINTS, WEIGHTS, strict=True):
+            beyond = [self.mass(s + (1 - s) * t) for t in POINTS]
+            N = last + p * (1 - s) * float(WEIGHTS @ beyond)
+            slopes = by(self.shapes(s, 1), local)
+            total = total + dot(slopes, slopes) * (0.5 * w * self.h * N)
+        return total
+
+    def at_end(self, x: Jet, s: float) -> tuple[Jet, Jet]:
+        """∂x/∂s and the change of rotation per length, in world axes, at an end."""
+        frame, chord, local = self.local(x)
+        slope = by(frame[:, 1:], by(self.shapes(s, 1), local))
+        curved = np.zeros((3, 12))
+        curved[0, [3, 9]] = [-1 / self.h, 1 / self.h]
+        curved[2], curved[1] = self.shapes(s, 2) * [[1], [-1]]
+        return chord * (1 / self.h) + slope, by(self.axes, by(curved, local))
+
+
+class WeightBuilder(Builder):
+    """The frame program's builder, which remembers the nonlinear parts."""
+
+    def __init__(self, tree: Tree, pose: Pose) -> None:
+        super().__init__(tree, pose)
+        self.beams: list[Beam] = []
+        self.strained: list[Strained] = []
+        self.hung: list[tuple[int, float, Array]] = []  # node, mass, arm in world axes
+        self.driven: list[int] = []
+
+    def beam(
+        self, R: Array, data: Tree, shares: tuple[float, float], h: float, a: int, b: int
+    ) -> None:
+        super().beam(R, data, shares, h, a, b)
+        material = self.m["materials"][data["material"]]
+
+        def values(s: float) -> tuple[float, ...]:
+            share = shares[0] + (shares[1] - shares[0]) * s
+            return section(dimensions(self.m, data["section"], share))
+
+        k, _, T = element(material, values, h, data.get("shear", False))
+        axes = R @ turn(X, data.get("roll", 0.0))
+        dofs = np.r_[a : a + 6, b : b + 6]
+
+        def mass(s: float) -> float:
+            return float(material["density"] * values(s)[0])
+
+        beam = Beam(dofs, axes, axes[:, 0] * h, k, T, mass)
+        self.beams.append(beam)
+        self.strained.append(Strained(dofs, lambda x: beam.local(x)[2], k))
+
+    def add_link(self, name: str) -> None:
+        link = self.m["links"][name]
+        if link.get("type", "beam") == "rigid":
+            center = self.pose.R[name] @ point(link.get("center"))
+            self.hung.append((self.n, link.get("mass", 0.0), center))
+        super().add_link(name)
+
+    def tie(self, follower: int, base: int | None, lever: Array) -> None:
+        first = len(self.rows)
+        super().tie(follower, base, lever)
+        if base is None:
+            return
+        dofs = np.r_[base : base + 6, follower : follower + 6]
+
+        def closure(x: Jet) -> Jet:
+            R = rotated(x[3:6])
+            apart = x[6:9] - x[0:3] - by(R, lever) + lever
+            turn_apart = vector_of(product("ij,kj->ik", rotated(x[9:12]), R))
+            return joined(apart, turn_apart)
+
+        self.strained.append(Strained(dofs, closure, None, slice(first, first + 6)))
+
+    def add_body(self, data: Tree) -> None:
+        super().add_body(data)
+        R = self.pose.R[data["at"].split(".")[0]]
+        at = self.where[data["at"]]
+        self.hung.append((at, data.get("mass", 0.0), R @ point(data.get("offset"))))
+
+    def add_spring(self, data: Tree, planar: bool) -> None:
+        super().add_spring(data, planar)
+        dofs, K = self.K[-1]
+        first, second = data["between"]
+        R = self.pose.R[first.split(".")[0]] @ mount(data)
+        here = self.pose.node(self.tree, first)
+        arm = np.zeros(3) if second == "ground" else self.pose.node(self.tree, second) - here
+        k = np.zeros(6)
+        for key, at in (("translational", 0), ("rotational", 3)):
+            given = data.get(key, 0.0)
+            for n, axis in enumerate(([0, 1] if at == 0 else [2]) if planar else range(3)):
+                k[at + axis] = given[n] if np.ndim(given) else given
+
+        def stretched(x: Jet) -> Jet:
+            turn_1 = rotated(x[3:6])
+            apart = arm - x[0:3] if len(dofs) == 6 else x[6:9] - x[0:3] + arm
+            back = product("ji,j->i", turn_1, apart) - arm
+            twist = -vector_of(turn_1)
+            if len(dofs) == 12:
+                twist = vector_of(product("ji,jk->ik", turn_1, rotated(x[9:12])))
+            return joined(by(R.T, back), by(R.T, twist))
+
+        self.strained.append(Strained(dofs, stretched, np.diag(k)))
+
+    def add_joint(self, name: str) -> int:
+        first, before, ties = len(self.rows), self.n, len(self.strained)
+        free = super().add_joint(name)
+        del self.strained[ties:]
+        joint = self.m["joints"][name]
+        base, follower = base_of(name, joint), joint["follower"]
+        R_b, R_f = (self.pose.R[n.split(".")[0]] for n in (base, follower))
+        driven, _ = split_coordinates(self.tree)
+        unlocked, c0 = [], self.pose.values[name]
+        for k in range(FREEDOMS[joint["type"]]):
+            drive: Any = None
+            if (name, k) in driven:
+                drive = self.tree["coordinates"][driven[name, k]].get("drive", "free")
+            if drive == "locked":
+                continue
+            if drive is not None:
+                self.driven.append(before + len(unlocked))
+            unlocked.append(k)
+        at = [self.where[follower]] + ([self.where[base]] if base in self.where else [])
+        dofs = np.concatenate([np.arange(a, a + 6) for a in at])
+        dofs = np.append(dofs, before + np.arange(len(unlocked)))
+        rider = joint["type"] in ("carriage", "nut")
+        sides = []
+        if rider:
+            sides = [(b, s) for b in self.beams for s in (0.0, 1.0)
+                     if b.dofs[0 if s == 0.0 else 6] == self.where[base]]  # fmt: skip
+            for beam, s in sides:
+                dofs = np.append(dofs, beam.dofs[6:] if s == 0.0 else beam.dofs[:6])
+        x_f, x_b = self.pose.node(self.tree, follower), self.pose.node(self.tree, base)
+        start = 6 * len(at)
+
+        def closure(x: Jet) -> Jet:
+            n = x.v.size
+            pick = np.zeros((len(c0), n))
+            pick[unlocked, start + np.arange(len(unlocked))] = 1.0
+            c = by(pick, x) + c0
+            R, d = moved_joint(joint, c)
+            T_b = rotated(x[9:12]) if len(at) > 1 else rotated(x[0:3] * 0.0)
+            o_b = x[6:9] + x_b if len(at) > 1 else x[0:3] * 0.0
+            if rider:
+                travel = c[0] - c0[0]
+                ends = []
+                for k, (beam, s) in enumerate(sides):
+                    other = x[start + len(unlocked) + 6 * k :][:6]
+                    own = x[6:12]
+                    pair = [own, other] if s == 0.0 else [other, own]
+                    ends.append(beam.at_end(chained(*pair), s))
+                along_beam = mean([e[0] for e in ends])
+                curved = mean([e[1] for e in ends])
+                o_b = o_b + product(",i->i", travel, along_beam)
+                T_b = times(T_b, rotated(product(",i->i", travel, curved)))
+            R_base = times(T_b, R_b)
+            o_f = o_b + by(R_base, d + point(joint.get("position")))
+            apart = x[0:3] + x_f - o_f
+            wanted = times(R_base, R)
+            turn_apart = vector_of(product("ij,kj->ik", times(rotated(x[3:6]), R_f), wanted))
+            return joined(apart, turn_apart)
+
+        self.strained.append(Strained(dofs, closure, None, slice(first, first + 6)))
+        return free
+
+
+def joined(a: Jet, b: Jet) -> Jet:
+    return Jet(*(np.concatenate([getattr(a, k), getattr(b, k)]) for k in "vgh"))
+
+
+chained = joined
+
+
+def mean(parts: Sequence[Jet]) -> Jet:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total * (1.0 / len(parts))
+
+
+@dataclass
+class Weighed:
+    """K, K_g and M on the motions that the joints allow, and where they come from."""
+
+    K: Array
+    K_g: Array
+    M: Array
+    T: Array  # (n, n_motions), over all unknowns
+    builder: WeightBuilder
+    sag: Array
+    n_free: int
+
+    def spectrum(self, count: int, share: float = 1.0) -> Array:
+        """The lowest λ of K + share K_g; negative ones are poses that fall."""
+        return lowest(self.K + share * self.K_g, self.M, count)
+
+
+def lowest(K: Array, M: Array, count: int) -> Array:
+    """The lowest λ of a pencil whose M may be singular; K may be indefinite."""
+    size = np.sqrt(
+        np.abs(np.diag(K)) + np.abs(np.diag(M)) * np.trace(np.abs(K)) / np.trace(M) * 1e-6
+    )
+    K, M = K / np.outer(size, size), M / np.outer(size, size)
+    shift = 0.0
+    for trial in (0.0, *np.geomspace(1e-6, 1e3, 10) * np.trace(np.abs(K)) / np.trace(M)):
+        shift = trial
+        if linalg.eigvalsh(K + shift * M).min() > 1e-13:
+            break
+    mu = np.sort(linalg.eigvalsh(M, K + shift * M))[::-1]
+    return 1.0 / mu[:count] - shift
+
+
+def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed:
+    """The mechanism at q under ``gravity`` in m/s²."""
+    pose = solve_pose(tree, np.atleast_1d(np.asarray(q, float))) if pose is None else pose
+    b, planar = WeightBuilder(tree, pose), tree["mechanism"]["space"] == "planar"
+    g = point(gravity)
+    for name in b.m["links"]:
+        b.add_link(name)
+    for data in b.m.get("bodies", {}).values():
+        b.add_body(data)
+    for data in b.m.get("springs", {}).values():
+        b.add_spring(data, planar)
+    nodes = b.n
+    n_free = sum(b.add_joint(name) for name in b.m["joints"])
+    K, M = b.dense()
+    rows = np.zeros((len(b.rows), b.n))
+    for i, row in enumerate(b.rows):
+        rows[i, list(row)] = list(row.values())
+    out = [6 * k + d for k in range(nodes // 6) for d in (2, 3, 4)] if planar else []
+    keep = np.setdiff1d(np.arange(b.n), out)
+    slope, curve = np.zeros(b.n), np.zeros((b.n, b.n))
+
+    def add(dofs: Array, value: Jet) -> None:
+        slope[dofs] += value.g
+        curve[np.ix_(dofs, dofs)] += value.h
+
+    for node, mass, arm in b.hung:
+        x = unknowns(6)
+        add(np.arange(node, node + 6), dot(x[0:3] + by(rotated(x[3:6]), arm), g * -mass))
+    for beam in b.beams:
+        add(beam.dofs, beam.weight(unknowns(12), g))
+    sag, forces = statics(K, rows, -slope, np.setdiff1d(keep, b.driven))
+    for part in b.strained:
+        strain = part.strain(unknowns(len(part.dofs)))
+        assert np.abs(strain.v).max() < 1e-8
+        if part.stiffness is None:
+            assert np.abs(rows[part.rows][:, part.dofs] - strain.g).max() < 1e-6
+            add(part.dofs, dot(strain, forces[part.rows]))
+        else:
+            add(part.dofs, dot(strain, part.stiffness @ (strain.g @ sag[part.dofs])))
+    for beam in b.beams:
+        x = unknowns(12)
+        pulled = float((beam.k @ (beam.local(x)[2].g @ sag[beam.dofs]))[6])
+        add(beam.dofs, beam.bowing(x, g, pulled))
+    held = np.setdiff1d(keep, b.driven)
+    assert np.abs(slope[held]).max() < 1e-6 * max(np.abs(forces).max(initial=0.0), 1.0)
+    T = np.zeros((b.n, 0))
+    small = null_space(rows[:, keep])
+    T = np.zeros((b.n, small.shape[1]))
+    T[keep] = small
+    return Weighed(T.T @ K @ T, T.T @ curve @ T, T.T @ M @ T, T, b, sag, n_free)
+
+
+def statics(K: Array, rows: Array, f: Array, held: Array) -> tuple[Array, Array]:
+    """Displacements, and multipliers of the rows: K u + rowsᵀ μ = f on the unknowns ``held``."""
+    T = null_space(rows[:, held])
+    A = T.T @ K[np.ix_(held, held)] @ T
+    u = np.zeros(len(f))
+    if A.size:
+        size = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-12 * np.diag(A).max()))
+        scaled = A * np.outer(size, size)
+        u[held] = T @ (size * np.linalg.lstsq(scaled, size * (T.T @ f[held]), rcond=1e-13)[0])
+    left = (f - K @ u)[held]
+    return u, np.linalg.lstsq(rows[:, held].T, left, rcond=1e-12)[0]
