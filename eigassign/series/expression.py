@@ -255,7 +255,8 @@ def parts(x: Scalar) -> list[tuple[int, float]]:
     """The atoms of a scalar and their factors; −1 stands for the number 1."""
     if not isinstance(x, Expression):
         return [(-1, float(x))] if x else []
-    return [(-1, x.constant)] * (x.constant != 0.0) + list(x.terms.items())
+    constant = [(-1, float(x.constant))] if x.constant != 0.0 else []
+    return constant + list(x.terms.items())
 
 
 def atom_of(x: Scalar, atom: int) -> Scalar:
