@@ -17,7 +17,7 @@ import numpy as np
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.node_motion import MotionRows, combined
-from eigassign.mechanism.kinematics.rotations import Objects, multiply, present, skew
+from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply, present, skew
 
 
 def add_arm(target: AffineEntries, turn: MotionRows, force: Objects, arm: Objects) -> None:
@@ -37,9 +37,10 @@ def add_joint(
 ) -> None:
     """Hessian of −F · w₂ − M · ψ₂ of a joint: rows of its base node, six, and of its motions δ.
 
-    ``freedoms`` is A (6, k) in the base's axes.
+    ``freedoms`` is A (6, k) in the base's axes, the wrench what the follower puts on the base node.
     """
-    F, M = wrench[:3], wrench[3:]
+    F = wrench[:3]
+    M = wrench[3:] - cross(lever, F)  # about the follower's node
     add_arm(target, base[3:], F, lever)
     # −F · (θ × t₁) = θᵀ [F]× t₁, with t₁ and ψ₁ = A δ
     add_bilinear(target, multiply(skew(F), freedoms[:3]), base[3:], own)

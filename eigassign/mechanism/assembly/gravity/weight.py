@@ -155,8 +155,6 @@ class _Weight:
     def add_joint(self, edge: JointEdge) -> None:
         """What a joint's follower does to second order, as the file has it."""
         written, wrench = edge.written, self.statics.through[edge.joint]
-        if written.base == GROUND:
-            return
         own = self.motion.tree.of_joint(edge.joint)
         values = [self.parameters.freedom(k) for k in own]
         joint = walked(self.case.mechanism.joints[edge.joint], False, values)
