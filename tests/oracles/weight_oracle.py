@@ -3,11 +3,12 @@
 `spatial_oracle` gives nodes, elements and linear rows. Here every part has its nonlinear geometry,
 with a displacement and a rotation vector for every node in world axes:
 
-* a beam element has a frame that follows its chord and the mean roll of its ends; in it, deflections
-  are cubic (constant shear strain), strains linear with the work ½ ∫ N w'² of the bowing, N varying
-  along the element under its own weight, which hangs on the deflected shape;
-* bodies and rigid links are carried by rotation matrices; joints close with the rotation matrices of
-  their freedoms, which are unknowns; a rider stands on the shape of its beam, mean of both sides;
+* a beam element has a frame that follows its chord and the mean roll of its ends; in it are cubic
+  deflections (constant shear strain) and linear strains, with the work ½ ∫ N w'² of the bowing, N
+  varying along the element under its own weight, which hangs on the deflected shape;
+* bodies and rigid links are carried by rotation matrices; joints close with the rotation matrices
+  of their freedoms, which are unknowns; a rider stands on the shape of its beam, the mean of that
+  on both its sides;
 * springs measure in axes that turn with their first node.
 
 The internal forces n and the multipliers μ of joints are those of linear statics with every
@@ -28,7 +29,6 @@ import numpy as np
 from scipy import linalg
 from spatial_oracle import (
     FREEDOMS,
-    NUMBER,
     Array,
     Builder,
     Pose,
@@ -43,7 +43,6 @@ from spatial_oracle import (
     element,
     mount,
     null_space,
-    place,
     point,
     section,
     solve_pose,
@@ -340,7 +339,7 @@ class WeightBuilder(Builder):
 
     def add_spring(self, data: Tree, planar: bool) -> None:
         super().add_spring(data, planar)
-        dofs, K = self.K[-1]
+        dofs, _ = self.K[-1]
         first, second = data["between"]
         R = self.pose.R[first.split(".")[0]] @ mount(data)
         here = self.pose.node(self.tree, first)
@@ -353,7 +352,7 @@ class WeightBuilder(Builder):
 
         def stretched(x: Jet) -> Jet:
             turn_1 = rotated(x[3:6])
-            apart = arm - x[0:3] if len(dofs) == 6 else x[6:9] - x[0:3] + arm
+            apart = (x[6:9] - x[0:3] if len(dofs) == 12 else -x[0:3]) + arm
             back = product("ji,j->i", turn_1, apart) - arm
             twist = -vector_of(turn_1)
             if len(dofs) == 12:
@@ -457,24 +456,24 @@ class Weighed:
 
 def lowest(K: Array, M: Array, count: int) -> Array:
     """The lowest λ of a pencil whose M may be singular; K may be indefinite."""
-    size = np.sqrt(
-        np.abs(np.diag(K)) + np.abs(np.diag(M)) * np.trace(np.abs(K)) / np.trace(M) * 1e-6
-    )
+    least = np.trace(np.abs(K)) / np.trace(M) * 1e-6
+    size = np.sqrt(np.abs(np.diag(K)) + least * np.abs(np.diag(M)))
     K, M = K / np.outer(size, size), M / np.outer(size, size)
-    shift = 0.0
-    for trial in (0.0, *np.geomspace(1e-6, 1e3, 10) * np.trace(np.abs(K)) / np.trace(M)):
-        shift = trial
+    ratio = np.trace(np.abs(K)) / np.trace(M)
+    for shift in (0.0, *np.geomspace(1e-6, 1e3, 10) * ratio):
         if linalg.eigvalsh(K + shift * M).min() > 1e-13:
             break
-    mu = np.sort(linalg.eigvalsh(M, K + shift * M))[::-1]
-    return 1.0 / mu[:count] - shift
+    for _ in range(2):  # the second time near the modes asked for, which are then most accurate
+        lam = 1.0 / np.sort(linalg.eigvalsh(M, K + shift * M))[::-1][:count] - shift
+        shift = max(shift, float(np.abs(lam).max()))
+    return lam
 
 
 def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed:
     """The mechanism at q under ``gravity`` in m/s²."""
     pose = solve_pose(tree, np.atleast_1d(np.asarray(q, float))) if pose is None else pose
     b, planar = WeightBuilder(tree, pose), tree["mechanism"]["space"] == "planar"
-    g = point(gravity)
+    g = point(np.asarray(gravity).tolist())
     for name in b.m["links"]:
         b.add_link(name)
     for data in b.m.get("bodies", {}).values():
