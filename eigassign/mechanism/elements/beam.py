@@ -167,6 +167,14 @@ def bending_slopes(
     return _shapes(ROTATION, xi, phi, skew)
 
 
+def shares(bent: Shear) -> list[Scalar]:
+    """Factors of the parts of `DEFLECTION`: 1, Φ and Φ r over 1 + Φ, as far as they are not zero."""
+    if _is_zero(bent.phi):
+        return [1.0]
+    whole = (bent.phi + 1.0) ** -1.0
+    return [whole, bent.phi * whole] + ([] if _is_zero(bent.skew) else [bent.skew * whole])
+
+
 def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
     """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
 

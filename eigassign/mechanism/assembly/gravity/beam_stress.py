@@ -29,6 +29,7 @@ from eigassign.mechanism.elements.beam import (
     LEGENDRE,
     ElementTerm,
     Shear,
+    shares,
     stretched_slopes,
 )
 from eigassign.mechanism.kinematics.rotations import Objects, some
@@ -64,11 +65,12 @@ def stress_terms(
     if not planar:
         works += [(forces.moments[end, Y], moment_work(end, Y), 0) for end in (0, 1)]
         works.append((forces.torque, moment_work(1, X) - moment_work(0, X), 0))
-        works += [
-            (p[axis], load_work(axis, degree), 2)
-            for degree, p in enumerate(forces.weight)
-            for axis in (Y, Z)
-        ]
+        for degree, p in enumerate(forces.weight):
+            for axis, each in ((Y, bent[1]), (Z, bent[0])):
+                works += [
+                    (p[axis] * share, load_work(axis, degree, part), 2)
+                    for part, share in enumerate(shares(each))
+                ]
     return terms + [
         ElementTerm(value * h ** float(power - k), matrix)
         for value, matrices, power in works
@@ -93,16 +95,16 @@ def moment_work(end: int, axis: int) -> Floats:
 
 
 @cache
-def load_work(axis: int, degree: int) -> Floats:
+def load_work(axis: int, degree: int, part: int) -> Floats:
     """Hessian of −∫ P_l (ρ × w̄)_axis dx/h²: what goes with 1, 1/h and 1/h², (3, 12, 12).
 
-    (ρ × w̄)_y = −ρ_x w̄_z, (ρ × w̄)_z = ρ_x w̄_y; w̄_y = Σ h S θ̄_z, w̄_z = −Σ h S θ̄_y. The shapes S
-    are those without shear: what shear adds vanishes with the square of h.
+    (ρ × w̄)_y = −ρ_x w̄_z, (ρ × w̄)_z = ρ_x w̄_y; w̄_y = Σ h S θ̄_z, w̄_z = −Σ h S θ̄_y with one part of
+    the shapes S of `bending_shapes`.
     """
     _, turns, rho = _motions()
-    products = [np.convolve(S, LEGENDRE[degree]) for S in DEFLECTION[0][[1, 3]]]
-    shares = [float(p @ (1.0 / np.arange(1.0, len(p) + 1.0))) for p in products]
-    local = sum(share * (own[axis] - rho[axis]) for share, own in zip(shares, turns, strict=True))
+    products = [np.convolve(S, LEGENDRE[degree]) for S in DEFLECTION[part][[1, 3]]]
+    means = [float(p @ (1.0 / np.arange(1.0, len(p) + 1.0))) for p in products]
+    local = sum(mean * (own[axis] - rho[axis]) for mean, own in zip(means, turns, strict=True))
     return np.asarray(-_product(rho[X], np.asarray(local)))
 
 
