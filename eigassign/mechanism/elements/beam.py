@@ -168,7 +168,7 @@ def bending_slopes(
 
 
 def shares(bent: Shear) -> list[Scalar]:
-    """Factors of the parts of `DEFLECTION`: 1, Φ and Φ r over 1 + Φ, as far as they are not zero."""
+    """Factors of the parts of `DEFLECTION`: 1, Φ and Φ r over 1 + Φ, no zeros behind."""
     if _is_zero(bent.phi):
         return [1.0]
     whole = (bent.phi + 1.0) ** -1.0

@@ -6,7 +6,8 @@ base node in its axes, the follower goes
 
     w₂ = θ × (θ × t)/2 + θ × t₁,    ψ = θ × ψ₁/2 + ½ Σ_{i<j} A_i × A_j δ_i δ_j
 
-with A_i, δ_i the axes and motions of its own turns in their order. F, M are what it carries.
+with A_i, δ_i the axes and motions of its own turns in their order. F, M are what it carries. What
+rides on a beam goes δ (u' − θ × e_x) farther and turns by δ θ', the beam's strains where it stands.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import numpy as np
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.node_motion import MotionRows, combined
+from eigassign.mechanism.elements.beam import PLANES, Shear, shares
 from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply, present, skew
+from eigassign.series.expression import Scalar
 
 
 def add_arm(target: AffineEntries, turn: MotionRows, force: Objects, arm: Objects) -> None:
@@ -49,6 +52,26 @@ def add_joint(
         turned = multiply(skew(freedoms[3:, i]), freedoms[3:, j])
         work = multiply(M[None], turned)[0] * -0.5
         add_bilinear(target, np.array([[work]], dtype=object), [own[i]], [own[j]])
+
+
+def end_strains(h: Scalar, bent: tuple[Shear, Shear], end: int) -> Objects:
+    """Strains (6, 12) at the end 0 or 1 of a beam element, of its dofs and in its axes.
+
+    The stretch, two shear angles and the rates of turning, (u' − θ × e_x, θ'); with the symbols of
+    `Shear` −6 h γ = Φ/(1+Φ) (t + r b)ᵀ d and h² κ = bᵀ d + (tᵀ d + 6 h γ) τ, τ = ∓1.
+    """
+    out, over = np.zeros((6, 12), dtype=object), h**-1.0
+    for row in (0, 3):
+        out[row, row], out[row, row + 6] = over * -1.0, over
+    b, t, tau = (0.0, -1.0, 0.0, 1.0), (6.0, 3.0, -6.0, 3.0), (-1.0, 1.0)[end]
+    for (w, theta, sign), each in zip(PLANES, bent, strict=True):
+        _, phi, skew = [*shares(each), 0.0, 0.0][:3]
+        for k, dof in enumerate((w, theta, w + 6, theta + 6)):
+            d = h * sign if k % 2 else 1.0
+            sheared = (phi * t[k] + skew * b[k]) * d  # −6 h γ
+            out[w, dof] = sheared * over * (-1.0 / 6.0)
+            out[theta, dof] = ((b[k] + t[k] * tau) * d - sheared * tau) * over * over * sign
+    return out
 
 
 def add_spring(

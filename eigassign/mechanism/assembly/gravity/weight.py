@@ -1,8 +1,8 @@
-"""All terms of K_g, added to the entries of K: beams, arms and joints under the weight of a pose."""
+"""All terms of K_g, added to the entries of K: beams, arms and joints under weight."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,13 +11,25 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.joints import RIDING
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed, inertia
 from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
-from eigassign.mechanism.assembly.gravity.curvature import add_arm, add_joint, add_spring
+from eigassign.mechanism.assembly.gravity.curvature import (
+    add_arm,
+    add_joint,
+    add_spring,
+    end_strains,
+)
 from eigassign.mechanism.assembly.gravity.statics import Statics, handed, statics
-from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, NodeMotions, apply
+from eigassign.mechanism.assembly.node_motion import (
+    MotionRow,
+    MotionRows,
+    NodeMotions,
+    apply,
+    combined,
+)
 from eigassign.mechanism.assembly.springs import SpringEnds
 from eigassign.mechanism.elements.beam import ElementTerm, element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
@@ -63,7 +75,7 @@ def add_weight(
         few = {p.link: c for p, c in zip(motion.placements, coarse[0], strict=True)}, coarse[1]
     found = statics(case, parameters, motion, local, gravity, few)
     columns = np.setdiff1d(np.arange(len(motion.columns)), motion.rigid)
-    weight = _Weight(K, case, known, motion, nodes, found, set(columns.tolist()))
+    weight = _Weight(K, case, known, motion, local, nodes, found, set(columns.tolist()))
     for name, link in local.items():
         terms = weight.stressed(name)
         if terms:
@@ -105,6 +117,7 @@ class _Weight:
     case: CaseFile
     parameters: ModelParameters  # passive freedoms known
     motion: Kinematics
+    links: Mapping[str, LocalLink]
     nodes: NodeMotions
     statics: Statics
     columns: set[int]  # that are no rigid motions
@@ -165,6 +178,33 @@ class _Weight:
         turned = np.concatenate(np.split(multiply(joint.rotation, freedoms), 2, axis=1))
         rows = [self._own_motion(k) for k in own]
         add_joint(self.K, self.rows(written.base), rows, turned, joint.translation, wrench)
+        if self.case.mechanism.joints[edge.joint].type in RIDING and rows[0]:
+            work = self._strained(written.base, wrench)
+            self.K.add_product(-1.0, list(work.items()), list(rows[0].items()))
+
+    def _strained(self, node: NodeName, wrench: Objects) -> MotionRow:
+        """F · (u' − θ × e_x) + M · θ' at a node within a beam, the mean of both its sides."""
+        name, mesh = node[0], self.nodes.meshes[node[0]]
+        (strand,) = mesh.strands
+        k = next(k for k, slots in enumerate(strand.slots) if slots[0] == mesh.nodes[node[1]][0])
+        turn = np.kron(np.eye(2), strand.axes)
+        work: MotionRow = {}
+        for first, end in ((k - 1, 1), (k, 0)):
+            h = multiply(strand.axes, strand.points[first + 1] - strand.points[first])[0]
+            strains = end_strains(h, strand.shear[first], end)
+            shares = multiply(scaled(multiply(turn, wrench), 0.5)[None], strains)
+            shares = multiply(shares, np.kron(np.eye(2), turn))[0]
+            slots = np.append(strand.slots[first], strand.slots[first + 1]).tolist()
+            for slot, share in zip(slots, shares.tolist(), strict=True):
+                if slot >= 0 and some(share):
+                    work = combined(work, self._local(name, slot), share)
+        return work
+
+    def _local(self, name: str, slot: int) -> MotionRow:
+        """The elastic motion of one dof of a link."""
+        link = self.links[name]
+        own = int(link.own[slot])
+        return {own: 1.0} if own >= 0 else dict(link.carried[slot])
 
     def _own_motion(self, freedom: int) -> MotionRow:
         """The motion of one freedom of a joint, elastic and with the coordinates."""
