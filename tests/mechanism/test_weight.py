@@ -1,0 +1,184 @@
+"""Stiffness under weight: the pencil against a nonlinear potential, and what must always hold."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_cases import built
+from spatial_examples import arm3r, ball_screw, four_bar, gantry, rigid, slotted_lever, straight
+from spatial_oracle import Tree, Z
+from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
+from weight_comparison import agree_under_weight, direction, matrices, pulled, turned_about
+from weight_oracle import weigh
+
+DRAWS = [  # that hold every joint, a frame, rigid links, springs, tapers and shear
+    *EVERY_TREE[:4:3], *EVERY_TREE[4:9], *EVERY_LOOP[:2], *EVERY_LOOP[5:8]
+]  # fmt: skip
+
+
+def drawn(draw: tuple[Any, ...]) -> tuple[Tree, np.ndarray]:
+    if len(draw) == 3:
+        return random_open(*draw)
+    tree, _, q = random_closed(*draw)
+    return tree, q
+
+
+# --- the oracle itself
+
+
+def test_the_oracle_knows_the_pendulum_on_a_free_joint() -> None:
+    """A rigid rod of mass m and inertia J about its middle, hanging: λ = m g (L/2)/(J + m L²/4)."""
+    rod = {"type": "rigid", "length": 0.8, "center": [0.4, 0.0], "mass": 2.0, "inertia": 0.15}
+    tree = one_link(rod, {"type": "revolute", "angle": -np.pi / 2}, "free")
+    found = weigh(tree, [0.0], [0.0, -9.81])
+    expected = 2.0 * 9.81 * 0.4 / (0.15 + 2.0 * 0.4**2)
+    np.testing.assert_allclose(found.spectrum(1), [expected], rtol=1e-12)
+
+
+def test_the_oracle_knows_the_column_that_buckles() -> None:
+    """λ vanishes at the tip load π²EI/4L² of a clamped column."""
+    tree = one_link(straight(2.0, 8), {"type": "fixed", "angle": np.pi / 2}, None)
+    tree["mechanism"]["materials"]["m"]["density"] = 1e-6
+    EI = 200e9 * 0.02 * 0.004**3 / 12
+    tree["mechanism"]["bodies"] = {"load": {"at": "l.end", "mass": 3.0}}
+    critical = np.pi**2 * EI / (4 * 2.0**2)
+    found = weigh(tree, [], [0.0, -critical / 3.0])
+    assert abs(found.spectrum(1)[0]) < 1e-4 * found.spectrum(1, 0.0)[0]
+
+
+def one_link(link: Tree, joint: Tree, drive: Any) -> Tree:
+    tree = copy.deepcopy(four_bar("free"))
+    m = {k: v for k, v in tree["mechanism"].items() if k != "assembly"}
+    m |= {"links": {"l": link}, "joints": {"A": {**joint, "base": "ground", "follower": "l.start"}}}
+    coordinates = {} if drive is None else {"q": {"joint": "A", "drive": drive}}
+    return {"mechanism": m, "coordinates": coordinates}
+
+
+# --- the package
+
+
+@pytest.mark.parametrize("draw", DRAWS, ids=str)
+def test_random_mechanisms_under_weight_are_those_of_the_nonlinear_potential(
+    draw: tuple[Any, ...],
+) -> None:
+    tree, q = drawn(draw)
+    agree_under_weight(tree, q, direction(tree, draw[0]))
+
+
+def lopsided(tree: Tree) -> Tree:
+    tree["mechanism"]["links"]["trolley"] |= {"center": [0.1, -0.3], "inertia": 0.1}
+    return tree
+
+
+def in_space(tree: Tree) -> Tree:
+    """The same in space, where a planar loop has more conditions than freedoms."""
+    m = tree["mechanism"]
+    m["space"] = "spatial"
+    for joint in m["joints"].values():
+        if "position" in joint:
+            joint["position"] = [*joint["position"], 0.0]
+    m["bodies"] = {"knob": {"at": "coupler.end", "mass": 0.6, "offset": [0.05, -0.03, 0.04]}}
+    return tree
+
+
+def reduced(tree: Tree) -> Tree:
+    for link in tree["mechanism"]["links"].values():
+        link["reduce_to"] = 1e6
+    return tree
+
+
+KNOWN: dict[str, tuple[Callable[[], Tree], list[float]]] = {
+    "a portal with a lopsided trolley": (lambda: lopsided(gantry("free")), [0.5]),
+    "a block on a lever": (lambda: slotted_lever("free"), [0.2]),
+    "a ball screw": (lambda: ball_screw([0.3, 0.5, -0.4]), [0.37]),
+    "an arm": (lambda: arm3r("free"), [0.4, 0.8, -0.9]),
+    "a four-bar with rigid links": (lambda: rigid(four_bar("free"), "crank", "coupler"), [1.0]),
+    "a redundant four-bar in space": (lambda: in_space(four_bar({"stiffness": 300.0})), [1.0]),
+    "reduced links": (lambda: reduced(four_bar("free")), [1.0]),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_mechanisms_under_weight_are_those_of_the_nonlinear_potential(name: str) -> None:
+    make, q = KNOWN[name]
+    tree = make()
+    agree_under_weight(tree, q, direction(tree, 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_many_random_trees_under_weight(space: str, seed: int) -> None:
+    tree, q = random_open(1000 + seed, space, seed % 2 == 1)
+    agree_under_weight(tree, q, direction(tree, seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_many_random_loops_under_weight(space: str, seed: int) -> None:
+    tree, q, _ = random_closed(seed, space, 1 + (seed % 5 == 4), seed % 2 == 1)
+    agree_under_weight(tree, q, direction(tree, seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_random_loops_of_rigid_links_under_weight(space: str, seed: int) -> None:
+    tree, q, _ = random_closed(seed, space, 1 + seed % 3 // 2, seed % 2 == 0, ("rigid",))
+    agree_under_weight(tree, q, direction(tree, seed))
+
+
+# --- what must always hold
+
+
+@pytest.mark.parametrize("draw", DRAWS[-6::3], ids=str)
+def test_what_weight_adds_is_linear_in_gravity(draw: tuple[Any, ...]) -> None:
+    tree, q = drawn(draw)
+    g, other = (50.0 * direction(tree, seed) for seed in (1, 2))
+    plain = matrices(built(tree), q)[0]
+    a, b, both = (matrices(pulled(tree, v), q)[0] - plain for v in (g, other, 2.0 * g - other))
+    size = np.abs(plain).max()
+    np.testing.assert_allclose(both, 2.0 * a - b, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize("draw", [d for d in DRAWS if d[1] == "spatial"][::4], ids=str)
+def test_the_way_a_mechanism_faces_does_not_matter(draw: tuple[Any, ...]) -> None:
+    tree, q = drawn(draw)
+    g = [0.0, 0.0, -50.0]
+    here, there = (matrices(pulled(t, g), q)[0] for t in (tree, turned_about(tree, Z, 0.8)))
+    np.testing.assert_allclose(there, here, atol=1e-11 * np.abs(here).max())
+
+
+@pytest.mark.parametrize("name", ["a portal with a lopsided trolley", "an arm"])
+def test_slopes_along_the_coordinates_are_those_of_differences(name: str) -> None:
+    make, q = KNOWN[name]
+    tree, h = make(), 1e-5
+    weights = direction(tree, 3) * 1e3
+    model, plain = pulled(tree, weights), built(tree)
+    along = np.arange(len(q))
+    for k in along:
+        step = h * np.eye(len(q))[k]
+        ends = [
+            matrices(model, q + s * step)[0] - matrices(plain, q + s * step)[0] for s in (-1, 1)
+        ]
+        slopes = [
+            m.pencil.stiffness_matrices(m.pencil.theta_slopes(m.x(q), along)[k])[0]
+            for m in (model, plain)
+        ]
+        expected = (ends[1] - ends[0]) / (2 * h)
+        found = slopes[0] - slopes[1]
+        np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_a_free_turn_about_the_vertical_stays_rigid_and_all_others_swing() -> None:
+    tree = arm3r("free")
+    model = pulled(tree, [0.0, 0.0, -9.81])
+    assert len(model.pencil.rigid) == 1
+    assert len(pulled(tree, [0.0, -9.81, 0.0]).pencil.rigid) == 0
+    K_g = weigh(copy.deepcopy(tree), [0.4, 0.8, -0.9], [0.0, 0.0, -9.81]).K_g
+    assert np.sum(np.abs(np.linalg.eigvalsh(K_g)) > 1e-9 * np.abs(K_g).max()) < len(K_g)

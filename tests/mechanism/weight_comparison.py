@@ -1,0 +1,74 @@
+"""The pencil of a mechanism under weight against the nonlinear potential of the plain frame.
+
+Gravity is taken so strong that it changes the lowest modes by a fifth: K_g is linear in it, and its
+errors stand out of the round-off of K. Each λ agrees to 1e-6 of what gravity changes, beside 2e-8
+of itself, which is the round-off of `frame_comparison`.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+from scipy.spatial.transform import Rotation
+from spatial_cases import Built, built
+from spatial_oracle import Tree, mount, point, turn
+from weight_oracle import Weighed, lowest, weigh
+
+COUNT = 6
+
+
+def direction(tree: Tree, seed: int) -> np.ndarray:
+    """Some direction of gravity."""
+    g = np.random.default_rng(seed).normal(size=2 if tree["mechanism"]["space"] == "planar" else 3)
+    return np.asarray(g / np.linalg.norm(g))
+
+
+def pulled(tree: Tree, gravity: Any) -> Built:
+    """The mechanism under gravity."""
+    out = copy.deepcopy(tree)
+    out["mechanism"]["gravity"] = np.asarray(gravity).tolist()
+    return built(out)
+
+
+def matrices(model: Built, q: Any) -> np.ndarray:
+    """K and M (2, n_dof, n_dof) at one q."""
+    return np.asarray(model.pencil.matrices(model.pencil.theta(model.x(q)))[:, 0])
+
+
+def strong(found: Weighed) -> float:
+    """How many times the gravity changes the lowest elastic modes by a fifth at most."""
+    n, M = found.n_free, found.M + 1e-12 * np.trace(found.M) / len(found.M) * np.eye(len(found.M))
+    lam, modes = linalg.eigh(found.K, M, subset_by_index=[0, min(n + 3, len(M) - 1)])
+    if len(lam) == n:
+        return 10.0
+    change = modes[:, n:].T @ found.K_g @ modes[:, n:]
+    size = np.abs(change / np.sqrt(np.outer(lam[n:], lam[n:]))).max()
+    return float(min(0.2 / max(size, 1e-9), 1e5))
+
+
+def agree_under_weight(tree: Tree, q: Any, g: np.ndarray) -> None:
+    """The change of the lowest λ by gravity along g is that of the oracle, and K_g symmetric."""
+    found = weigh(tree, q, g)
+    share = strong(found)
+    K, M = matrices(pulled(tree, share * g), q)
+    assert len(K) == len(found.K)
+    count = min(COUNT, len(K))
+    expected, plain = found.spectrum(count, share), found.spectrum(count, 0.0)
+    change = np.abs(expected - plain).max()
+    missed = np.abs(lowest(K, M, count) - expected)
+    assert (missed <= 1e-6 * change + 2e-8 * np.abs(expected)).all()
+    assert np.abs(K - K.T).max() <= 1e-14 * np.abs(K).max()
+
+
+def turned_about(tree: Tree, axis: np.ndarray, angle: float) -> Tree:
+    """The whole mechanism turned in the world with all that joins it to the ground."""
+    out, R = copy.deepcopy(tree), turn(axis, angle)
+    for joint in out["mechanism"]["joints"].values():
+        if joint["base"] == "ground":
+            joint["orientation"] = Rotation.from_matrix(R @ mount(joint)).as_euler("xyz").tolist()
+            joint.pop("angle", None)
+            joint["position"] = (R @ point(joint.get("position"))).tolist()
+    return out
