@@ -182,3 +182,37 @@ def test_a_free_turn_about_the_vertical_stays_rigid_and_all_others_swing() -> No
     assert len(pulled(tree, [0.0, -9.81, 0.0]).pencil.rigid) == 0
     K_g = weigh(copy.deepcopy(tree), [0.4, 0.8, -0.9], [0.0, 0.0, -9.81]).K_g
     assert np.sum(np.abs(np.linalg.eigvalsh(K_g)) > 1e-9 * np.abs(K_g).max()) < len(K_g)
+
+
+def cross_slides(tree: Tree, *axes: list[float]) -> Tree:
+    """A mass on free slides along these axes, one on the other."""
+    m = tree["mechanism"]
+    m["links"], m["joints"], below = {}, {}, "ground"
+    for k, axis in enumerate(axes):
+        m["links"][f"l{k}"] = {"type": "rigid", "mass": 1.0, "inertia": 0.1, "length": 0.1}
+        m["joints"][f"s{k}"] = {
+            "type": "prismatic", "base": below, "follower": f"l{k}.start", "axis": axis
+        }  # fmt: skip
+        below = f"l{k}.end"
+    m.pop("assembly", None)
+    m["links"]["tip"] = straight(0.3, 2)
+    m["joints"]["tip"] = {"type": "fixed", "base": below, "follower": "tip.start"}
+    tree["coordinates"] = {f"q{k}": {"joint": f"s{k}", "drive": "free"} for k in range(len(axes))}
+    return tree
+
+
+def test_slides_that_together_keep_the_height_leave_one_rigid_motion() -> None:
+    tree = cross_slides(copy.deepcopy(four_bar("free")), [1.0, 1.0], [1.0, -1.0])
+    model = pulled(tree, [0.0, -9.81])
+    assert len(model.pencil.rigid) == 1
+    assert len(built(tree).pencil.rigid) == 2
+    level = cross_slides(copy.deepcopy(four_bar("free")), [1.0, 0.0])
+    assert len(pulled(level, [0.0, -9.81]).pencil.rigid) == 1
+    agree_under_weight(tree, [0.1, 0.2], np.array([0.0, -1.0]))
+
+
+@pytest.mark.parametrize("draw", [(25, "planar", 1, True), (12, "spatial", 1, False)], ids=str)
+def test_loops_that_do_not_reach_far_are_asked_near_their_pose(draw: tuple[Any, ...]) -> None:
+    """Whether a free coordinate swings is told at random poses, of which some may not close."""
+    tree, q = drawn(draw)
+    assert np.isfinite(matrices(pulled(tree, direction(tree, 2)), q)).all()

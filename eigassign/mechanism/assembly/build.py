@@ -13,10 +13,10 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.gravity.statics import hangs_on_stiffness
-from eigassign.mechanism.assembly.gravity.weight import add_weight, swinging
+from eigassign.mechanism.assembly.gravity.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.assembly.rigid_body_modes import separated
+from eigassign.mechanism.assembly.rigid_body_modes import separated, swinging
 from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
@@ -28,7 +28,7 @@ from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, refer
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.parameters import parameters as variables
 from eigassign.mechanism.kinematics.property_limits import property_limits
-from eigassign.mechanism.kinematics.rotations import DOFS
+from eigassign.mechanism.kinematics.rotations import DOFS, Floats
 from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
 from eigassign.series.compiler import compile_program
@@ -46,8 +46,20 @@ def erls_motion(case: CaseFile, parameters: ModelParameters) -> Kinematics:
     moves = [c.moves for c in case.coordinates.values()]
     free = tuple(k for k, i in enumerate(motion.columns) if moves[i] == "free")
     if free and getattr(case.mechanism, "springs", None):
-        return separated(case, parameters, motion, free)
-    return replace(motion, rigid=free)
+        motion = separated(case, parameters, motion, free)
+    else:
+        motion = replace(motion, rigid=free)
+    g = gravity(case)
+    if g is None or not free:
+        return motion
+    meshes = _meshes(in_few_elements(case), parameters, motion)
+    return swinging(case, parameters, motion, [_unjoined(meshes, p) for p in motion.placements], g)
+
+
+def gravity(case: CaseFile) -> Floats | None:
+    """g (3,) in m/s², where it counts."""
+    given = case.mechanism.gravity
+    return np.array([*given, 0.0][:3]) if isinstance(given, tuple) else None
 
 
 def build_pencil(
@@ -61,9 +73,8 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    if isinstance(case.mechanism.gravity, tuple):
-        g = np.array([*case.mechanism.gravity, 0.0][:3])
-        motion = swinging(case, parameters, motion, links, g)
+    g = gravity(case)
+    if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
             coarse = local_links(in_few_elements(case), parameters, motion)
@@ -181,6 +192,14 @@ def local_links(
     else:
         nodes.number_passive(motion.tree.passive)
     return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
+
+
+def _unjoined(meshes: Mapping[str, LinkMesh], placement: Placement) -> LocalLink:
+    """A link's matrices alone, none of its nodes joined to others."""
+    mesh = meshes[placement.link]
+    own = np.arange(mesh.n_local)
+    twist = placement.twist[: mesh.rigid[0].matrix.shape[1]]
+    return LocalLink(mesh.stiffness, mesh.mass, mesh.rigid, twist, own, {})
 
 
 def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> LocalLink:

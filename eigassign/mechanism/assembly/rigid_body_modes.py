@@ -4,6 +4,9 @@ A spring's rows r(q, y) over the rates of the free coordinates are its ends' rel
 nothing deforms. Motions W with r W = 0 at every q and y strain nothing, whatever the stiffnesses.
 The columns of eq. (1) are changed to them: in the column of one coordinate of each the others move
 along, so that rigid motions are columns again and are projected out exactly.
+
+Under gravity those stay rigid on which the weight works in no pose, such as a turn about the
+vertical: there r is the work of the weight per rate, Σ_links Tᵀ J (g, 0).
 """
 
 from __future__ import annotations
@@ -16,12 +19,13 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
+from eigassign.mechanism.assembly.congruence import LocalLink, inertia
 from eigassign.mechanism.assembly.node_motion import MotionRows
 from eigassign.mechanism.assembly.springs import SpringEnds, resists
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import multiply
+from eigassign.mechanism.kinematics.rotations import DOFS, multiply
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
 
@@ -42,6 +46,47 @@ def separated(
     found = _Resistance(case, motion, free, *_rows(case, parameters, motion, free))
     W, pivots = found.unresisted()
     found.require_lasting(W.shape[1])
+    return _recombined(motion, free, W, pivots)
+
+
+def swinging(
+    case: CaseFile,
+    parameters: ModelParameters,
+    motion: Kinematics,
+    links: Sequence[LocalLink],
+    gravity: Floats,
+) -> Kinematics:
+    """The motion, of whose rigid motions those are left on which the weight works in no pose.
+
+    ``links`` are those of the placements, with their masses; gravity g (3,) is in m/s².
+    """
+    if not motion.rigid:
+        return motion
+    free, kept = list(motion.rigid), list(DOFS[case.mechanism.space])
+    parts = []
+    for placement, link in zip(motion.placements, links, strict=True):
+        pull = np.zeros(6, dtype=object)
+        pull[:3] = multiply(placement.world_rotation.T, gravity)
+        twist = placement.twist[kept][:, free]
+        parts.append(np.concatenate([twist, pull[kept][:, None], inertia(link)], axis=1))
+    table = parameters.with_passive(motion.passive).compiled(np.array(parts))
+    values = _at_poses(table, reference(case, parameters), _spans(case, parameters))
+    T, g, J = np.split(values, [len(free), len(free) + 1], axis=-1)
+    work = np.einsum("slik,slij,sljo->sk", T, J, g)
+    # |work| ≤ |g| √m √(Tᵀ J T) of every link: beside these sums round-off is none
+    energy = np.einsum("slik,slij,sljk->slk", T, J, T)
+    weight = np.einsum("slio,slij,sljo->slo", g, J, g)
+    size = np.sqrt(np.maximum(energy * weight, 0.0)).sum(axis=1).max(axis=0)
+    work[:, np.abs(work).max(axis=0) <= RESISTED * size] = 0.0
+    size[size == 0.0] = 1.0
+    W = _null_space(work / size)  # rad against m
+    return _recombined(motion, free, *_echelon(W / size[:, None]))
+
+
+def _recombined(
+    motion: Kinematics, free: Sequence[int], W: Floats, pivots: Sequence[int]
+) -> Kinematics:
+    """The motion with W (n_free, n_rigid) as its rigid columns, in place of those of the pivots."""
     change = np.eye(len(motion.columns))
     change[np.ix_(free, [free[k] for k in pivots])] = W
     rigid = tuple(sorted(free[k] for k in pivots))
@@ -53,6 +98,13 @@ def separated(
     if passive is not None:
         passive = multiply(passive, change)
     return replace(motion, placements=moved, coordinates=rates, rigid=rigid, passive_rates=passive)
+
+
+def _spans(case: CaseFile, parameters: ModelParameters) -> Floats:
+    """How far z may be varied: a rad or m, and half of the range of a property."""
+    n = len(parameters.coordinates)
+    half = [0.5 * (high - low) for low, high in case.ranges.values()]
+    return np.append(np.ones(n), parameters.to_z[n:, n:] @ half)
 
 
 def _rows(
@@ -68,12 +120,9 @@ def _rows(
     known = parameters.with_passive(motion.passive)
     springs = list(SpringEnds(case, known, motion, stiff, 0).all())
     entries = [[[row.get(k, 0.0) for k in free] for row in pair] for _, *pair in springs]
-    z = reference(case, parameters)
     table = parameters.compiled(np.array(entries, dtype=object))
-    n = len(parameters.coordinates)
-    half = [0.5 * (high - low) for low, high in case.ranges.values()]
-    span = np.append(np.ones(n), parameters.to_z[n:, n:] @ half)  # rad or m; half of a property's
-    values = np.moveaxis(_at_poses(table, z, span), 0, -1)
+    at_poses = _at_poses(table, reference(case, parameters), _spans(case, parameters))
+    values = np.moveaxis(at_poses, 0, -1)
     ends = values.reshape(-1, 3, *values.shape[1:])  # three axes of v or ω together
     size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]
     apart = ends[:, :, 1] - ends[:, :, 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
-from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed, inertia
+from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed
 from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
 from eigassign.mechanism.assembly.gravity.curvature import (
     add_arm,
@@ -34,7 +34,7 @@ from eigassign.mechanism.assembly.springs import SpringEnds
 from eigassign.mechanism.elements.beam import ElementTerm, element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walked
-from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
+from eigassign.mechanism.kinematics.loop_closure import passive_motion
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.rotations import (
     DOFS,
@@ -84,29 +84,6 @@ def add_weight(
     for edge in (*motion.tree.edges, *motion.tree.loops):
         weight.add_joint(edge)
     weight.add_springs()
-
-
-def swinging(
-    case: CaseFile,
-    parameters: ModelParameters,
-    motion: Kinematics,
-    links: Sequence[LocalLink],
-    gravity: Floats,
-) -> Kinematics:
-    """The motion, of whose rigid columns those stay on which the weight works in no pose."""
-    if not motion.rigid:
-        return motion
-    g = {p.link: multiply(p.world_rotation.T, gravity) for p in motion.placements}
-    kept, work = list(DOFS[case.mechanism.space]), np.zeros(len(motion.columns), dtype=object)
-    for placement, link in zip(motion.placements, links, strict=True):
-        pull = np.concatenate([g[placement.link], np.zeros(3, dtype=object)])[kept]
-        work = work + multiply(placement.twist[kept].T, multiply(inertia(link), pull))
-    table = parameters.compiled(work[list(motion.rigid)])
-    z = reference(case, parameters)[:, None]
-    spread = np.random.default_rng(0).uniform(-0.4, 0.4, (len(z), 6))
-    values = table(z + spread * np.maximum(np.abs(z), 1.0))[0]
-    still = np.abs(values).max(axis=0) < 1e-9
-    return replace(motion, rigid=tuple(np.array(motion.rigid)[still].tolist()))
 
 
 @dataclass(frozen=True, eq=False)
