@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import built
+from imported_parts import arm, beam_arm, exported, part, write
+from spatial_cases import ALLOY, built
 from spatial_examples import arm3r, ball_screw, four_bar, gantry, rigid, slotted_lever, straight
 from spatial_oracle import Tree, Z
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 from weight_comparison import agree_under_weight, direction, matrices, pulled, turned_about
-from weight_oracle import weigh
+from weight_oracle import lowest, weigh
 
 DRAWS = [  # that hold every joint, a frame, rigid links, springs, tapers and shear
     *EVERY_TREE[:4:3], *EVERY_TREE[4:9], *EVERY_LOOP[:2], *EVERY_LOOP[5:8]
@@ -216,3 +218,34 @@ def test_loops_that_do_not_reach_far_are_asked_near_their_pose(draw: tuple[Any, 
     """Whether a free coordinate swings is told at random poses, of which some may not close."""
     tree, q = drawn(draw)
     assert np.isfinite(matrices(pulled(tree, direction(tree, 2)), q)).all()
+
+
+# --- parts known by their matrices
+
+
+@pytest.mark.parametrize("sprung", [False, True])
+@pytest.mark.parametrize("more", [{}, {"reduce_to": 1e5}], ids=["whole", "reduced"])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_a_stiff_imported_part_is_the_beam_it_was_exported_from(
+    tmp_path: Path, space: str, more: Tree, sprung: bool
+) -> None:
+    """A strut between its nodes has all but the bending of the part under its own forces."""
+    stiff = {**ALLOY, **{key: 1e4 * ALLOY[key] for key in ("youngs_modulus", "shear_modulus")}}
+    K, M = exported(space)
+    imported = part(space, write(tmp_path, "npy", 1e4 * K, M), **more)
+    trees = copy.deepcopy((beam_arm(space), arm(space, {"part": imported})))
+    offset = [0.05, 0.1, -0.07][: 2 if space == "planar" else 3]
+    changes = []
+    for tree in trees:
+        m = tree["mechanism"]
+        m["materials"]["n"] = stiff
+        m["bodies"]["tip"]["offset"] = offset
+        if "material" in m["links"]["part"]:
+            m["links"]["part"]["material"] = "n"
+        if sprung:
+            m["springs"] = {"s": {"between": ["part.end", "ground"], "translational": 3e4}}
+        plain = matrices(built(tree, tmp_path / "case.yaml"), [0.4, 0.9])
+        m["gravity"] = (20.0 * direction(tree, 1)).tolist()
+        weighed = matrices(built(tree, tmp_path / "case.yaml"), [0.4, 0.9])
+        changes.append(lowest(*weighed, 3) - lowest(*plain, 3))
+    np.testing.assert_allclose(changes[1], changes[0], rtol=1e-3)

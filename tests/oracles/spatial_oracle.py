@@ -347,12 +347,19 @@ def bending(s: float, h: float) -> list[tuple[list[int], Array, Array, Array]]:
 
 def element(
     material: Tree, values: Callable[[float], tuple[float, ...]], h: float, sheared: bool
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """(12, 12) stiffness and mass in the element's axes, by Gauss quadrature.
 
     ``values`` are those of `section` at a share of the element. The shear strain is constant: an
-    inner unknown of its own, eliminated statically by the third, (14, 12).
+    inner unknown of its own, eliminated statically.
     """
+    return shaped_element(material, values, h, sheared)[:2]
+
+
+def shaped_element(
+    material: Tree, values: Callable[[float], tuple[float, ...]], h: float, sheared: bool
+) -> tuple[Array, Array, Array]:
+    """The same, and the shear strains behind the twelve dofs, (14, 12), see `bending`."""
     E, rho = material["youngs_modulus"], material["density"]
     G = material.get("shear_modulus", E / (2 + 2 * material.get("poissons_ratio", 0.3)))
     k, m = np.zeros((14, 14)), np.zeros((14, 14))  # two shear strains behind the twelve
@@ -492,7 +499,7 @@ class Builder:
 
         R = R @ turn(X, data.get("roll", 0.0))
         material = self.m["materials"][data["material"]]
-        k, m, _ = element(material, values, h, data.get("shear", False))
+        k, m = element(material, values, h, data.get("shear", False))
         T = np.kron(np.eye(4), R.T)
         dofs = np.r_[a : a + 6, b : b + 6]
         self.K.append((dofs, T.T @ k @ T))

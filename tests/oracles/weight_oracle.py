@@ -40,11 +40,11 @@ from spatial_oracle import (
     bending,
     cross,
     dimensions,
-    element,
     mount,
     null_space,
     point,
     section,
+    shaped_element,
     solve_pose,
     split_coordinates,
     turn,
@@ -298,7 +298,7 @@ class WeightBuilder(Builder):
             share = shares[0] + (shares[1] - shares[0]) * s
             return section(dimensions(self.m, data["section"], share))
 
-        k, _, T = element(material, values, h, data.get("shear", False))
+        k, _, T = shaped_element(material, values, h, data.get("shear", False))
         axes = R @ turn(X, data.get("roll", 0.0))
         dofs = np.r_[a : a + 6, b : b + 6]
 

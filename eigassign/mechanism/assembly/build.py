@@ -94,10 +94,15 @@ def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> C
 
 
 def in_few_elements(case: CaseFile) -> CaseFile:
-    """The case with one element for each beam whose section does not vary, and no link reduced."""
+    """The case with one element for each beam whose section does not vary, beams and frames whole.
+
+    Superelements are left their interface: no part has a mode as low as the frequency named here.
+    """
 
     def few(part: Any) -> Any:
-        update = {"reduce_to": None} if getattr(part, "reduce_to", None) is not None else {}
+        update: dict[str, Any] = {}
+        if hasattr(part, "reduce_to"):
+            update["reduce_to"] = 1e-9 if part.type == "superelement" else None
         if hasattr(part, "elements") and isinstance(part.section, str):
             update["elements"] = 1
         if hasattr(part, "beams"):

@@ -4,6 +4,7 @@ The drives hold the pose; n are the internal forces that the weight causes there
 order; each imports only from those above it:
 
     beam_stress  k_σ of a beam element from its end forces and its own weight
+    imported     k_σ of a part that is known by its matrices alone
     statics      the wrenches through the joints, explicit for trees, one small solve for loops
     curvature    levers and joints: where displacements are of second order in the motion
     weight       all terms, added to the entries of K

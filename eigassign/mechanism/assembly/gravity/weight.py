@@ -12,7 +12,6 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
-from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed
 from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
@@ -22,6 +21,7 @@ from eigassign.mechanism.assembly.gravity.curvature import (
     add_spring,
     end_strains,
 )
+from eigassign.mechanism.assembly.gravity.imported import strut_terms
 from eigassign.mechanism.assembly.gravity.statics import Statics, handed, statics
 from eigassign.mechanism.assembly.node_motion import (
     MotionRow,
@@ -224,8 +224,8 @@ class _Weight:
             case "frame":
                 terms = self._frame(name, whole)
             case _:
-                message = "has inner forces under gravity that are not modelled yet"
-                raise MechanismError(f"mechanism.links.{name}", message)
+                acting, g = self._on_nodes(name), self.statics.g[name]
+                return strut_terms(mesh, acting, g, self.nodes.space)
         if mesh.reduction is None:
             return terms
         T = mesh.reduction.basis

@@ -1,0 +1,103 @@
+"""Geometric stiffness of a part that is known by its matrices alone: a strut between its nodes.
+
+Its strains are those of the displacements v against a frame that turns by φ, the rotation that fits
+the motion of the nodes best (about a line that they all lie on, their mean turn). To second order
+the wrenches (F, M) on its nodes at X and its own weight, M r g on all its dofs, do the work
+
+    Σ [F · (−φ × v + φ × (φ × X)/2) − M · (φ × θ)/2] + vᵀ M r (φ × g) + m g · (φ × (φ × c))/2,
+
+r its translations and c its centre of mass. What bends between the nodes under the forces inside
+is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+
+from eigassign.mechanism.elements.mesh import LinkMesh, Term
+from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, some
+from eigassign.series.expression import Scalar
+
+ON_A_LINE = 1e-6  # of the nodes' second moment, about an axis that they do not turn about
+AXES = np.eye(3)
+# (a × b)_k = Σ CROSSED_kij a_i b_j
+CROSSED = np.cross(AXES[:, None], AXES[None]).transpose(2, 0, 1)
+
+
+def strut_terms(
+    mesh: LinkMesh, wrenches: Sequence[tuple[str, Objects]], g: Objects, space: str
+) -> list[Term]:
+    """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes and g, m/s²."""
+    moved = {name: _motion(mesh, name) for name in mesh.nodes}
+    kept = [d - 3 for d in DOFS[space] if d >= 3]
+    phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)
+    Mr, first = _momentum(mesh, space)
+    out: list[Term] = []
+
+    def add(coefficient: Scalar, matrix: Floats) -> None:
+        if some(coefficient) and matrix.any():
+            out.append(Term(coefficient, sparse.csr_array(matrix + matrix.T)))
+
+    for name, wrench in wrenches:
+        v, theta = moved[name][:3], moved[name][3:]
+        X = mesh.positions[name].astype(float)
+        for axis in range(3):
+            lever = _turned_twice(phi, X, axis) - _mixed(axis, phi, v)
+            add(wrench[axis], lever)
+            add(wrench[3 + axis], -0.5 * _mixed(axis, phi, theta))
+    for axis in range(3):
+        turned = sum(np.outer(Mr[k], CROSSED[k, :, axis] @ phi) for k in range(3))
+        add(g[axis], np.asarray(turned) + _turned_twice(phi, first, axis))
+    return out
+
+
+def _mixed(axis: int, a: Floats, b: Floats) -> Floats:
+    """(a × b)_axis of two rows of forms (3, n), as (n, n)."""
+    return np.asarray(a.T @ CROSSED[axis] @ b)
+
+
+def _turned_twice(phi: Floats, X: Floats, axis: int) -> Floats:
+    """(φ × (φ × X))_axis/2 = (φ_axis X·φ − X_axis φ·φ)/2."""
+    return 0.5 * (np.outer(phi[axis], X @ phi) - X[axis] * (phi.T @ phi))
+
+
+def _motion(mesh: LinkMesh, name: str) -> Floats:
+    """The motion (6, n_local) of a node."""
+    out = np.zeros((6, mesh.n_local))
+    for axis, slot in enumerate(mesh.nodes[name].tolist()):
+        if slot >= 0:
+            out[axis, slot] = 1.0
+    return out
+
+
+def _rotation(nodes: Sequence[tuple[Floats, Floats]], kept: Sequence[int]) -> Floats:
+    """φ (3, n_local): least squares of the displacements, about a line the mean of the turns."""
+    places, motions = np.array([X for X, _ in nodes]), np.array([v for _, v in nodes])
+    arms = places - places.mean(axis=0)
+    moment = sum((arm @ arm) * AXES - np.outer(arm, arm) for arm in arms)
+    values, axes = np.linalg.eigh(np.asarray(moment)[np.ix_(kept, kept)])
+    whole = AXES[kept].T @ axes
+    swept = np.einsum("kij,ai,ajn->kn", CROSSED, arms, motions[:, :3])
+    turns = motions[:, 3:].mean(axis=0)
+    far = values > ON_A_LINE * max(values.max(initial=0.0), np.square(places).max(initial=0.0))
+    each = [
+        axis @ swept / value if seen else axis @ turns
+        for axis, value, seen in zip(whole.T, values, far, strict=True)
+    ]
+    return np.asarray(whole @ np.array(each))
+
+
+def _momentum(mesh: LinkMesh, space: str) -> tuple[Floats, Floats]:
+    """(M r)ᵀ (3, n_local) of the part's own mass, and its first moment m c (3,)."""
+    whole = mesh if mesh.reduction is None else mesh.reduction.mesh
+    kept = list(DOFS[space])
+    N = np.zeros((whole.n_local, 6))
+    N[:, kept] = sum(term.matrix.toarray() for term in whole.rigid)
+    Mr = np.asarray(whole.mass[0].matrix @ N[:, :3])
+    B = N[:, 3:].T @ Mr  # θ · (m c × a)
+    if mesh.reduction is not None:
+        Mr = mesh.reduction.basis.T @ Mr
+    return Mr.T, np.array([B[2, 1], -B[2, 0], -B[0, 1]])
