@@ -213,6 +213,13 @@ def test_slides_that_together_keep_the_height_leave_one_rigid_motion() -> None:
     agree_under_weight(tree, [0.1, 0.2], np.array([0.0, -1.0]))
 
 
+@pytest.mark.parametrize("place", [0.5, 0.8])
+def test_a_free_trolley_on_a_level_girder_is_rigid_but_bends_it_where_it_goes(place: float) -> None:
+    tree = lopsided(gantry("free"))
+    assert len(pulled(tree, [0.0, -9.81]).pencil.rigid) == 1
+    agree_under_weight(tree, [place], np.array([0.0, -1.0]))
+
+
 @pytest.mark.parametrize("draw", [(25, "planar", 1, True), (12, "spatial", 1, False)], ids=str)
 def test_loops_that_do_not_reach_far_are_asked_near_their_pose(draw: tuple[Any, ...]) -> None:
     """Whether a free coordinate swings is told at random poses, of which some may not close."""

@@ -9,7 +9,8 @@ Read in this order; each imports only from those above it:
     node_motion       Q: the elastic motion of every node from the independent unknowns u
     rigid_loops       loops between rigid links: passive joints follow elastically
     springs           springs between nodes
-    rigid_body_modes  free motions that no spring resists, made columns of their own
+    rigid_body_modes  free motions that no spring or weight resists, made columns of their own
+    gravity           the stiffness that the weight adds in a pose
     total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]

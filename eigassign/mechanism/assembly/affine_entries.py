@@ -109,6 +109,12 @@ def _spread(blocks: Sequence[Block]) -> tuple[Any, ...]:
     return np.concatenate(rows), column, np.repeat(atoms, sizes), value
 
 
+def joined(first: Entries, second: Entries) -> Entries:
+    """The entries of the sum of two matrices."""
+    i, j, atom, value = (np.concatenate(own) for own in zip(first, second, strict=True))
+    return i, j, atom, value
+
+
 def pattern(
     entries: Sequence[Entries], n_dof: int, n_theta: int
 ) -> tuple[Ints, Ints, list[sparse.csr_array]]:

@@ -10,13 +10,13 @@ import numpy as np
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
+from eigassign.mechanism.assembly.affine_entries import AffineEntries, Entries, joined, pattern
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.gravity.statics import hangs_on_stiffness
 from eigassign.mechanism.assembly.gravity.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.assembly.rigid_body_modes import separated, swinging
+from eigassign.mechanism.assembly.rigid_body_modes import separated, swinging, uncoupled
 from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
@@ -73,14 +73,19 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    g = gravity(case)
+    g, weight = gravity(case), AffineEntries()
     if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
             coarse = local_links(in_few_elements(case), parameters, motion)
-        add_weight(stiffness, case, parameters, motion, links, nodes, g, coarse)
+        add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
     _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
-    return _compile(stiffness, mass, case, parameters, motion, nodes.count)
+    K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
+    if g is not None:
+        known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
+        rigid = [nodes.count + k for k in motion.rigid]
+        K = joined(K, uncoupled(weight.finish(nodes.count), case, known, rigid, n_dof))
+    return _compile(K, M, case, parameters, motion, nodes.count)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -252,8 +257,8 @@ def _add_drives(
 
 
 def _compile(
-    stiffness: AffineEntries,
-    mass: AffineEntries,
+    stiffness: Entries,
+    mass: Entries,
     case: CaseFile,
     parameters: ModelParameters,
     motion: Kinematics,
@@ -262,7 +267,7 @@ def _compile(
     n_dof = n_u + len(motion.columns)
     if not n_dof:
         raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
-    entries = [stiffness.finish(n_u), mass.finish(n_u)]
+    entries = [stiffness, mass]
     used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
     used[0] = True
     for entry in entries:

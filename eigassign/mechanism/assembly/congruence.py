@@ -65,14 +65,9 @@ def add_links(K: AffineEntries, M: AffineEntries, links: Sequence[LocalLink], n_
         _add_whole(M, link.mass, numbers, link, n_u)
 
 
-def add_stressed(
-    K: AffineEntries, link: LocalLink, terms: Sequence[Term], columns: Ints, n_u: int
-) -> None:
-    """K += Bᵀ k_σ B of one link, which resists rigid motions, too: those of the ``columns``."""
-    twist = link.twist.copy()
-    twist[:, np.setdiff1d(np.arange(twist.shape[1]), columns)] = 0.0
-    moved = replace(link, mass=terms, twist=twist)
-    _add_whole(K, terms, _constants(moved), moved, n_u)
+def add_stressed(K: AffineEntries, link: LocalLink, terms: Sequence[Term], n_u: int) -> None:
+    """K += Bᵀ k_σ B of one link, which resists rigid motions, too."""
+    _add_whole(K, terms, _constants(replace(link, mass=terms)), link, n_u)
 
 
 def _add_whole(

@@ -16,9 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
+from eigassign.mechanism.assembly.affine_entries import Entries
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
 from eigassign.mechanism.assembly.node_motion import MotionRows
 from eigassign.mechanism.assembly.springs import SpringEnds, resists
@@ -28,6 +30,7 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import DOFS, multiply
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
+from eigassign.series.expression import Expression
 
 Floats = NDArray[np.float64]
 REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
@@ -81,6 +84,34 @@ def swinging(
     size[size == 0.0] = 1.0
     W = _null_space(work / size)  # rad against m
     return _recombined(motion, free, *_echelon(W / size[:, None]))
+
+
+def uncoupled(
+    entries: Entries, case: CaseFile, parameters: ModelParameters, rigid: Sequence[int], n_dof: int
+) -> Entries:
+    """Entries of K_g without what is but round-off in those of rigid motions, the dofs ``rigid``.
+
+    On them alone the weight does no work. Yet a motion along a deflected beam, unlike a turn about
+    the vertical, may change what elastic displacements cost: K_g then couples it to them.
+    """
+    rows, columns, atoms, factors = entries
+    if not len(rigid) or not len(rows):
+        return entries
+    used, place = np.unique(atoms, return_inverse=True)
+    recorder = parameters.recorder
+    terms = [Expression(recorder, 0.0, {a: 1.0}) if a >= 0 else 1.0 for a in used.tolist()]
+    table = parameters.compiled(np.array(terms, dtype=object))
+    still = np.zeros(n_dof, dtype=bool)
+    still[list(rigid)] = True
+    among = still[rows] & still[columns]
+    for theta in _at_poses(table, reference(case, parameters), _spans(case, parameters)):
+        values = np.where(among, 0.0, factors * theta[place])
+        size = abs(sparse.csr_array((values, (rows, columns)), shape=(n_dof, n_dof)))
+        # of N against N/m and N m; a rider of this share of the weight is none
+        coupled = size.max(axis=0).toarray().ravel() > 1e-10 * size.max()
+        still &= ~coupled
+    kept = ~(among | still[rows] | still[columns])
+    return rows[kept], columns[kept], atoms[kept], factors[kept]
 
 
 def _recombined(

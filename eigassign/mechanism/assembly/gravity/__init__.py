@@ -5,6 +5,7 @@ order; each imports only from those above it:
 
     beam_stress  k_σ of a beam element from its end forces and its own weight
     imported     k_σ of a part that is known by its matrices alone
+    elastic      forces that hang on stiffnesses: redundant loops and springs
     statics      the wrenches through the joints, explicit for trees, one small solve for loops
     curvature    levers and joints: where displacements are of second order in the motion
     weight       all terms, added to the entries of K

@@ -80,7 +80,7 @@ def sagging(
             K.add_square(k, list(full.items()) if resists(k) else [])
     A: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     for i, j, atom, value in zip(*(each.tolist() for each in K.finish(n)), strict=True):
-        if i < n and j < n:
+        if i < n and j < n and value != 0.0:
             one = Expression(recorder, 0.0, {atom: value}) if atom >= 0 else value
             A[i][j] = A[i][j] + one
     loads = {name: _loads(link, g[name], nodes.space) for name, link in links.items()}

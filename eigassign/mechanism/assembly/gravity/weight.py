@@ -74,12 +74,11 @@ def add_weight(
     if coarse is not None:
         few = {p.link: c for p, c in zip(motion.placements, coarse[0], strict=True)}, coarse[1]
     found = statics(case, parameters, motion, local, gravity, few)
-    columns = np.setdiff1d(np.arange(len(motion.columns)), motion.rigid)
-    weight = _Weight(K, case, known, motion, local, nodes, found, set(columns.tolist()))
+    weight = _Weight(K, case, known, motion, local, nodes, found)
     for name, link in local.items():
         terms = weight.stressed(name)
         if terms:
-            add_stressed(K, link, terms, columns, nodes.count)
+            add_stressed(K, link, terms, nodes.count)
         weight.add_arms(name)
     for edge in (*motion.tree.edges, *motion.tree.loops):
         weight.add_joint(edge)
@@ -97,7 +96,6 @@ class _Weight:
     links: Mapping[str, LocalLink]
     nodes: NodeMotions
     statics: Statics
-    columns: set[int]  # that are no rigid motions
 
     # --- motions
 
@@ -108,8 +106,7 @@ class _Weight:
         rigid = shifted(self.motion.placement(node[0]).twist, self._place(node))
         rows = [dict(row) for row in self.nodes.rows(node)]
         for a, k in zip(*np.nonzero(present(rigid)), strict=True):
-            if int(k) in self.columns:
-                rows[a][self.nodes.count + int(k)] = rigid[a, k]
+            rows[a][self.nodes.count + int(k)] = rigid[a, k]
         return rows
 
     def _place(self, node: NodeName) -> Objects:
@@ -188,7 +185,7 @@ class _Weight:
         named = self.motion.tree.freedoms[freedom]
         row = dict(self.nodes.passive.get((named.joint, named.component), {}))
         for k, rate in enumerate(self.motion.rates[freedom]):
-            if some(rate) and k in self.columns:
+            if some(rate):
                 row[self.nodes.count + k] = rate
         return row
 
@@ -199,16 +196,9 @@ class _Weight:
         count, eye = self.nodes.count, np.eye(3).astype(object)
         ends = SpringEnds(self.case, self.parameters, self.motion, self.nodes.rows, count).each()
         for spring, (_, force) in zip(ends, self.statics.springs, strict=True):
-            here, there = (
-                [
-                    {i: c for i, c in row.items() if i < count or i - count in self.columns}
-                    for row in rows
-                ]
-                for rows in (spring.here, spring.there)
-            )
             arm = multiply(spring.rotation.T, spring.arm)
-            here = apply(carried(eye, arm * -1.0), here)
-            add_spring(self.K, here, there, arm, force)
+            here = apply(carried(eye, arm * -1.0), spring.here)
+            add_spring(self.K, here, spring.there, arm, force)
 
     # --- beams
 
