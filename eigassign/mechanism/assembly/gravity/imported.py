@@ -61,7 +61,7 @@ def _mixed(axis: int, a: Floats, b: Floats) -> Floats:
 
 def _turned_twice(phi: Floats, X: Floats, axis: int) -> Floats:
     """(φ × (φ × X))_axis/2 = (φ_axis X·φ − X_axis φ·φ)/2."""
-    return 0.5 * (np.outer(phi[axis], X @ phi) - X[axis] * (phi.T @ phi))
+    return np.asarray(0.5 * (np.outer(phi[axis], X @ phi) - X[axis] * (phi.T @ phi)))
 
 
 def _motion(mesh: LinkMesh, name: str) -> Floats:

@@ -110,9 +110,10 @@ class _Wrenches:
 
     def stretch(self, spring: SpringMotion, force: Objects) -> None:
         """A spring's force on the second of its nodes, and its opposite on the first."""
-        in_world = np.concatenate([multiply(spring.rotation, part) for part in np.split(force, 2)])
-        self._act_in_world(spring.end, in_world * -1.0)
-        lever = np.concatenate([np.zeros(3), cross(spring.arm, in_world[:3])])
+        R, zero = spring.rotation, np.zeros(3, dtype=object)
+        in_world = np.concatenate([multiply(R, force[:3]), multiply(R, force[3:])])
+        self._act_in_world(spring.end, np.negative(in_world))
+        lever = np.concatenate([zero, cross(spring.arm, in_world[:3])])
         self._act_in_world(spring.start, in_world + lever)
 
     def close(self, edge: JointEdge, wrench: Objects) -> None:
@@ -171,7 +172,9 @@ def _closing(
     moved = walk(case, known, tree, coords, values, unit)
     kept = list(DOFS[case.mechanism.space])
     J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
-    G = sum(multiply(p.twist.T, found.total[p.link]) for p in moved.placements)
+    right = np.zeros((J.shape[1], 1), dtype=object)  # G
+    for p in moved.placements:
+        right[:, 0] = right[:, 0] + multiply(p.twist.T, found.total[p.link])
     rows, columns = J.shape
     if rows < columns:
         raise MechanismError(
@@ -180,10 +183,8 @@ def _closing(
             "sets free: hold it, or write gravity: none",
         )
     if rows == columns:
-        right = np.array([[value] for value in G], dtype=object)
         forces = passive_motion(known.recorder, J.T, right)[:, 0]
     else:
-        right = np.array([[value] for value in G], dtype=object)
         forces = multiply(J, passive_motion(known.recorder, multiply(J.T, J), right)[:, 0])
     out = []
     for edge, force in zip(loops, np.split(forces, len(loops)), strict=True):

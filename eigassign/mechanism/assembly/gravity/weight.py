@@ -161,13 +161,15 @@ class _Weight:
         name, mesh = node[0], self.nodes.meshes[node[0]]
         (strand,) = mesh.strands
         k = next(k for k, slots in enumerate(strand.slots) if slots[0] == mesh.nodes[node[1]][0])
-        turn = np.kron(np.eye(2), strand.axes)
+        axes = _axes(strand)
+        turn = np.asarray(np.kron(np.eye(2), axes), dtype=np.float64)
+        twice = np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
         work: MotionRow = {}
         for first, end in ((k - 1, 1), (k, 0)):
-            h = multiply(strand.axes, strand.points[first + 1] - strand.points[first])[0]
+            h = multiply(axes, strand.points[first + 1] - strand.points[first])[0]
             strains = end_strains(h, strand.shear[first], end)
             shares = multiply(scaled(multiply(turn, wrench), 0.5)[None], strains)
-            shares = multiply(shares, np.kron(np.eye(2), turn))[0]
+            shares = multiply(shares, twice)[0]
             slots = np.append(strand.slots[first], strand.slots[first + 1]).tolist()
             for slot, share in zip(slots, shares.tolist(), strict=True):
                 if slot >= 0 and some(share):
@@ -267,8 +269,8 @@ class _Weight:
         self, out: Entries, name: str, strand: Strand, acting: Sequence[Objects]
     ) -> None:
         """k_σ of a row of elements for what acts on its nodes, in the link's axes."""
-        turn, planar = strand.axes, self.nodes.space == "planar"
-        R, beyond = np.kron(np.eye(4), turn), np.zeros(6, dtype=object)  # about the last node
+        turn, planar = _axes(strand), self.nodes.space == "planar"
+        R, beyond = _of_element(turn), np.zeros(6, dtype=object)  # about the last node
         g = multiply(turn, np.array([one_atom(v) for v in self.statics.g[name]]))
         for k in range(len(strand.profiles) - 1, -1, -1):
             along = multiply(turn, strand.points[k + 1] - strand.points[k])
@@ -301,7 +303,7 @@ class _Weight:
 
 def _whole_beam(strand: Strand, g: Objects) -> tuple[Objects, Objects]:
     """Stiffness (12, 12) and weight (12,) of a straight beam of one section, in the link's axes."""
-    R = np.kron(np.eye(4), strand.axes)
+    R = _of_element(_axes(strand))
     h = float(np.linalg.norm((strand.points[-1] - strand.points[0]).astype(np.float64)))
     k, m = (
         _summed(terms, R)
@@ -309,6 +311,16 @@ def _whole_beam(strand: Strand, g: Objects) -> tuple[Objects, Objects]:
     )
     still = np.zeros(3, dtype=object)
     return k, multiply(m, np.concatenate([g, still, g, still]))
+
+
+def _axes(strand: Strand) -> Floats:
+    """(3, 3): the axes of a row of elements, which a mesh has always."""
+    return np.asarray(strand.axes, dtype=np.float64)
+
+
+def _of_element(turn: Floats) -> Floats:
+    """The turn of all twelve dofs."""
+    return np.asarray(np.kron(np.eye(4, dtype=np.float64), turn), dtype=np.float64)
 
 
 def _summed(terms: Sequence[ElementTerm], R: Floats) -> Objects:
