@@ -97,6 +97,7 @@ _DIMENSIONS = (
     Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm", 1e-24, 1e24),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
     Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz", 1e-12, 1e15),
+    Dimension("acceleration", (0, 1, -2, 0, 0), "m/s2", "mm/s2", 1e-12, 1e9),
     Dimension("fraction", (0, 0, 0, 0, 0), "", "%"),
     # never asked for; known so that a mistake can be called by its name
     Dimension("angular rate", (0, 0, -1, 1, 0), "rad/s", "deg/s"),

@@ -3,7 +3,8 @@
 K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs and drives, and masses
 and inertias m of bodies and drives, A_i and B_j positive semidefinite at every pose. By the
 min-max principle every λ grows with each k and falls with each m, so that over a box of them the
-least and largest frequency are those of two corners: two exact solves a pose.
+least and largest frequency are those of two corners: two exact solves a pose. With gravity masses
+are weights, too, and springs share the load: of neither anything is known then.
 """
 
 from __future__ import annotations
@@ -18,11 +19,15 @@ Floats = NDArray[np.float64]
 
 def effects(file: CaseFile) -> Floats:
     """+1 for each parameter (n_y,) that raises every frequency, −1 that lowers it, 0 unknown."""
-    return np.array([_effect(column.parameter) for column in file.design.parameters.values()])
+    weighs = isinstance(file.mechanism.gravity, tuple)
+    columns = file.design.parameters.values()
+    return np.array([_effect(column.parameter, weighs) for column in columns])
 
 
-def _effect(path: str) -> float:
+def _effect(path: str, weighs: bool) -> float:
     group, _, *rest = path.split(".")
+    if weighs and (group == "springs" or rest == ["mass"]):  # loads and their shares change, too
+        return 0.0
     match group, ".".join(rest):
         case ("bodies", "mass" | "inertia") | ("coordinates", "drive.inertia"):
             return -1.0

@@ -44,6 +44,9 @@ Stiffness: TypeAlias = Annotated[float, quantity("stiffness", at_least=0)]
 TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", at_least=0)]
 
 
+_Acceleration: TypeAlias = Annotated[
+    tuple[Annotated[float, quantity("acceleration")], ...], Components()
+]
 _AboutAxes: TypeAlias = Annotated[
     tuple[TurningStiffness, ...],
     Components(),
@@ -173,7 +176,8 @@ class Mechanism(Part):
     Keys:
         space: `planar`: vectors are `[x, y]`, parts are turned by `angle`; `spatial`: `[x, y, z]`,
             and `orientation`
-        gravity: m/s², or `none`: left out on purpose
+        gravity: the acceleration of a fall, in the axes of the ground; or `none`: left out on
+            purpose
         materials: of beams
         sections: cross-sections of beams
         links: beams, rigid bodies, frames of beams, and parts given by matrices
@@ -184,7 +188,7 @@ class Mechanism(Part):
     """
 
     space: Literal["planar", "spatial"]
-    gravity: Vector | Literal["none"] | None = None
+    gravity: OneOrList[Literal["none"], _Acceleration] | None = None
     materials: Named[Material] = FrozenDict()
     sections: Named[Section] = FrozenDict()
     links: OneOrMoreNamed[Link]
