@@ -32,9 +32,10 @@ class AffineEntries:
 
     ``places`` of local dofs are their unknowns, −1 for those that are none; a row r is one over all
     unknowns, v a vector of the local dofs. What joins few unknowns, where many functions meet, is
-    summed before it is split into atoms.
+    summed before it is split into atoms; where ``summed``, all that couples is, and not split.
     """
 
+    summed: bool = False
     blocks: list[Block] = field(default_factory=list)
     couplings: list[Block] = field(default_factory=list)  # to one unknown, without transposes
     sums: dict[tuple[int, int], Scalar] = field(default_factory=dict)
@@ -51,6 +52,9 @@ class AffineEntries:
         """coefficient × (Pᵀ v r + rᵀ vᵀ P)."""
         present = (places >= 0) & (v != 0.0)
         rows, values = places[present], v[present]
+        if self.summed:
+            self.add_product(coefficient, list(zip(rows.tolist(), values.tolist(), strict=True)), r)
+            return
         for unknown, factor in r if len(rows) else ():
             self.couplings += [
                 (rows, unknown, values, *part) for part in parts(coefficient * factor)
@@ -85,7 +89,9 @@ class AffineEntries:
         sums = [
             (row, column, atom, factor)
             for (row, column), value in self.sums.items()
-            for atom, factor in parts(one_atom(value) if min(row, column) >= n_u else value)
+            for atom, factor in parts(
+                one_atom(value) if self.summed or min(row, column) >= n_u else value
+            )
         ]
         rows, columns, *what = _spread(self.couplings)
         groups = [

@@ -73,7 +73,7 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    g, weight = gravity(case), AffineEntries()
+    g, weight = gravity(case), AffineEntries(summed=True)
     if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
