@@ -7,6 +7,7 @@ Read in this order; each imports only from those above it:
     assembly            K = Bᵀ k B and M = Bᵀ m B with B = [Q, N T], affine in scalar functions
     inverse_kinematics  the coordinates q along a path of the tip
     trajectory          q(t) from samples, files, points or tip paths
+    drives              torques and forces that the drives exert along trajectories
 """
 
 from eigassign.faces import face
@@ -22,6 +23,7 @@ __all__, __getattr__, __dir__ = face(
         "assembly.pencil": "Pencil",
         "assembly.rigid_loops": "require_consistent",
         "assembly.velocity_terms": "velocity_terms",
+        "drives": "DriveForces drive_forces",
         "elements.beam": "bending_mass bending_shapes fields",
         "elements.matrix_file": "read_matrix",
         "elements.mesh": "total",

@@ -104,8 +104,11 @@ class Program:
         return bool(degree[self.outputs].max(initial=0.0) <= 1.0)
 
     def run(self, algebra: Algebra, variables: Floats) -> Floats:
-        """Outputs as rows, from the variables as rows (n_variables, …) of the algebra."""
-        values = np.empty((self.n_atoms, variables.shape[1]))
+        """Outputs as rows, from the variables as rows (n_variables, …) of the algebra.
+
+        Of samples and their tangents they may be complex: for rates along the imaginary axis.
+        """
+        values = np.empty((self.n_atoms, variables.shape[1]), np.result_type(variables, 1.0))
         values[self.inputs] = variables[self.input_variables]
         for step in self.steps:
             values[step.targets] = _take(step, algebra, values)
@@ -285,9 +288,12 @@ class CompiledArrays:
     table: CompiledTable
     shapes: tuple[tuple[int, ...], ...]
 
-    def __call__(self, variables: Floats) -> list[Floats]:
-        """The values (n, *shape) of each array at variables (n_variables, n)."""
-        values = self.table.evaluate(Samples(), variables).T
+    def __call__(self, variables: Floats, algebra: Algebra | None = None) -> list[Floats]:
+        """The values (n, *shape) of each array at variables (n_variables, n), rows of the algebra.
+
+        That is of plain samples unless another one is given.
+        """
+        values = self.table.evaluate(algebra or Samples(), variables).T
         cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
         parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
         return [part.reshape(len(values), *shape) for part, shape in parts]

@@ -151,7 +151,10 @@ class ImplicitFunction:
     def tangents(self, algebra: Tangents, a: Floats) -> Floats:
         """p (size, …) with its derivatives −(∂F/∂p)⁺ ∂F/∂a a'."""
         n = algebra.samples
-        p = self.samples(a[:, :n])
+        p = self.samples(a[:, :n].real)
+        if np.iscomplexobj(a):  # a rate along the imaginary axis: one step has it exactly
+            F, _, J = self.equations(a[:, :n], p)
+            p = p - 1j * _solved(J.real, F.imag.T[:, :, None])[:, :, 0].T
         still = np.zeros((self.size, a.shape[1] - n))
         held = np.concatenate([a, np.hstack([p, still])])
         F = self.program.run(algebra, held)[: self.n_equations]

@@ -52,8 +52,7 @@ def erls_motion(case: CaseFile, parameters: ModelParameters) -> Kinematics:
     g = gravity(case)
     if g is None or not free:
         return motion
-    meshes = _meshes(in_few_elements(case), parameters, motion)
-    return swinging(case, parameters, motion, [_unjoined(meshes, p) for p in motion.placements], g)
+    return swinging(case, parameters, motion, rigid_links(case, parameters, motion), g)
 
 
 def gravity(case: CaseFile) -> Floats | None:
@@ -204,9 +203,14 @@ def local_links(
     return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
 
 
-def _unjoined(meshes: Mapping[str, LinkMesh], placement: Placement) -> LocalLink:
+def rigid_links(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> list[LocalLink]:
+    """Every link by itself in as few elements as may be: enough for its rigid motions."""
+    meshes = _meshes(in_few_elements(case), parameters, motion)
+    return [_unjoined(meshes[p.link], p) for p in motion.placements]
+
+
+def _unjoined(mesh: LinkMesh, placement: Placement) -> LocalLink:
     """A link's matrices alone, none of its nodes joined to others."""
-    mesh = meshes[placement.link]
     own = np.arange(mesh.n_local)
     twist = placement.twist[: mesh.rigid[0].matrix.shape[1]]
     return LocalLink(mesh.stiffness, mesh.mass, mesh.rigid, twist, own, {})

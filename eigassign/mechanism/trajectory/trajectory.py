@@ -468,6 +468,16 @@ def rates(trajectory: Trajectory) -> Rates:
     return Rates(samples, q[samples], rate, acceleration)
 
 
+def rates_at(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
+    """Rates at design y (n_y,), and the slopes in it of q, q̇ and q̈, each (m, n_q, n_y)."""
+    own = trajectory.given
+    q, slopes = own.at(y)
+    found, flat = rates(replace(own, q=q)), rates(replace(own, q=slopes.reshape(len(q), -1)))
+    shape = (len(found.samples), *slopes.shape[1:])
+    by_design = (each.reshape(shape) for each in (flat.q, flat.rate, flat.acceleration))
+    return found, Rates(found.samples, *by_design)
+
+
 def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
     """The samples from each corner to the next."""
     time_s = trajectory.time_s

@@ -1,0 +1,151 @@
+"""Torques and forces that the drives exert along trajectories: the links rigid, all joints driven.
+
+With T(q, y) the twists of a link per q̇ in its own axes, V = T q̇ = (v, ω), its inertia
+J = Nᵀ m N about its origin, momentum (p, L) = J V, and drive inertias J_d on ṡ = A q̇, virtual work
+in the closed kinematics gives (loops need nothing else: passive joints are functions of q)
+
+    Aᵀ τ = Σ_links Tᵀ [ J (T q̈ + Ṫ q̇ − (Rᵀ g, 0)) + (ω × p, ω × L + v × p) ] + Aᵀ J_d s̈.
+
+τ acts on the relative motion of each joint, in N m or N, positive along its coordinate: what its
+drive must exert, whether the coordinate is locked, held by a spring or free. Springs of `springs`
+rest in the unloaded pose: where nothing bends they carry nothing. Slopes in y are exact: Ṫ, and
+all that is a product, by rates along the imaginary axis, which lose no digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case.case_file import CaseFile
+from eigassign.mechanism.assembly.build import gravity, rigid_links
+from eigassign.mechanism.assembly.congruence import inertia
+from eigassign.mechanism.assembly.velocity_terms import IMAGINARY
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.loop_closure import all_moving
+from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.mechanism.kinematics.rotations import DOFS, multiply
+from eigassign.mechanism.trajectory.trajectory import Rates, Trajectories, Trajectory, rates_at
+from eigassign.series.algebra import Tangents
+from eigassign.series.compiler import CompiledArrays
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class DriveForces:
+    """τ of a mechanism; built once, evaluated along trajectories."""
+
+    table: CompiledArrays  # T, (Rᵀg, 0) and J of links with mass, (n_links, 6, n + 7); J_d (n,)
+    parameters: ModelParameters
+
+    def along(
+        self, path: Trajectories, y: Floats, slopes: bool = False
+    ) -> tuple[Ints, Floats, Floats]:
+        """Samples (m,) of the path, τ (m, n) at design y (n_y,), its slopes (m, n, n_y or 0).
+
+        Rates are differences of the samples; at a corner both sides count, and not the blow. A
+        sample alone between two corners is at rest. Instants between samples are left out.
+        """
+        samples, motions = [], []
+        for part, rows in zip(path.parts, path.rows, strict=True):
+            motion = _motion(part.trajectory, y)
+            given = np.flatnonzero(~part.trajectory.inserted)
+            samples.append(rows.start + given[motion[0].samples])
+            motions.append([[m.q, m.rate, m.acceleration] for m in motion])
+        here, by_design = (
+            [np.concatenate(each) for each in zip(*(m[k] for m in motions), strict=True)]
+            for k in (0, 1)
+        )
+        return np.concatenate(samples), *self.at(here, by_design, y, slopes)
+
+    def at(
+        self, motion: list[Floats], by_design: list[Floats], y: Floats, slopes: bool
+    ) -> tuple[Floats, Floats]:
+        """τ and slopes for q, q̇, q̈ (m, n_q), which change with the design (m, n_q, n_y)."""
+        A, n_y = self.parameters.relative, len(y) if slopes else 0
+        n, m = len(A), len(motion[0])
+        x = np.zeros((1 + n_y, m, motion[0].shape[1] + len(y)), dtype=complex)
+        moved = [np.moveaxis(each, 2, 0)[:n_y] for each in by_design]
+        q, rate, acceleration = (
+            np.concatenate([here[None], slope]) for here, slope in zip(motion, moved, strict=True)
+        )
+        x[..., : q.shape[2]] = q + 1j * IMAGINARY * rate
+        x[0, :, q.shape[2] :] = y
+        x[1 + np.arange(n_y), :, q.shape[2] + np.arange(n_y)] = 1.0
+        z = x @ self.parameters.to_z.T
+        z[0] += self.parameters.shift
+        found = self.table(z.reshape(x.shape[0] * m, -1).T, Tangents(m, n_y))
+        parts, drives = (each.reshape(1 + n_y, m, *each.shape[1:]) for each in found)
+        T, g, J = np.split(parts.real, [n, n + 1], axis=-1)
+        T_rate = parts.imag[..., :n] / IMAGINARY
+        terms = [T, T_rate, g, J, drives.real, rate[..., :n], acceleration[..., :n]]
+        value = _exerted(A, *(each[0] for each in terms))
+        steps = (each[:1] + 1j * IMAGINARY * each[1:] for each in terms)
+        return value, np.moveaxis(_exerted(A, *steps).imag / IMAGINARY, 0, 2)
+
+
+def _exerted(
+    A: Floats,
+    T: Floats,
+    T_rate: Floats,
+    g: Floats,
+    J: Floats,
+    drives: Floats,
+    rate: Floats,
+    acceleration: Floats,
+) -> Floats:
+    """τ (…, n) of the formula above, T (…, n_links, 6, n)."""
+    q_rate, q_push = (each[..., None, :, None] for each in (rate, acceleration))
+    V = T @ q_rate
+    momentum = (J @ V)[..., 0]
+    (v, w), (p, L) = (np.split(each, 2, axis=-1) for each in (V[..., 0], momentum))
+    force = (J @ (T @ q_push + T_rate @ q_rate - g))[..., 0]
+    force = force + np.concatenate([np.cross(w, p), np.cross(w, L) + np.cross(v, p)], axis=-1)
+    work = np.einsum("...lik,...li->...k", T, force)
+    return np.asarray(work @ np.linalg.inv(A) + drives * (acceleration @ A.T))
+
+
+def _motion(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
+    """The rates at every sample, and their slopes in the design; 0 where none are known."""
+    own = trajectory.given
+    known = rates_at(trajectory, y)
+    alone = np.setdiff1d(np.arange(len(own.time_s)), known[0].samples)
+    if not len(alone):
+        return known
+    both = []
+    for found, at in zip(known, own.at(y), strict=True):
+        rest = np.zeros_like(at[alone])
+        samples = np.concatenate([found.samples, alone])
+        pairs = ((found.q, at[alone]), (found.rate, rest), (found.acceleration, rest))
+        both.append(Rates(samples, *(np.concatenate(pair) for pair in pairs)))
+    return both[0], both[1]
+
+
+def drive_forces(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> DriveForces:
+    """The drives of a mechanism, with its weight where `mechanism.gravity` is a vector."""
+    moving, kept = all_moving(case, parameters, motion), list(DOFS[case.mechanism.space])
+    g = gravity(case)
+    parts = []
+    for placement, link in zip(
+        moving.placements, rigid_links(case, parameters, motion), strict=True
+    ):
+        J = np.zeros((6, 6), dtype=object)
+        J[np.ix_(kept, kept)] = inertia(link)
+        if not J.any():
+            continue
+        pull = np.zeros((6, 1), dtype=object)
+        if g is not None:
+            pull[:3, 0] = multiply(placement.world_rotation.T, g)
+        parts.append(np.concatenate([placement.twist, pull, J], axis=1))
+    drives = np.zeros(len(case.coordinates), dtype=object)
+    for i, (name, coordinate) in enumerate(case.coordinates.items()):
+        given = getattr(coordinate.drive, "inertia", None)
+        if given is not None:
+            drives[i] = parameters.number(f"coordinates.{name}.drive.inertia", given)
+    shape = (-1, 6, len(drives) + 7)
+    known = parameters.with_passive(moving.passive)
+    return DriveForces(known.compiled(np.array(parts, dtype=object).reshape(shape), drives), known)
