@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from eigassign.case.reader import resolve
-from eigassign.case.schema.design import Design, Tolerance
+from eigassign.case.schema.design import RESERVED, Design, Tolerance
 from eigassign.case.schema.joints import JointBase
 from eigassign.case.schema.mechanism import Spring
 from eigassign.case.schema.parts import Part
@@ -24,8 +24,8 @@ def to_yaml(content: Mapping[str, object]) -> str:
 def plain(value: object) -> object:
     """Objects → mappings, lists, numbers and text, in the shape of the file."""
     if isinstance(value, Design):
-        limits = {"constraints": value.constraints or None, "mass": value.mass}
-        return plain({**value.entries, **{k: v for k, v in limits.items() if v is not None}})
+        limits = {k: getattr(value, k) for k in RESERVED}
+        return plain({**value.entries, **{k: v for k, v in limits.items() if v}})
     if isinstance(value, Tolerance):
         return value.written()
     if isinstance(value, Part):

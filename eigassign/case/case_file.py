@@ -106,6 +106,11 @@ class CaseFile:
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
         return tuple("m" if freedom == "translation" else "rad" for freedom in moved)
 
+    @property
+    def drive_units(self) -> tuple[str, ...]:
+        """SI unit of what the drive of each coordinate exerts: N m, or N where its joint slides."""
+        return tuple("N" if unit == "m" else "N m" for unit in self.coordinate_units)
+
     @cached_property
     def design_quantities(self) -> tuple[Quantity, ...]:
         """Dimension and limits of each design parameter, in the order of y."""

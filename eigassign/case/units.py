@@ -99,10 +99,10 @@ _DIMENSIONS = (
     Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz", 1e-12, 1e15),
     Dimension("acceleration", (0, 1, -2, 0, 0), "m/s2", "mm/s2", 1e-12, 1e9),
     Dimension("fraction", (0, 0, 0, 0, 0), "", "%"),
+    Dimension("force", (1, 1, -2, 0, 0), "N", "kN", 1e-24, 1e24),
+    Dimension("torque or energy", (1, 2, -2, 0, 0), "N m", "kN m", 1e-24, 1e24),
     # never asked for; known so that a mistake can be called by its name
     Dimension("angular rate", (0, 0, -1, 1, 0), "rad/s", "deg/s"),
-    Dimension("force", (1, 1, -2, 0, 0), "N", "kN"),
-    Dimension("torque or energy", (1, 2, -2, 0, 0), "N m", "kN m"),
     Dimension("velocity", (0, 1, -1, 0, 0), "m/s", "mm/s"),
     Dimension("volume", (0, 3, 0, 0, 0), "m3", "cm3"),
     Dimension("mass per length", (1, -1, 0, 0, 0), "kg/m", "g/mm"),

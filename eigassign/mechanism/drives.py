@@ -42,6 +42,17 @@ class DriveForces:
     table: CompiledArrays  # T, (Rᵀg, 0) and J of links with mass, (n_links, 6, n + 7); J_d (n,)
     parameters: ModelParameters
 
+    @property
+    def is_affine(self) -> bool:
+        """True where τ along given coordinates is affine in the design, which moves no link."""
+        table, n_y = self.table.table, len(self.parameters.design)
+        of_design = np.arange(self.parameters.count) >= self.parameters.count - n_y
+        still = np.zeros(self.table.shapes[0], dtype=bool)
+        still[..., :-6] = True
+        of_motion = table.weights[: still.size][still.ravel()].indices
+        moved = table.program.dependence[np.unique(of_motion)][:, of_design].any()
+        return table.program.is_affine(of_design) and not bool(moved)
+
     def along(
         self, path: Trajectories, y: Floats, slopes: bool = False
     ) -> tuple[Ints, Floats, Floats]:
@@ -61,6 +72,18 @@ class DriveForces:
             for k in (0, 1)
         )
         return np.concatenate(samples), *self.at(here, by_design, y, slopes)
+
+    def curves(self, path: Trajectories, y: Floats) -> Floats:
+        """τ (n_t, n) at all samples: of a corner the larger side, at instants between linear."""
+        samples, tau, _ = self.along(path, y)
+        out = np.zeros((len(path.time_s), tau.shape[1]))
+        for k, row in zip(samples, tau, strict=True):
+            out[k] = np.where(np.abs(row) > np.abs(out[k]), row, out[k])
+        for part, rows in zip(path.parts, path.rows, strict=True):
+            own, time_s, new = out[rows], part.trajectory.time_s, part.trajectory.inserted
+            for column in own.T:
+                column[new] = np.interp(time_s[new], time_s[~new], column[~new])
+        return out
 
     def at(
         self, motion: list[Floats], by_design: list[Floats], y: Floats, slopes: bool

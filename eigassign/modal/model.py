@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.total_mass import TotalMass
+from eigassign.mechanism.drives import DriveForces, drive_forces
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
@@ -127,6 +129,11 @@ class Model:
     def mass_slopes(self, y: ArrayLike) -> Floats:
         """∂mass/∂y (n_y,) in kg per SI unit of y."""
         return self.total_mass(self._design(y))[1]
+
+    @cached_property
+    def drives(self) -> DriveForces:
+        """What the drives exert along trajectories, `DriveForces`."""
+        return drive_forces(self.poses.case, self.poses.parameters, self.motion)
 
     def _design(self, y: ArrayLike) -> Floats:
         x = self.one(np.zeros(len(self.q_names)), y)

@@ -21,6 +21,7 @@ from eigassign.files import plain
 from eigassign.study.results import (
     AssignmentRow,
     DesignRow,
+    DriveRow,
     ErrorSummary,
     FollowedRow,
     MassRow,
@@ -172,6 +173,7 @@ class RunDocument(OriginDocument):
 
     design: Annotated[Mapping[str, DesignRow], Fact("by parameter, in the order of the case")]
     mass: MassRow | None
+    drives: Annotated[Mapping[str, DriveRow], Fact("what each exerts, by coordinate")]
     price: Annotated[float | None, Fact("of the change of the design")]
     error: Annotated[ErrorSummary | None, Fact("of all wanted frequencies, else of all limits")]
     frequencies: Annotated[CurvesDocument | LimitDocument | None, Fact("of the first target")]
@@ -215,6 +217,7 @@ def run_document(results: RunResults) -> RunDocument:
         beginning(results),
         results,
         design={row.name: row for row in results.design},
+        drives={row.name: row for row in results.drives},
         frequencies=targets[0].frequencies if targets else None,
         targets=targets,
         sensitivity={

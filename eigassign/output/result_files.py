@@ -32,7 +32,10 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         f"trajectory_{row.name}.csv" if several else "trajectory.csv": trajectory_csv(results, row)
         for row in results.trajectories
     }
-    return {**files, "frequencies.csv": _number_text(frequency_columns(results))}
+    files["frequencies.csv"] = _number_text(frequency_columns(results))
+    if results.drives:
+        files["drives.csv"] = _number_text([*_samples(results), *_exerted(results)])
+    return files
 
 
 def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
@@ -50,12 +53,21 @@ def frequency_columns(results: RunResults) -> list[Column]:
 
     Of several trajectories one below the other, the first column naming them.
     """
-    everything = slice(0, results.time_s.size)
-    columns: list[Column] = []
+    own = _assigned(results) if results.targets else _expanded(results)
+    return [*_samples(results), *own]
+
+
+def _samples(results: RunResults) -> Iterator[Column]:
     if len(results.trajectories) > 1:
-        columns.append(("trajectory", trajectory_names(results)))
-    columns += _motion(results, everything)
-    return [*columns, *(_assigned(results) if results.targets else _expanded(results))]
+        yield "trajectory", trajectory_names(results)
+    yield from _motion(results, slice(0, results.time_s.size))
+
+
+def _exerted(results: RunResults) -> Iterator[Column]:
+    """What each drive exerts before and after."""
+    for row in results.drives:
+        for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
+            yield f"{row.name} {row.quantity} {when} [{row.unit}]", curve.tolist()
 
 
 def _motion(results: RunResults, rows: slice) -> Iterator[Column]:

@@ -84,13 +84,13 @@ def _value(row: Any, name: str, one: Fact) -> Any:
 
 
 def run_tables(results: RunResults) -> tuple[Table, ...]:
-    """Design, distances, limits, local optima, what the answer means, approximation, solver, time.
+    """Design, distances, limits, drives, local optima, meaning, approximation, solver, time.
 
     Those that there is something to show in.
     """
     kinds = (
-        design, errors, required, clearances, combinations, optima, sensitivity, limits, reach,
-        tolerance, trade_off, approximation, solver, timing,
+        design, errors, required, drives, clearances, combinations, optima, sensitivity, limits,
+        reach, tolerance, trade_off, approximation, solver, timing,
     )  # fmt: skip
     return tuple(table for table in (kind(results) for kind in kinds) if table.rows)
 
@@ -206,6 +206,22 @@ def required(results: RunResults) -> Table:
         rows.append((row.words, *map(str.rstrip, cells), _met(row.satisfied)))
     caption = f"Relative to the limit, along {results.along}."
     return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
+
+
+def drives(results: RunResults) -> Table:
+    """What every drive exerts: its peak, where that is, and rms, before and after."""
+    rows = results.drives
+    of = rows[0].of if rows else ""
+    caption = f"Of {of}, along {results.along}; the links rigid, springs at rest."
+    names = "name handy initial.peak initial.at initial.rms optimal.peak optimal.at optimal.rms"
+    headings = {
+        f"{design}.{fact}": f"{fact} {when}"
+        for design, when in (("initial", "before"), ("optimal", "after"))
+        for fact in ("peak", "at", "rms")
+    }
+    return facts_table(
+        "What the drives carry", rows, f"{names} limit", caption, name="coordinate", **headings
+    )
 
 
 def _met(satisfied: bool) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import Accuracy, study_motion
@@ -22,6 +23,8 @@ from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
+    DriveLoad,
+    DriveRow,
     MassRow,
     Meaning,
     MovingMode,
@@ -108,6 +111,7 @@ def _with_answer(
         notes=(*results.notes, *(note for note in notes if note)),
         meaning=meaning,
         mass=_mass(scene, answer.y),
+        drives=_drives(scene, answer.y),
     )
 
 
@@ -115,6 +119,34 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
     limits, mass = scene.file.design.mass, scene.model.mass
     low, high = (None, None) if limits is None else (limits.min, limits.max)
     return MassRow(mass(scene.initial), mass(y), low, high)
+
+
+def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
+    """What every drive exerts before and after; none where there is no weight and no motion."""
+    file, path, g = scene.file, scene.path, scene.file.mechanism.gravity
+    curves = [scene.model.drives.curves(path, each) for each in (scene.initial, y)]
+    weights = time_weights(path)
+    weights = weights / weights.sum()
+    of = "weight and motion" if isinstance(g, tuple) else "the motion alone, gravity being none"
+    if g is None:
+        of = "the motion alone, mechanism.gravity not being given"
+    if not isinstance(g, tuple) and not any(curve.any() for curve in curves):
+        return ()
+
+    def load(tau: Floats) -> DriveLoad:
+        k = int(np.abs(tau).argmax())
+        where = path.where(k) if tau[k] else ""
+        return DriveLoad(abs(float(tau[k])), float(np.sqrt(weights @ tau**2)), where)
+
+    def limit(name: str) -> float | None:
+        return file.design.torque[name].max if name in file.design.torque else None
+
+    return tuple(
+        DriveRow(name, unit, of, limit(name), load(before), load(after), before, after)
+        for name, unit, before, after in zip(
+            file.coordinates, file.drive_units, *(c.T for c in curves), strict=True
+        )
+    )
 
 
 def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tuple[str, ...]:

@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.units import handy_unit, is_bare
-from eigassign.facts import Curve, Fact, Hertz, InUnit, Key, Residual, Share, positive_percent
+from eigassign.facts import (
+    OF_ROW,
+    Curve,
+    Fact,
+    Hertz,
+    InUnit,
+    Key,
+    Residual,
+    Share,
+    positive_percent,
+)
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -156,6 +166,43 @@ class MassRow:
     optimal: Kilograms
     lower: Kilograms | None
     upper: Kilograms | None
+
+
+@dataclass(frozen=True)
+class DriveLoad:
+    """What a drive exerts along all trajectories, in the SI unit of its row."""
+
+    peak: Annotated[InUnit, Fact("its largest magnitude")]
+    rms: Annotated[InUnit, Fact("over time")]
+    at: Annotated[str, Fact("the sample of the peak")]
+
+
+@dataclass(frozen=True, repr=False)
+class DriveRow(Brief):
+    """What the drive of one coordinate exerts, positive along it, before and after; (n_t,) curves.
+
+    The links are rigid: torque in N m, or force in N, of weight and motion as ``of`` says. Springs
+    of `springs` rest in the unloaded pose and carry nothing.
+    """
+
+    name: Key
+    unit: str
+    of: Annotated[str, Fact("weight, motion or both")]
+    limit: Annotated[InUnit | None, Fact("of its magnitude")]
+    initial: DriveLoad
+    optimal: DriveLoad
+    initial_curve: Annotated[Floats, Fact("before", unit=OF_ROW)]
+    optimal_curve: Annotated[Floats, Fact("with the answer", unit=OF_ROW)]
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read it in, and the size of that in SI."""
+        return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
+
+    @property
+    def quantity(self) -> str:
+        """Torque or force."""
+        return "force" if self.unit == "N" else "torque"
 
 
 @dataclass(frozen=True)
@@ -637,6 +684,7 @@ class RunResults(Brief):
     meaning: Meaning = field(default_factory=Meaning)
     spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for
     moving: tuple[MovingMode, ...] = ()  # of every trajectory, where a report shows it
+    drives: tuple[DriveRow, ...] = ()  # of every coordinate, where anything loads them
 
     @property
     def along(self) -> str:
@@ -747,6 +795,7 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         targets=tuple(target for target in targets if target is not None),
         others=_part(results.others, rows),
         spectrum=_part(results.spectrum, rows),
+        drives=tuple(_part(drive, rows) for drive in results.drives),
     )
 
 

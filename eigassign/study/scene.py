@@ -127,8 +127,8 @@ class Scene:
 
     @cached_property
     def limits(self) -> tuple[LimitedQuantity, ...]:
-        """The limits of quantities of the design, whatever the trajectory."""
-        return design_limits(self.file, self.model)
+        """The limits of quantities of the design, at all samples of the trajectories."""
+        return design_limits(self.file, self.model, self.trajectory)
 
     @property
     def constraints(self) -> tuple[LinearConstraint, ...]:

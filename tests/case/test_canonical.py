@@ -47,6 +47,7 @@ VARIANTS = {
     "names like words": NAMED_LIKE_WORDS,
     "parameter called mass": edited("  m:", "  mass:").replace("{m: 1}", "{mass: 1}"),
     "limit of the mass": edited("  constraints:", "  mass: {max: 12 kg}\n  constraints:"),
+    "limit of a drive": edited("  constraints:", "  torque: {q1: {max: 2 kN m}}\n  constraints:"),
     "reference": edited("title: Arm", "title: Arm\nreference: 'Belotti et al.: 2021'"),
 }
 

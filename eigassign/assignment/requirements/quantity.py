@@ -1,8 +1,9 @@
-"""A quantity of the design keeps within its limits: the mass, or a weighted sum of parameters."""
+"""A quantity of the design keeps within its limits: mass, loads of drives, sums of parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,6 +13,7 @@ from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,
     Frequencies,
+    Ints,
     Quantity,
     Requirement,
     Solved,
@@ -19,6 +21,9 @@ from eigassign.assignment.requirements.requirement import (
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.mechanism.assembly.total_mass import TotalMass
+from eigassign.mechanism.drives import DriveForces
+from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 
 _MASS = "design.mass"
@@ -29,11 +34,12 @@ class LimitedQuantity(Requirement):
     """low ≤ quantity(y) ≤ high, in SI units; no kind of target, for it belongs to no mode."""
 
     is_goal = False
-    unit: ClassVar[str] = ""  # SI, that its amounts are said in
     extreme: ClassVar[tuple[str, str]] = ("the least is", "the most is")
 
     @classmethod
-    def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
+    def of_case(
+        cls, file: CaseFile, model: Model, path: Trajectories | None
+    ) -> Iterator[LimitedQuantity]:
         """Yield what the case file limits, and nothing where it limits nothing."""
         raise NotImplementedError
 
@@ -53,6 +59,11 @@ class LimitedQuantity(Requirement):
         """True where it allows a convex set of designs."""
         return self.is_affine
 
+    @property
+    def is_decided(self) -> bool:
+        """True where no design keeps it if a search from a few starts finds none."""
+        return True
+
     def range_over(self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved) -> Edges:
         """Its range over designs between two (n_y,); endless where it is not affine."""
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -63,6 +74,20 @@ class LimitedQuantity(Requirement):
         return amount - reach, amount + reach
 
     # --- Amounts in words
+
+    @property
+    def unit(self) -> str:
+        """The SI unit that its amounts are said in."""
+        return ""
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """The limits of the amount, infinite without one."""
+        return float(self.lower[0]), float(self.upper[0])
+
+    def where(self, y: Floats) -> str:
+        """The place where a design (n_y,) has its amount, in words behind it; nothing of most."""
+        return ""
 
     @property
     def noun(self) -> str:
@@ -94,9 +119,9 @@ class LimitedQuantity(Requirement):
         """``mass at most 3 kg``."""
         return f"{self.noun} {self._asked}"
 
-    def stated(self, amount: float, extreme: float | None) -> str:
+    def stated(self, y: Floats, extreme: float | None) -> str:
         """``mass 5.47 kg, at most 3 kg``, and where given what the most extreme design has."""
-        words = f"{self.noun} {self._said(amount)}, {self._asked}"
+        words = f"{self.noun} {self._said(self.amount(y))}{self.where(y)}, {self._asked}"
         if extreme is None:
             return words
         return f"{words}; {self.extreme[int(extreme < self._edges[0][1])]} {self._said(extreme)}"
@@ -109,7 +134,8 @@ class LimitedQuantity(Requirement):
 
     @property
     def _edges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        return (-1.0, float(self.lower[0])), (1.0, float(self.upper[0]))
+        low, high = self.allowed
+        return (-1.0, low), (1.0, high)
 
     def _said(self, amount: float) -> str:
         return f"{amount:.4g} {self.unit}".rstrip()
@@ -123,7 +149,9 @@ class MassLimit(LimitedQuantity):
     extreme = ("the lightest design has", "the heaviest design has")
 
     @classmethod
-    def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
+    def of_case(
+        cls, file: CaseFile, model: Model, path: Trajectories | None
+    ) -> Iterator[LimitedQuantity]:
         """Yield the limits of the mass, if there are any."""
         if (given := file.design.mass) is not None:
             yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
@@ -145,13 +173,126 @@ class MassLimit(LimitedQuantity):
         return f"{handy(share * float(edge[0]), 'kg')} {more} mass"
 
 
+@dataclass(frozen=True, eq=False)
+class CarriedLoads:
+    """What all drives exert along whole trajectories; of the last design it is remembered."""
+
+    drives: DriveForces
+    path: Trajectories
+    known: dict[bytes, tuple[Ints, Floats, Floats]] = field(default_factory=dict)
+
+    def __call__(self, y: Floats) -> tuple[Ints, Floats, Floats]:
+        """Samples (m,), τ (m, n) of a design (n_y,), its slopes (m, n, n_y); see `DriveForces`."""
+        key = np.asarray(y, dtype=np.float64).tobytes()
+        if key not in self.known:
+            found = self.drives.along(self.path, y, slopes=True)
+            self.known.clear()
+            self.known[key] = found
+        return self.known[key]
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedLoad:
+    """The load of one drive, in N m or N: (m,) at all samples, with slopes (m, n_y)."""
+
+    loads: CarriedLoads
+    name: str
+    column: int
+    unit: str
+
+    def __call__(self, y: Floats) -> tuple[Floats, Floats]:
+        """Its values and slopes at a design y (n_y,)."""
+        _, tau, slopes = self.loads(y)
+        return tau[:, self.column], slopes[:, self.column]
+
+
+class DriveLimit(LimitedQuantity):
+    """|τ| ≤ max of the drive of a coordinate at all samples; its amount is the peak."""
+
+    extreme = ("the least found is", "the least found is")
+
+    @classmethod
+    def of_case(
+        cls, file: CaseFile, model: Model, path: Trajectories | None
+    ) -> Iterator[LimitedQuantity]:
+        """Yield the limits of all drives, along all trajectories whole."""
+        if path is None or not file.design.torque:
+            return
+        loads = CarriedLoads(model.drives, path.whole)
+        rows = len(loads(initial_design(file))[0])
+        for column, (name, unit) in enumerate(zip(file.coordinates, file.drive_units, strict=True)):
+            if name in file.design.torque:
+                edge = np.full(rows, file.design.torque[name].max)
+                load, place = CarriedLoad(loads, name, column, unit), f"design.torque.{name}"
+                yield cls(place, place, ((load, 1.0),), slice(0, rows), -edge, edge)
+
+    @property
+    def load(self) -> CarriedLoad:
+        """What it limits."""
+        load = self.terms[0][0]
+        assert isinstance(load, CarriedLoad)
+        return load
+
+    @property
+    def is_affine(self) -> bool:
+        """True where the load is affine in the design, at every sample."""
+        return self.load.loads.drives.is_affine and not self.load.loads.path.follows_design
+
+    @property
+    def is_decided(self) -> bool:
+        """True where the designs that keep it are a convex set: else a search may miss some."""
+        return self.is_affine
+
+    @property
+    def unit(self) -> str:
+        """N m, or N."""
+        return self.load.unit
+
+    @property
+    def noun(self) -> str:
+        """``torque of q1``."""
+        return f"{'force' if self.unit == 'N' else 'torque'} of {self.load.name}"
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """The limit of the peak."""
+        return -np.inf, float(self.upper[0])
+
+    def amount(self, y: Floats) -> float:
+        """The peak of a design (n_y,)."""
+        return float(np.abs(self.load(y)[0]).max())
+
+    def slopes(self, y: Floats) -> Floats:
+        """The slopes (n_y,) of the peak."""
+        tau, slopes = self.load(y)
+        k = int(np.abs(tau).argmax())
+        return np.asarray(np.sign(tau[k]) * slopes[k])
+
+    def where(self, y: Floats) -> str:
+        """`` at sample 12 (t = 0.3 s)``."""
+        samples, tau, _ = self.load.loads(y)
+        k = int(samples[np.abs(tau[:, self.load.column]).argmax()])
+        return f" at {self.load.loads.path.where(k)}"
+
+    @property
+    def in_words(self) -> str:
+        """Its name in a sentence about limits."""
+        return f"the limit of the {self.noun}"
+
+    def relaxed(self, side: str, share: float) -> str:
+        """The words for a limit that is relaxed by a share of it."""
+        return f"{handy(share * self.allowed[1], self.unit)} more {self.noun}"
+
+
 class LinearLimit(LimitedQuantity):
     """low ≤ Σ c_j y_j ≤ high: linear in the design, so that each step can keep it exactly."""
 
     in_one_shot = True
 
     @classmethod
-    def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
+    def of_case(
+        cls, file: CaseFile, model: Model, path: Trajectories | None
+    ) -> Iterator[LimitedQuantity]:
         """Yield the linear limits between design parameters."""
         for name, given in file.design.constraints.items():
             factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])

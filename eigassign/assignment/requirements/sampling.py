@@ -19,7 +19,12 @@ from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.lower_limit import LowerLimit
 from eigassign.assignment.requirements.named_modes import followed_modes
-from eigassign.assignment.requirements.quantity import LimitedQuantity, LinearLimit, MassLimit
+from eigassign.assignment.requirements.quantity import (
+    DriveLimit,
+    LimitedQuantity,
+    LinearLimit,
+    MassLimit,
+)
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights
@@ -41,7 +46,7 @@ KINDS: dict[str, type[Requirement]] = {
     one.form.kind: one
     for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap)
 }  # by the key that only their targets have
-QUANTITIES: tuple[type[LimitedQuantity], ...] = (MassLimit, LinearLimit)
+QUANTITIES: tuple[type[LimitedQuantity], ...] = (MassLimit, DriveLimit, LinearLimit)
 
 
 def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ...]:
@@ -55,9 +60,11 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
     )
 
 
-def design_limits(file: CaseFile, model: Model) -> tuple[LimitedQuantity, ...]:
-    """The limits of quantities of the design."""
-    return tuple(one for kind in QUANTITIES for one in kind.of_case(file, model))
+def design_limits(
+    file: CaseFile, model: Model, path: Trajectories | None
+) -> tuple[LimitedQuantity, ...]:
+    """The limits of quantities of the design, those of drives along whole trajectories."""
+    return tuple(one for kind in QUANTITIES for one in kind.of_case(file, model, path))
 
 
 def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, items, names
+from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names
 from eigassign.case.rules import joints, links, properties, study, targets
+from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.mechanism import Mechanism
 
 Rule = Callable[[Tree], Iterator[Finding]]
@@ -31,12 +32,15 @@ def keys_have_values(node: object, path: KeyPath = ()) -> Iterator[Finding]:
 
 
 def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
-    """`ground` is no link, `time` heads every table over time."""
+    """`ground` is no link, `time` heads every table over time, `torque` limits drives."""
     if "time" in names(tree, "coordinates"):
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in names(tree, "mechanism", "links"):
         path = ("mechanism", "links", "ground")
         yield path, "'ground' is the fixed frame: name the link otherwise"
+    if is_entry(at(tree, "design", "torque")):
+        message = "'torque' limits what drives exert, by coordinate: name the parameter otherwise"
+        yield ("design", "torque"), message
 
 
 RULES: tuple[Rule, ...] = (
@@ -68,6 +72,7 @@ RULES: tuple[Rule, ...] = (
     study.trajectories_have_names_of_their_own,
     study.branches_are_ranges_of_driven_joints,
     study.parameters_vary_different_properties,
+    study.limited_drives_are_of_coordinates,
     study.constraints_are_between_design_parameters,
     targets.targets_are_on_trajectories,
     targets.a_mode_has_one_frequency_at_a_time,

@@ -16,6 +16,7 @@ from eigassign.case.rules.lookups import (
     number,
     trajectories,
 )
+from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.vectors import ANGLE
 from eigassign.case.suggestions import listed, unknown
 
@@ -94,6 +95,14 @@ def parameters_vary_different_properties(tree: Tree) -> Iterator[Finding]:
             yield place, f"{path} is a design parameter already: {owner[path]!r}"
         else:
             owner[path] = name
+
+
+def limited_drives_are_of_coordinates(tree: Tree) -> Iterator[Finding]:
+    """The drives under `design.torque` are named by their coordinates."""
+    known, limits = names(tree, "coordinates"), at(tree, "design", "torque")
+    for name in () if is_entry(limits) else names(limits):
+        if name not in known:
+            yield ("design", "torque", name), unknown("coordinate", name, known)
 
 
 def constraints_are_between_design_parameters(tree: Tree) -> Iterator[Finding]:

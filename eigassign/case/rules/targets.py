@@ -131,9 +131,10 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
             yield ("targets", k, kind), f"is no wanted frequency; {instead}"
     for path, _ in followed_modes(tree):
         yield path, f"is followed by its shape; {instead}"
-    mass = at(tree, "design", "mass")
-    if mass is not None and not is_entry(mass):
-        yield ("design", "mass"), f"limits the mass; {instead}"
+    for key, what in (("mass", "the mass"), ("torque", "torques of drives")):
+        limits = at(tree, "design", key)
+        if limits is not None and not is_entry(limits):
+            yield ("design", key), f"limits {what}; {instead}"
 
 
 # --- Frequencies that change in time are wanted for the whole motion

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eigassign.case.reader import KeyPath, Tree, at, entries, items, text
+from eigassign.case.reader import KeyPath, Tree, at, entries, items, names, text
 from eigassign.case.rules.files import named_files
 from eigassign.case.rules.lookups import (
     ANY,
@@ -33,8 +33,9 @@ from eigassign.case.rules.properties import (
     known_property,
     properties,
 )
-from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.schema.targets import FREQUENCY
+from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import shown
 from eigassign.case.units import QuantityError, read_quantity, read_rate
 
@@ -71,10 +72,10 @@ def _changed(node: Any, changes: Any) -> Any:
 
 
 def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
-    for path, value, quantity in _undecided(tree):
+    for path, value, kind in _undecided(tree):
         if isinstance(value, (str, int, float)) and not isinstance(value, bool):
             try:
-                yield path, _in_si(value, quantity)
+                yield path, _in_si(value, kind)
             except QuantityError as error:
                 yield path, error
 
@@ -157,6 +158,11 @@ def _of_design(tree: Tree, known: Mapping[str, Quantity | None]) -> Iterator[Und
         if isinstance(amount, str) and not amount.rstrip().endswith("%"):
             either = Quantity(own.dimension, above=0) if prop else ANY
             yield ("design", name, "tolerance"), amount, either
+    drives = dict(zip(names(tree, "coordinates"), coordinate_quantities(tree), strict=True))
+    for name, body in items(tree, "design", "torque"):
+        kind = drives.get(name, ANY)
+        exerted = {PLACE: quantity("force", above=0), ANGLE: quantity("torque or energy", above=0)}
+        yield ("design", "torque", name, "max"), at(body, "max"), exerted.get(kind, ANY)
     for name, body in items(tree, "design", "constraints"):
         terms = [known.get(term) for term, _ in items(body, "terms")]
         dimensions = {term.dimension for term in terms if term}

@@ -35,7 +35,7 @@ YValue: TypeAlias = Annotated[
 Price: TypeAlias = Annotated[
     float, Quantity(elsewhere="for one SI unit when bare, or such as 3 / kg")
 ]
-RESERVED = ("constraints", "mass")  # names under `design` that are no entries of it
+RESERVED = ("constraints", "mass", "torque")  # names under `design` that are no entries of it
 MOST_CHOICES = 1000  # of an entry; a maker's whole list of profiles has some hundreds
 _SHARE = quantity("fraction", above=0)
 
@@ -233,6 +233,16 @@ class MassLimits(Part):
         return self
 
 
+class TorqueLimit(Part):
+    """Limit of what the drive of a coordinate exerts, at every sample of all trajectories.
+
+    Keys:
+        max: of its magnitude
+    """
+
+    max: Annotated[float, Quantity(above=0, elsewhere="torque, or force where the joint slides")]
+
+
 def is_entry(value: object) -> bool:
     """True for what looks like a parameter or a list of choices, as it stands under `design`."""
     return isinstance(value, Mapping) and ("parameter" in value or "choices" in value)
@@ -296,11 +306,13 @@ class Design(Part):
         entries: by name
         constraints: linear limits, min ≤ Σ coefficient · y ≤ max
         mass: of the whole mechanism
+        torque: of drives, by coordinate
     """
 
     entries: Named[Entry] = FrozenDict()
     constraints: Named[Constraint] = FrozenDict()
     mass: MassLimits | None = None
+    torque: Named[TorqueLimit] = FrozenDict()
 
     @cached_property
     def parameters(self) -> Mapping[str, DesignColumn]:

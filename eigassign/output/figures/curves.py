@@ -74,6 +74,27 @@ def coordinates(results: RunResults) -> FigurePlan:
     )
 
 
+def drives(results: RunResults) -> FigurePlan:
+    """What each drive exerts before and after, with its limit, one panel for each coordinate."""
+    panels = []
+    for row in results.drives:
+        curves = (Curve(row.initial_curve, _BEFORE), Curve(row.optimal_curve, _AFTER))
+        edges = () if row.limit is None else (row.limit, -row.limit)
+        label = labelled(short(row.name, 12), row.unit)
+        marks = (*(Rule(edge, EDGE) for edge in edges), *curves)
+        panels.append(Panel(label, marks, 1.3, holds=(np.array([0.0, *edges]),)))
+    key = (*BEFORE_AND_AFTER, *((("limit", EDGE),) * any(row.limit for row in results.drives)))
+    panels[0] = replace(panels[0], key=key)
+    names, title = ", ".join(row.name for row in results.drives), "What the drives carry"
+    return FigurePlan(
+        f"drives{suffix(results)}",
+        f"{title}{where(results)}",
+        f"Torques and forces of {names} along {results.along}, of {results.drives[0].of}.",
+        f"Torques and forces of {names} over time before and after.",
+        Graph(f"{title}{where(results)}", "time [s]", results.time_s, tuple(panels)),
+    )
+
+
 # --- Everything that was asked for, before and after
 
 

@@ -28,6 +28,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     for one in each:
         if one.others is not None and one.others.initial_hz.size:
             yield curves.other_modes(one, one.others)
+    yield from (curves.drives(one) for one in each if one.drives)
     yield from meaning_figures(results)
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)

@@ -66,6 +66,10 @@ def assignment_row(
     if all(t.satisfied for t in targets) and all(row.satisfied for row in limits):
         # what only round-off misses contradicts nothing
         answer = replace(answer, conflict=None)
+    if answer.conflict is not None:
+        open_ = {one.name for one in scene.limits if not one.is_decided}
+        if open_.intersection(answer.conflict.names):
+            answer = replace(answer, conflict=None)
     optimality = _optimality(scene, answer)
     conflicting = () if answer.conflict is None else answer.conflict.names
     unproved = () if found is None else tuple(_why_unproved(scene, found))
@@ -153,7 +157,7 @@ def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
         misses = [one.violation(amount, reach) for amount in (before, after)]
         kept = misses[1] <= ON
         least = None if kept else extreme(scene, one, y)
-        low, high = float(one.lower[0]), float(one.upper[0])
+        low, high = one.allowed
         yield LimitRow(
             name=one.name,
             words=one.asked_words,
@@ -166,7 +170,7 @@ def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
             initial_violation=misses[0],
             violation=misses[1],
             extreme=least,
-            stated=one.stated(after, least),
+            stated=one.stated(y, least),
         )
 
 

@@ -389,8 +389,9 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     more = f"{left:.2g} more are expected" if np.isfinite(left) else "more are likely"
     yield f"{found.starts} starts led to {minima} of χ²; {more}"
     design = problem.case.file.design
-    if design.constraints or design.mass is not None:
-        yield "limits of the mass and linear ones say what shall be: they are left aside here"
+    if design.constraints or design.mass is not None or design.torque:
+        what = "the mass, of drives" if design.torque else "the mass"
+        yield f"limits of {what} and linear ones say what shall be: they are left aside here"
     if design.catalogues:
         yield "lists of values and choices count as ranges from their smallest to largest value"
 

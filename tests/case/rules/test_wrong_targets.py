@@ -81,6 +81,12 @@ ENTRIES = {
     "mass without limits": ("¦mass: {}", "mass", "needs min, max or both"),
     "mass upside down": ("mass: {¦min: 3, max: 1}", "mass.min", "min 3 is above max 1"),
     "mass in m": ("mass: {¦max: 1 m}", "mass.max", "which is length"),
+    "torque of nothing": ("torque: {¦q3: {max: 3}}", "torque.q3", "unknown coordinate 'q3'; known: q1, q2"),
+    "torque in N": ("torque: {q1: {¦max: 3 N}}", "torque.q1.max", "which is force"),
+    "torque below nothing": ("torque: {q1: {¦max: 0}}", "torque.q1.max", "must be > 0 N m"),
+    "torque without max": ("torque: {¦q1: {}}", "torque.q1.max", "required key is missing"),
+    "torque from below": ("torque: {q1: {max: 3, ¦min: 1}}", "torque.q1.min", "unknown key"),
+    "parameter called torque": (f"¦torque: {{{ROD}, min: 2 cm, max: 4 cm}}", "torque", "'torque' limits what drives exert"),
 }
 ASSIGNMENT = {
     "misspelt method": ("{¦method: oneshot}", "method", "did you mean 'one_shot'"),
@@ -97,6 +103,7 @@ NOT_IN_ONE_SHOT = {
     "limit": (T, "  - {mode: 1, ¦at_least: 3}\n", "targets[0].at_least"),
     "followed mode": (T, "  - {¦mode: {like: 1, at: {time: 0}}, frequency: 3}\n", "targets[0].mode"),
     "mass": (D, "  ¦mass: {max: 3}\n", "design.mass"),
+    "torque": (D, "  ¦torque: {q1: {max: 3}}\n", "design.torque"),
 }
 # fmt: on
 
