@@ -14,9 +14,17 @@ from spatial_cases import ALLOY, built
 from spatial_examples import arm3r, ball_screw, four_bar, gantry, rigid, slotted_lever, straight
 from spatial_oracle import Tree
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
-from weight_comparison import agree_under_weight, direction, matrices, pulled, turned_about
+from weight_comparison import (
+    agree_under_weight,
+    direction,
+    level_carriage,
+    matrices,
+    pulled,
+    turned_about,
+)
 from weight_oracle import lowest, weigh
 
+SLOW = pytest.mark.slow
 DRAWS = [  # that hold every joint, a frame, rigid links, springs, tapers and shear
     *EVERY_TREE[:4:3], *EVERY_TREE[4:9], *EVERY_LOOP[:2], *EVERY_LOOP[5:8]
 ]  # fmt: skip
@@ -226,6 +234,19 @@ def test_a_free_trolley_on_a_level_girder_is_rigid_but_bends_it_where_it_goes(pl
     tree = lopsided(gantry("free"))
     assert len(pulled(tree, [0.0, -9.81]).pencil.rigid) == 1
     agree_under_weight(tree, [place], np.array([0.0, -1.0]))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(k, marks=SLOW) for k in range(3, 60))])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_elastic_modes_take_a_free_slide_along_that_the_weight_couples_to_them(
+    space: str, seed: int
+) -> None:
+    tree, q, down = level_carriage(seed, space)
+    pencil = pulled(tree, 9.81 * down).pencil
+    assert len(pencil.rigid) == 1
+    agree_under_weight(tree, q, down)
+    K = matrices(pulled(tree, 9.81 * down), q)[0]
+    assert not K[pencil.rigid].any()
 
 
 @pytest.mark.parametrize("draw", [(25, "planar", 1, True), (12, "spatial", 1, False)], ids=str)

@@ -72,3 +72,50 @@ def turned_about(tree: Tree, axis: np.ndarray, angle: float) -> Tree:
             joint.pop("angle", None)
             joint["position"] = (R @ point(joint.get("position"))).tolist()
     return out
+
+
+def level_carriage(seed: int, space: str) -> tuple[Tree, list[float], np.ndarray]:
+    """A free slide along a level girder on a crooked post, with an arm below; q, and down."""
+    rng = np.random.default_rng(seed)
+    planar = space == "planar"
+    R = Rotation.from_euler("z" if planar else "xyz", rng.uniform(-1.0, 1.0, 1 if planar else 3))
+    level = Rotation.from_euler("xz", rng.uniform(-3.0, 3.0, 2))
+    if planar:
+        level = Rotation.identity()
+
+    def turned(rotation: Rotation) -> Tree:
+        angles = rotation.as_euler("xyz")
+        return {"angle": float(angles[2])} if planar else {"orientation": angles.tolist()}
+
+    def beam(length: float) -> Tree:
+        return {"length": length, "elements": 3, "section": "s", "material": "m"}
+
+    on, where = ("prismatic", "g.end") if seed % 3 == 0 else ("carriage", "g")
+    m: Tree = {
+        "space": space,
+        "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}},
+        "sections": {"s": {"shape": "rectangle", "height": 0.03, "width": 0.02}},
+        "links": {"p": beam(rng.uniform(0.3, 1.0)), "g": beam(rng.uniform(0.8, 1.5)),
+                  "t": {"type": "rigid", "mass": rng.uniform(1.0, 30.0), "length": 0.1,
+                        "center": [0.1, -0.2] if planar else [0.1, 0.05, -0.2], "inertia": 0.1},
+                  "a": beam(rng.uniform(0.2, 0.8))},
+        "joints": {
+            "f": {"type": "fixed", "base": "ground", "follower": "p.start", **turned(R)},
+            "h": {"type": "fixed", "base": "p.end", "follower": "g.start",
+                  **turned(R.inv() * level)},
+            "s": {"type": on, "base": where, "follower": "t.start"},
+            "r": {"type": "revolute", "base": "t.end", "follower": "a.start",
+                  **turned(Rotation.from_euler("z", -1.3))},
+        },
+        "bodies": {"tip": {"at": "a.end", "mass": rng.uniform(0.5, 10.0)}},
+    }  # fmt: skip
+    if on == "prismatic":
+        m["joints"]["s"]["axis"] = [1.0, 0.0] if planar else [1.0, 0.0, 0.0]
+    drive = "free" if seed % 2 else {"stiffness": 1e4}
+    tree = {
+        "mechanism": m,
+        "coordinates": {"x": {"joint": "s", "drive": "free"}, "a": {"joint": "r", "drive": drive}},
+    }
+    if not planar:
+        m["links"]["t"]["inertia"] = [0.1, 0.2, 0.15]
+    return tree, [0.37, -0.2], np.array([0.0, -1.0] if planar else [0.0, 0.0, -1.0])

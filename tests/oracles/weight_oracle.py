@@ -448,10 +448,26 @@ class Weighed:
     builder: WeightBuilder
     sag: Array
     n_free: int
+    pull: Array  # of the weight on the motions, which the drives hold
+    weight: float  # the most that it pulls at any
 
     def spectrum(self, count: int, share: float = 1.0) -> Array:
-        """The lowest λ of K + share K_g; negative ones are poses that fall."""
-        return lowest(self.K + share * self.K_g, self.M, count)
+        """The lowest λ of K + share K_g; negative ones are poses that fall.
+
+        Motions R on which neither K nor the weight works may be coupled to others by K_g. What that
+        does in second order of gravity is left out, for sag would be of the same: to first order
+        other modes feel Pᵀ K_g P with P = I − R (RᵀMR)⁻¹ RᵀM.
+        """
+        least = 1e-6 * (np.trace(self.K) or 1.0) / np.trace(self.M)
+        size = np.sqrt(np.diag(self.K) + least * np.diag(self.M))
+        R = null_space(self.K / np.outer(size, size)) / size[:, None]
+        works = np.vstack([R.T @ self.K_g, self.pull]) @ R
+        scale = np.abs(R.T) @ np.abs(self.K_g) @ np.abs(R)
+        scale = np.append(scale.max(axis=1, initial=0.0), self.weight * np.abs(R).max(initial=0.0))
+        turns = np.linalg.svd(works / np.maximum(scale, 1e-300)[:, None])
+        R = R @ turns.Vh[int((turns.S > 1e-9).sum()) :].T
+        P = np.eye(len(R)) - R @ np.linalg.solve(R.T @ self.M @ R, R.T @ self.M)
+        return lowest(self.K + share * P.T @ self.K_g @ P, self.M, count)
 
 
 def lowest(K: Array, M: Array, count: int) -> Array:
@@ -499,6 +515,7 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
         add(np.arange(node, node + 6), dot(x[0:3] + by(rotated(x[3:6]), arm), g * -mass))
     for beam in b.beams:
         add(beam.dofs, beam.weight(unknowns(12), g))
+    weight = np.abs(slope)
     sag, forces = statics(K, rows, -slope, np.setdiff1d(keep, b.driven))
     for part in b.strained:
         strain = part.strain(unknowns(len(part.dofs)))
@@ -518,7 +535,17 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
     small = null_space(rows[:, keep])
     T = np.zeros((b.n, small.shape[1]))
     T[keep] = small
-    return Weighed(T.T @ K @ T, T.T @ curve @ T, T.T @ M @ T, T, b, sag, n_free)
+    return Weighed(
+        T.T @ K @ T,
+        T.T @ curve @ T,
+        T.T @ M @ T,
+        T,
+        b,
+        sag,
+        n_free,
+        T.T @ slope,
+        float((np.abs(T.T) @ weight).max()),
+    )
 
 
 def statics(K: Array, rows: Array, f: Array, held: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,20 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
-from eigassign.mechanism.assembly.affine_entries import Entries
+from eigassign.mechanism.assembly.affine_entries import AffineEntries, Entries, joined
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
 from eigassign.mechanism.assembly.node_motion import MotionRows
 from eigassign.mechanism.assembly.springs import SpringEnds, resists
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import DOFS, multiply
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
-from eigassign.series.expression import Expression
+from eigassign.series.expression import Expression, Scalar, one_atom
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
 RESISTED = 1e-9  # relative motion of a spring's ends, scaled to 1, that is not round-off
 ROUND_OFF = 1e-12  # of an entry of W, whose largest is about 1, and of m or rad per rad or m
@@ -86,32 +88,82 @@ def swinging(
     return _recombined(motion, free, *_echelon(W / size[:, None]))
 
 
-def uncoupled(
-    entries: Entries, case: CaseFile, parameters: ModelParameters, rigid: Sequence[int], n_dof: int
+def apart_from_rigid(
+    K_g: Entries,
+    M: Entries,
+    case: CaseFile,
+    parameters: ModelParameters,
+    rigid: Sequence[int],
+    n_dof: int,
 ) -> Entries:
-    """Entries of K_g without what is but round-off in those of rigid motions, the dofs ``rigid``.
+    """Pᵀ K_g P with P = I − R M_FF⁻¹ RᵀM, R the columns of rigid motions, the dofs ``rigid`` F.
 
     On them alone the weight does no work. Yet a motion along a deflected beam, unlike a turn about
-    the vertical, may change what elastic displacements cost: K_g then couples it to them.
+    the vertical, may change what elastic displacements cost: K_g couples it to them. Elastic modes
+    move it by −C φ_E, C = M_FF⁻¹ M_FE, and feel
+
+        K_EE − K_EF C − Cᵀ K_FE .
+
+    What is but round-off in K_FE is left out.
     """
-    rows, columns, atoms, factors = entries
+    rows, columns, atoms, factors = K_g
     if not len(rigid) or not len(rows):
-        return entries
+        return K_g
     used, place = np.unique(atoms, return_inverse=True)
-    recorder = parameters.recorder
-    terms = [Expression(recorder, 0.0, {a: 1.0}) if a >= 0 else 1.0 for a in used.tolist()]
+    terms = [_atom(parameters, a) for a in used.tolist()]
     table = parameters.compiled(np.array(terms, dtype=object))
-    still = np.zeros(n_dof, dtype=bool)
-    still[list(rigid)] = True
-    among = still[rows] & still[columns]
+    moves = np.zeros(n_dof, dtype=bool)
+    moves[list(rigid)] = True
+    coupled, across = np.zeros_like(moves), moves[rows] & moves[columns]
     for theta in _at_poses(table, reference(case, parameters), _spans(case, parameters)):
-        values = np.where(among, 0.0, factors * theta[place])
+        values = np.where(across, 0.0, factors * theta[place])
         size = abs(sparse.csr_array((values, (rows, columns)), shape=(n_dof, n_dof)))
         # of N against N/m and N m; a rider of this share of the weight is none
-        coupled = size.max(axis=0).toarray().ravel() > 1e-10 * size.max()
-        still &= ~coupled
-    kept = ~(among | still[rows] | still[columns])
-    return rows[kept], columns[kept], atoms[kept], factors[kept]
+        coupled |= moves & (size.max(axis=0).toarray().ravel() > 1e-10 * size.max())
+    inner = ~(moves[rows] | moves[columns])
+    kept = rows[inner], columns[inner], atoms[inner], factors[inner]
+    pulls = ~moves[rows] & coupled[columns]
+    if not pulls.any():
+        return kept
+    K_EF = [each[pulls].tolist() for each in K_g]
+    return joined(kept, _drawn_along(K_EF, M, parameters, rigid, np.flatnonzero(coupled), n_dof))
+
+
+def _drawn_along(
+    K_EF: Sequence[Sequence[Any]],
+    M: Entries,
+    parameters: ModelParameters,
+    rigid: Sequence[int],
+    coupled: Ints,
+    n_dof: int,
+) -> Entries:
+    """−K_EF C − Cᵀ K_FE, C = M_FF⁻¹ M_FE, of the rigid motions that are ``coupled``."""
+    place, some = ({dof: k for k, dof in enumerate(own)} for own in (rigid, coupled.tolist()))
+    M_FF = np.zeros((len(place), len(place)), dtype=object)
+    M_FE: dict[tuple[int, int], Floats] = {}  # by rigid motion and atom
+    for i, j, atom, factor in zip(*(each.tolist() for each in M), strict=True):
+        if i in place and j in place:
+            value = _atom(parameters, atom) * factor
+            M_FF[place[i], place[j]] = M_FF[place[i], place[j]] + value
+        elif i in place:
+            M_FE.setdefault((place[i], atom), np.zeros(n_dof))[j] += factor
+    unit = np.eye(len(place))[:, [place[f] for f in some]]
+    inverse = parameters.recorder.solve(M_FF.tolist(), unit.tolist())
+    pull: dict[int, Objects] = {}  # K_EF row by row
+    for i, f, atom, factor in zip(*K_EF, strict=True):
+        row = pull.setdefault(i, np.zeros(len(some), dtype=object))
+        row[some[f]] = row[some[f]] + _atom(parameters, atom) * factor
+    out, every = AffineEntries(), np.arange(n_dof)
+    for i, row in pull.items():
+        shares = [one_atom(share) for share in multiply(np.array(inverse), row[:, None])[:, 0]]
+        for (f, atom), v in M_FE.items():
+            out.add_coupling(shares[f] * _atom(parameters, atom) * -1.0, v, every, [(i, 1.0)])
+    return out.finish(n_dof)
+
+
+def _atom(parameters: ModelParameters, atom: int) -> Scalar:
+    """The function of an entry: an atom, or the number 1."""
+    return Expression(parameters.recorder, 0.0, {atom: 1.0}) if atom >= 0 else 1.0
 
 
 def _recombined(
