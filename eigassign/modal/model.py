@@ -22,6 +22,7 @@ from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.discretisation import discretisation_error
 from eigassign.modal.exact.solver import eigenvalues, modes
+from eigassign.modal.exact.standing import require_standing
 from eigassign.modal.exact.tracking import Tracked, track
 from eigassign.modal.slopes import exact_slopes
 from eigassign.modal.truncation import truncation_error
@@ -89,14 +90,19 @@ class Model:
             raise UsageError(f"this is for one sample of q and y, not {len(x)}")
         return x
 
-    def require_on_rails(
+    def require_standing(
         self, q: ArrayLike, y: ArrayLike, label: Label = "sample {}".format
     ) -> None:
-        """Raise TravelError for the first sample k, ``label(k)``, where a rider leaves its beam."""
+        """Raise for the first sample k, ``label(k)``, where a rider leaves its beam: TravelError.
+
+        MechanismError for the first that falls under its weight, or buckles.
+        """
+        x = self.x(q, y)
         if self.pencil.rails is not None:
-            x = self.x(q, y)
             z = self.pencil.to_program @ x.T + self.pencil.shift[:, None]
             self.pencil.rails.require(z, x, label)
+        if self.pencil.weight is not None:
+            require_standing(self.pencil, self.pencil.theta(x), x, label)
 
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""

@@ -113,7 +113,7 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
         )
     )
     with located(file):
-        model.require_on_rails(found.q, initial_design(file), found.sample)
+        model.require_standing(found.q, initial_design(file), found.sample)
     return found
 
 

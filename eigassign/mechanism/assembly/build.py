@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
+from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.affine_entries import AffineEntries, Entries, joined, pattern
+from eigassign.mechanism.assembly.affine_entries import (
+    AffineEntries,
+    Entries,
+    Ints,
+    joined,
+    pattern,
+)
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.gravity.statics import hangs_on_stiffness
 from eigassign.mechanism.assembly.gravity.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.assembly.rigid_body_modes import separated, swinging, uncoupled
+from eigassign.mechanism.assembly.pencil import Pencil, Weight
+from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
 from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
@@ -72,7 +79,7 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    g, weight = gravity(case), AffineEntries(summed=True)
+    g, weight, K_g = gravity(case), AffineEntries(summed=True), None
     if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
@@ -83,8 +90,8 @@ def build_pencil(
     if g is not None:
         known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
         rigid = [nodes.count + k for k in motion.rigid]
-        K = joined(K, uncoupled(weight.finish(nodes.count), case, known, rigid, n_dof))
-    return _compile(K, M, case, parameters, motion, nodes.count)
+        K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
+    return _compile(K, M, K_g, case, parameters, motion, nodes.count)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -263,6 +270,7 @@ def _add_drives(
 def _compile(
     stiffness: Entries,
     mass: Entries,
+    weight: Entries | None,
     case: CaseFile,
     parameters: ModelParameters,
     motion: Kinematics,
@@ -272,6 +280,8 @@ def _compile(
     if not n_dof:
         raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
     entries = [stiffness, mass]
+    if weight is not None:
+        entries = [joined(stiffness, weight), mass, weight]
     used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
     used[0] = True
     for entry in entries:
@@ -294,4 +304,34 @@ def _compile(
         n_loads=len(parameters.loads),
         limits=property_limits(case),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
+        weight=_weight(stiffness[0], (rows, columns), weights[2:], case, motion, n_u),
+    )
+
+
+def _weight(
+    held: Ints,
+    places: tuple[Ints, Ints],
+    K_g: Sequence[sparse.csr_array],
+    case: CaseFile,
+    motion: Kinematics,
+    n_u: int,
+) -> Weight | None:
+    """K_g at its ``places``; ``held`` are the unknowns that K has entries of without it."""
+    g = gravity(case)
+    if g is None:
+        return None
+    columns = [k for k in range(len(motion.columns)) if k not in motion.rigid]
+    joints, names = n_u + np.array(columns, dtype=np.intp), tuple(case.coordinates)
+    entries = np.flatnonzero(np.isin(places, joints).all(axis=0))
+    i, j = (np.searchsorted(joints, each[entries]) for each in places)
+    at = np.ones(len(entries)), (i * len(joints) + j, np.arange(len(entries)))
+    spread = sparse.csr_array(at, shape=(len(joints) ** 2, len(entries)))
+    return Weight(
+        stiffness=K_g[0],
+        joints=joints,
+        among_joints=sparse.csr_array(spread @ K_g[0][entries]),
+        swinging=np.flatnonzero(~np.isin(joints, held)),
+        names=tuple(names[motion.columns[k]] for k in columns),
+        coordinates=names,
+        gravity=float(np.linalg.norm(g)),
     )

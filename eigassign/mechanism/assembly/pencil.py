@@ -52,6 +52,19 @@ def theta_slopes(
     return slopes
 
 
+@dataclass(frozen=True, eq=False)
+class Weight:
+    """K_g by itself, which is in K as well, and what to say of coordinates that it moves."""
+
+    stiffness: sparse.csr_array  # (n_nonzeros, n_theta) on the pencil's pattern
+    joints: Ints  # the dofs of joint coordinates that are not rigid (n_joints,)
+    among_joints: sparse.csr_array  # their own K_g, (n_joints², n_theta)
+    swinging: Ints  # places in ``joints`` of those that nothing but the weight holds
+    names: tuple[str, ...]  # of ``joints``
+    coordinates: tuple[str, ...]  # of all, which the samples begin with
+    gravity: float  # |g| in m/s²
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Pencil(Brief):
     """K and M of eq. (1) in the unknowns [u; q̇], order n_dof = n_u + n_columns.
@@ -75,6 +88,7 @@ class Pencil(Brief):
     n_loads: int = 0
     rails: Rails | None = None  # where carriages and nuts may stand
     limits: PropertyLimits | None = None  # of the loads and design parameters
+    weight: Weight | None = None  # under gravity
     dense_limit: int = DENSE_LIMIT
 
     @property

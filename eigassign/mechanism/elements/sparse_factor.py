@@ -34,6 +34,11 @@ def lu(matrix: sparse.csc_array, **options: Any) -> linalg.SuperLU:
         raise MemoryError(str(error)) from error  # of a malloc that failed
 
 
+def has_positive_pivots(factor: linalg.SuperLU) -> bool:
+    """True where all pivots are on the diagonal and positive: the matrix is definite."""
+    return bool((factor.perm_r == factor.perm_c).all() and (factor.U.diagonal() > 0.0).all())
+
+
 def definite_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
     """The factor of a symmetric positive definite matrix; None where it is not definite."""
     try:

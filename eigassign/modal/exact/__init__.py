@@ -6,6 +6,7 @@ In reading order:
     massless      counts the modes with mass, and solves nearly massless models to full precision
     dense         small pencils: many samples at once, or one through LAPACK
     sparse        large pencils: Lanczos with one sparse factorisation
+    standing      poses that fall under the weight, and loads beyond buckling
     inertia       how many modes lie below a frequency, by pivots alone
     substructure  many samples of a large pencil together, and proof that no mode was missed
     solver        the dispatcher: dense or sparse, and as many modes as there are

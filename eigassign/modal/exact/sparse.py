@@ -11,7 +11,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.sparse_factor import factorise, has_positive_pivots
 from eigassign.modal.exact.condensation import Modes, positive_at_top, rigid_coupling
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
@@ -42,6 +42,8 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
         factor = factorise(K_E)
     except RuntimeError as error:
         raise MechanismError("mechanism", LIMP) from error
+    if pencil.weight is not None and not has_positive_pivots(factor):
+        raise MechanismError("mechanism", LIMP)
     M_rows = M_EE.T  # symmetric: products run faster row by row
     mu, z = lanczos(factor, K_E.T, lambda v: M_rows @ v - (coupling @ v) @ M_FE, count)
     noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)

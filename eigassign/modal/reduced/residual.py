@@ -27,6 +27,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.sparse_factor import has_positive_pivots
 from eigassign.modal.projection import entries, project
 from eigassign.modal.reduced.basis import INDEFINITE
 
@@ -130,14 +131,13 @@ def residual_terms(
 
 def half_solve(factor: linalg.SuperLU, A: Floats) -> Floats:
     """L⁻¹ P A with P K0 Pᵀ = L Lᵀ; raises AccuracyError where K0 is not positive definite."""
-    pivots = factor.U.diagonal()
-    if (factor.perm_r != factor.perm_c).any() or not (pivots > 0.0).all():
+    if not has_positive_pivots(factor):
         raise AccuracyError(INDEFINITE)
     permuted = np.empty_like(A)
     permuted[factor.perm_r] = A
     lower = factor.L.tocsr()
     solved = linalg.spsolve_triangular(lower, permuted, lower=True, unit_diagonal=True)
-    return np.asarray(solved / np.sqrt(pivots)[:, None])
+    return np.asarray(solved / np.sqrt(factor.U.diagonal())[:, None])
 
 
 def _blocks(pencil: Pencil, terms: sparse.csc_array, basis: Floats) -> list[_Block]:

@@ -237,7 +237,7 @@ def update_problem(case: BuiltCase) -> UpdateProblem:
     )
     with case.located():
         labels = {int(row): each.label for row, each in zip(problem.rows, measured, strict=True)}
-        problem.model.require_on_rails(q, case.initial_design, lambda k: labels[k])
+        problem.model.require_standing(q, case.initial_design, lambda k: labels[k])
     return problem
 
 

@@ -1,0 +1,126 @@
+"""Where K_0 + K_g is not positive definite: poses that fall under the weight, and buckling.
+
+Of coordinates S that nothing but the weight holds, K_g,SS tells whether they hang or stand. With H
+all other elastic unknowns and
+
+    G = K_g,HH − K_g,HS K_g,SS⁻¹ K_g,SH ,    −G z = μ K_0,HH z ,
+
+K_0 + κ K_g is singular first at κ = 1/μ of the largest μ: where κ < 1, so much of the weight
+buckles the mechanism.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh, lapack
+from scipy.sparse import linalg
+
+from eigassign.errors import LIMP, MechanismError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.sparse_factor import (
+    definite_factor,
+    factorise,
+    has_positive_pivots,
+)
+from eigassign.modal.exact.sparse import principal
+
+Floats = NDArray[np.float64]
+Label = Callable[[int], str]
+# Of the largest K_g of a coordinate, and of g M_ii per metre: less is round-off, a thousand times
+ZERO = 1e-12
+FALLS = "give it a drive stiffness, lock it, or write `gravity: none`"
+
+
+def require_standing(
+    pencil: Pencil, theta: Floats, x: Floats | None = None, label: Label = "sample {}".format
+) -> None:
+    """Raise MechanismError for the first sample that falls or buckles: θ (n_theta, n).
+
+    ``x`` (n, n_x) names the pose, ``label`` sample k. Without gravity nothing does.
+    """
+    if pencil.weight is None:
+        return
+    require_hanging(pencil, theta, x, label)
+    for k in range(theta.shape[1]):
+        if not _is_definite(pencil, theta[:, k]):
+            raise MechanismError(
+                "mechanism", _buckled(pencil, theta[:, k], _pose(pencil, x, k, label))
+            )
+
+
+def require_hanging(
+    pencil: Pencil, theta: Floats, x: Floats | None = None, label: Label = "sample {}".format
+) -> None:
+    """Raise MechanismError for the first sample where a coordinate falls that the weight holds."""
+    weight = pencil.weight
+    if weight is None or not len(weight.swinging):
+        return
+    n, s = len(weight.joints), weight.swinging
+    K = (weight.among_joints @ theta).T.reshape(-1, n, n)
+    M = (pencil.mass_magnitude[weight.joints[s]] @ np.abs(theta)).T
+    scale = 1.0 / np.sqrt(np.where(M > 0.0, M, 1.0))
+    lam, modes = np.linalg.eigh(K[:, s][:, :, s] * scale[:, :, None] * scale[:, None, :])
+    least = ZERO * (np.abs(K).max(axis=(1, 2))[:, None] + weight.gravity * M) * scale**2
+    noise = (modes[:, :, 0] ** 2 * least).sum(axis=1)
+    fallen = lam[:, 0] <= noise
+    if fallen.any():
+        k = int(fallen.argmax())
+        name = weight.names[s[int(np.abs(modes[k, :, 0]).argmax())]]
+        what = "would fall" if lam[k, 0] < -noise[k] else "is held by nothing, nor by the weight,"
+        message = f"{what} {_pose(pencil, x, k, label)}: {FALLS}"
+        raise MechanismError(f"coordinates.{name}", message)
+
+
+def _pose(pencil: Pencil, x: Floats | None, k: int, label: Label) -> str:
+    """Where a sample is, in words."""
+    names = () if x is None or pencil.weight is None else pencil.weight.coordinates
+    pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, x[k] if names else (), strict=False))
+    return (f"in the pose {pose} " if pose else "") + f"({label(k)})"
+
+
+def _is_definite(pencil: Pencil, theta: Floats) -> bool:
+    E = pencil.elastic
+    if pencil.is_dense:
+        K = pencil.stiffness_matrices(theta[:, None])[0]
+        return not lapack.dpotrf(K[np.ix_(E, E)], lower=1)[1]
+    try:
+        return has_positive_pivots(factorise(principal(pencil, pencil.stiffness @ theta, E)))
+    except RuntimeError:  # a pivot is exactly zero
+        return False
+
+
+def _buckled(pencil: Pencil, theta: Floats, where: str) -> str:
+    """What a design and pose says whose K is not definite though nothing falls."""
+    weight = pencil.weight
+    assert weight is not None
+    S = weight.joints[weight.swinging]
+    H = np.setdiff1d(pencil.elastic, S)
+    data = weight.stiffness @ theta
+    K_0 = principal(pencil, pencil.stiffness @ theta - data, H)
+    K_g = principal(pencil, data, np.union1d(H, S)).tocsr()
+    inner, outer = (np.isin(np.union1d(H, S), each) for each in (H, S))
+    G, across = K_g[inner][:, inner], K_g[inner][:, outer].toarray()
+    drawn = np.linalg.solve(K_g[outer][:, outer].toarray(), across.T)
+    if len(H) <= pencil.dense_limit:
+        try:
+            mu = eigh(across @ drawn - G.toarray(), K_0.toarray(), eigvals_only=True)[-1]
+        except np.linalg.LinAlgError:
+            return LIMP
+    else:
+        factor = definite_factor(K_0)
+        if factor is None:
+            return LIMP
+        n = len(H)
+        operator = linalg.LinearOperator((n, n), matvec=lambda v: across @ (drawn @ v) - G @ v)
+        inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
+        start = np.random.default_rng(0).standard_normal(n)
+        mu = linalg.eigsh(operator, 1, M=K_0, Minv=inverse, which="LA", v0=start)[0][0]
+    if mu <= 1.0:
+        return LIMP
+    return (
+        f"buckles under its weight {where}: {1.0 / mu:.3g} times the weight is enough; make what "
+        "carries it stiffer or the load lighter, or write `gravity: none`"
+    )
