@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.velocity_terms import placeless, velocity_terms
+from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,
     Trajectories,

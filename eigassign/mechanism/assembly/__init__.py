@@ -14,5 +14,5 @@ Read in this order; each imports only from those above it:
     total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]
-    velocity_terms    the velocity terms of eq. (1) that the method neglects
+    dynamics          what motion and loads add to eq. (1), at a pose
 """

@@ -1,0 +1,6 @@
+"""All links in numbers at a pose: what their motion and the loads on them add to eq. (1).
+
+Read in this order:
+
+    velocity_terms  the velocity terms of eq. (1) that the method neglects
+"""
