@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.dynamics.velocity_terms import VelocityTerms
+from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Rates
 from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
 from eigassign.modal.taylor.coefficients import pencil_series

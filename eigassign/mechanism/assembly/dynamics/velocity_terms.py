@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.elements.beam import fields
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.elements.profiles import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -73,7 +73,7 @@ class VelocityTerms:
 
         The loads in q rest.
         """
-        h = self._step(q, y, rate, acceleration)
+        h = self.interval(q, y, rate, acceleration)
         t = h * np.arange(-2.0, 3.0)[:, None]
         z = self.values(q + rate * t + acceleration * (t * t / 2.0), y)
         B, W = [self.stack.motion(each) for each in z], self._joints(rate + acceleration * t)
@@ -90,13 +90,12 @@ class VelocityTerms:
         C, K = growth + Q[1] - Q[1].T, (Q[2] - Q[0]) * (0.5 / h) - R
         return sparse.csr_array(C), sparse.csr_array(K)
 
-    def _step(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
+    def interval(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
         """The interval of the differences, s: a screw turns much faster than its nut travels."""
         (z,) = self.values(q[None], y)
-        spins = self.stack.spins.at(z[4])
-        turned = (spins @ self._joints(rate), spins @ self._joints(acceleration))
+        turned = (self.stack.twists(z, self._joints(each))[:, 3:] for each in (rate, acceleration))
         fastest, hardest = (
-            np.abs(np.concatenate(both)).max()
+            np.abs(np.concatenate([both[0], both[1].ravel()])).max()
             for both in zip((rate, acceleration), turned, strict=True)
         )
         speed = max(float(fastest), float(np.sqrt(hardest)))
@@ -129,60 +128,53 @@ def velocity_terms(
         raise MechanismError(f"mechanism.links.{name}", message)
     links, nodes = local_links(case, parameters, motion)
     placed = zip(links, motion.placements, strict=True)
-    heavy = [_Heavy(link, p.link) for link, p in placed if whole_mass(link)]  # rigid ones may not
-    stack, meshes = _stacked(heavy, nodes, all_moving(case, parameters, motion), motion)
-    patterns = (stack.joined, stack.spread, stack.twist, stack.masses, stack.spins)
-    scalars = [np.array(each.coefficients, dtype=object) for each in patterns]
-    scalars += [array for mesh in meshes for array in _mesh_scalars(mesh)]
+    heavy = [(p.link, link) for link, p in placed if whole_mass(link)]  # rigid ones may not
+    stack, meshes = stacked(heavy, nodes, all_moving(case, parameters, motion), motion)
+    scalars = [*stack.scalars, *(array for mesh in meshes for array in _mesh_scalars(mesh))]
     return VelocityTerms(stack, parameters.compiled(*scalars), parameters)
 
 
-class _Heavy(NamedTuple):
-    """A link that has mass."""
-
-    local: LocalLink
-    name: str
-
-    @property
-    def size(self) -> int:
-        """Number of its dofs before it was reduced."""
-        return int(whole_mass(self.local)[0].matrix.shape[0])
-
-
-def _stacked(
-    links: Sequence[_Heavy], nodes: NodeMotions, moving: Kinematics, motion: Kinematics
+def stacked(
+    links: Sequence[tuple[str, LocalLink]],
+    nodes: NodeMotions,
+    moving: Kinematics,
+    motion: Kinematics,
 ) -> tuple[StackedLinks, list[LinkMesh]]:
-    """The links one below the other, and the meshes of those on which something rides."""
+    """The links one below the other, and the meshes of those on which something rides.
+
+    ``moving`` has every coordinate among its columns, as from `all_moving`.
+    """
     kept, n_dof = DOFS[nodes.space], nodes.count + len(motion.columns)
-    n_local, n_whole = sum(len(link.own) for link, _ in links), sum(each.size for each in links)
+    sizes = [whole_size(link) for _, link in links]
+    n_local, n_whole = sum(len(link.own) for _, link in links), sum(sizes)
     n_twist = len(kept) * len(links)
     U, N, T = Entries((n_local, n_dof)), Entries((n_local, n_twist)), Entries((n_twist, n_dof))
-    m, spins = Entries((n_whole, n_whole)), Entries((3 * len(links), len(motion.relative)))
+    m, rates = Entries((n_whole, n_whole)), Entries((6 * len(links), len(motion.relative)))
     local = whole = 0
     riders, meshes, bases = [], [], []
-    for k, (link, name) in enumerate(links):
-        own, size = np.flatnonzero(link.own >= 0), links[k].size
+    for k, (name, link) in enumerate(links):
+        own, size = np.flatnonzero(link.own >= 0), sizes[k]
         U.add(1.0, local + own, link.own[own], np.ones(len(own)))
         for slot, row in link.carried.items():
             unknowns = np.array([unknown for unknown, _ in row], dtype=np.intp)
             U.add_scalars([c for _, c in row], np.full(len(row), local + slot), unknowns)
-        _add_terms(N, link.rigid, local, len(kept) * k)
+        add_terms(N, link.rigid, local, len(kept) * k)
         _add_dense(T, link.twist, len(kept) * k, nodes.count)
-        _add_terms(m, whole_mass(link), whole, whole)
-        _add_dense(spins, moving.placement(name).twist[3:], 3 * k, 0)
+        add_terms(m, whole_mass(link), whole, whole)
+        _add_dense(rates, moving.placement(name).twist, 6 * k, 0)
         if motion.tree.riders(name):
             meshes.append(nodes.meshes[name])
-            riders.append(_riding(meshes[-1], whole, n_whole))
+            riders.append(Riding.of(meshes[-1].strands[0], whole, n_whole))
         bases.append(sparse.eye_array(size) if link.reduction is None else link.reduction.basis)
         local, whole = local + len(link.own), whole + size
     stack = StackedLinks(
-        _pattern(U),
-        _pattern(N),
-        _pattern(T),
-        _pattern(m),
-        _pattern(spins),
+        pattern(U),
+        pattern(N),
+        pattern(T),
+        pattern(m),
+        pattern(rates),
         sparse.csr_array(sparse.block_diag(bases)) if n_local != n_whole else None,
-        np.repeat(np.arange(len(links)), [h.size // len(kept) for h in links]),
+        np.repeat(np.arange(len(links)), [size // len(kept) for size in sizes]),
         np.array(kept),
         tuple(riders),
     )
@@ -194,7 +186,12 @@ def whole_mass(link: LocalLink) -> Sequence[Term]:
     return link.mass if link.reduction is None else link.reduction.mesh.mass
 
 
-def _add_terms(out: Entries, terms: Sequence[Term], row: int, column: int) -> None:
+def whole_size(link: LocalLink) -> int:
+    """Number of dofs of a link before it was reduced."""
+    return len(link.own) if link.reduction is None else link.reduction.mesh.n_local
+
+
+def add_terms(out: Entries, terms: Sequence[Term], row: int, column: int) -> None:
     """Σ coefficient × matrix with its corner at (row, column)."""
     for coefficient, matrix in terms:
         A = matrix.tocoo()
@@ -211,12 +208,35 @@ def _add_dense(out: Entries, block: Objects, row: int, column: int) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Riding:
-    """A straight beam whose mesh moves."""
+class StackedElements:
+    """The elements of a row of beams among the dofs of all links."""
 
-    dofs: Ints  # (n, 12) dofs of each element among those of all links; −1 where a plane has none
+    dofs: Ints  # (n, 12) dofs of each element; −1 where a plane has none
     turn: Floats  # (12, 12) from the link's axes to those of the section
     n_whole: int
+
+    @classmethod
+    def of(cls, strand: Strand, first: int, n_whole: int) -> Self:
+        """The elements of a strand, its link's dofs counted from ``first``."""
+        assert strand.axes is not None
+        slots = np.array(list(strand.slots), dtype=np.intp)
+        slots = np.where(slots >= 0, first + slots, -1)
+        turn = np.kron(np.eye(4), strand.axes).astype(np.float64)
+        return cls(np.hstack([slots[:-1], slots[1:]]), turn, n_whole)
+
+    def assembled(self, blocks: Floats) -> sparse.csr_array:
+        """Matrices (n, 12, 12) of the elements in the section's axes, on the dofs of all links."""
+        blocks = self.turn.T @ blocks @ self.turn
+        places = self.dofs[:, :, None], self.dofs[:, None, :]
+        rows, columns = (np.broadcast_to(a, blocks.shape) for a in places)
+        kept = (rows >= 0) & (columns >= 0)
+        entries = (blocks[kept], (rows[kept], columns[kept]))
+        return sparse.csr_array(entries, shape=(self.n_whole, self.n_whole))
+
+
+@dataclass(frozen=True, eq=False)
+class Riding(StackedElements):
+    """A straight beam whose mesh moves."""
 
     def at(self, values: Sequence[Values], step: float) -> tuple[sparse.csr_array, ...]:
         """G [kg/s] and H [kg/s²] (n_whole, n_whole) at the middle of three instants ``step`` apart.
@@ -241,25 +261,6 @@ class Riding:
         G = np.einsum("epri,epr,eprj->eij", N, matter, N_rate)
         H = np.einsum("epri,epr,eprj->eij", N_rate, matter, N_rate)
         return self.assembled(G), self.assembled(H)
-
-    def assembled(self, blocks: Floats) -> sparse.csr_array:
-        """Matrices (n, 12, 12) of the elements in the section's axes, on the dofs of all links."""
-        blocks = self.turn.T @ blocks @ self.turn
-        places = self.dofs[:, :, None], self.dofs[:, None, :]
-        rows, columns = (np.broadcast_to(a, blocks.shape) for a in places)
-        kept = (rows >= 0) & (columns >= 0)
-        entries = (blocks[kept], (rows[kept], columns[kept]))
-        return sparse.csr_array(entries, shape=(self.n_whole, self.n_whole))
-
-
-def _riding(mesh: LinkMesh, first: int, n_whole: int) -> Riding:
-    """The beam of a link on which a carriage or nut rides, its dofs counted from ``first``."""
-    (strand,) = mesh.strands
-    assert strand.axes is not None
-    slots = np.array(list(strand.slots), dtype=np.intp)
-    slots = np.where(slots >= 0, first + slots, -1)
-    turn = np.kron(np.eye(4), strand.axes).astype(np.float64)
-    return Riding(np.hstack([slots[:-1], slots[1:]]), turn, n_whole)
 
 
 def _mesh_scalars(mesh: LinkMesh) -> list[Objects]:
@@ -301,7 +302,8 @@ class Pattern:
         return self.places % width, np.searchsorted(self.places, np.arange(rows + 1) * width)
 
 
-def _pattern(entries: Entries) -> Pattern:
+def pattern(entries: Entries) -> Pattern:
+    """The pattern of an affine matrix."""
     none = np.zeros(0, dtype=np.intp)
     keys, columns, data = [none], [none], [np.zeros(0)]
     for k, (_, groups) in enumerate(entries.groups.values()):
@@ -318,17 +320,27 @@ def _pattern(entries: Entries) -> Pattern:
 
 @dataclass(frozen=True, eq=False)
 class StackedLinks:
-    """The links with mass; z are the numbers of the five patterns, then three for each rider."""
+    """Links; z are the numbers of the five patterns, then three for each rider."""
 
     joined: Pattern  # U (n_local, n_dof)
     spread: Pattern  # N (n_local, Σ n_twist)
     twist: Pattern  # T (Σ n_twist, n_dof)
     masses: Pattern  # m (n_whole, n_whole)
-    spins: Pattern  # ω per rate of every coordinate, (3 n_links, n_coordinates)
+    rates: Pattern  # twist (v, ω) per rate of every coordinate, (6 n_links, n_coordinates)
     basis: sparse.csr_array | None  # Ψ (n_whole, n_local); None where no link is reduced
     owners: Ints  # the link of each node
     kept: Ints  # of the six dofs of a node
     riders: tuple[Riding, ...]
+
+    @property
+    def scalars(self) -> list[Objects]:
+        """The coefficients of the five patterns."""
+        patterns = (self.joined, self.spread, self.twist, self.masses, self.rates)
+        return [np.array(each.coefficients, dtype=object) for each in patterns]
+
+    def twists(self, z: Values, rate: Floats) -> Floats:
+        """Twist (v, ω) of every link in its own axes, (n_links, 6)."""
+        return np.asarray(self.rates.at(z[4]) @ rate).reshape(-1, 6)
 
     def motion(self, z: Values) -> Matrix:
         """B (n_whole, n_dof)."""
@@ -341,7 +353,7 @@ class StackedLinks:
 
     def turned(self, z: Values, rate: Floats, B: Matrix) -> Matrix:
         """ω̃ B, ω̃ on translations and rotations of every node, in its link's axes."""
-        spins = (self.spins.at(z[4]) @ rate).reshape(-1, 3)
+        spins = self.twists(z, rate)[:, 3:]
         turns = np.zeros((len(spins), 6, 6))
         for i, j, component, sign in CROSS:
             turns[:, i, j] = turns[:, 3 + i, 3 + j] = sign * spins[:, component]
