@@ -14,6 +14,7 @@ In reading order:
     truncation   what the reduction of links leaves out, bounded
     discretisation  what a mesh leaves out, bounded
     model        the model of a case, as notebooks meet it
+    under_load   what the weight changes by its forces, and by bending the links
     slow_motion  how much the neglected velocity terms would move the frequencies
     adaptive     the least mesh, order and reduction that meet an accuracy
     fit          polynomials through exact frequencies, with an error estimate
@@ -57,6 +58,7 @@ __all__, __getattr__, __dir__ = face(
             "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
         ),
         "surrogate": "Surrogate",
+        "under_load": "WeightChanges buckling sag_of_nodes weight_changes",
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.local_coordinates": "substitute",
         "taylor.recursion": "expand_subspace",

@@ -11,6 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import cut, named
 from eigassign.errors import UsageError
+from eigassign.mechanism.assembly.dynamics.under_load import (
+    StiffnessUnderLoad,
+    stiffness_under_load,
+)
 from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -78,6 +82,11 @@ class Model:
     def n_dof(self) -> int:
         """Order of K and M of eq. (1)."""
         return self.pencil.n_dof
+
+    @cached_property
+    def under_load(self) -> StiffnessUnderLoad:
+        """The stiffness that loads add, whatever they are."""
+        return stiffness_under_load(self.poses.case, self.poses.parameters, self.motion)
 
     def x(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(q, y) as rows (n_samples, n_q + n_y); raises UsageError for a wrong shape."""

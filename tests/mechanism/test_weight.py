@@ -24,6 +24,8 @@ from weight_comparison import (
 )
 from weight_oracle import lowest, weigh
 
+from eigassign.mechanism import stiffness_under_load
+
 SLOW = pytest.mark.slow
 DRAWS = [  # that hold every joint, a frame, rigid links, springs, tapers and shear
     *EVERY_TREE[:4:3], *EVERY_TREE[4:9], *EVERY_LOOP[:2], *EVERY_LOOP[5:8]
@@ -141,6 +143,41 @@ def test_many_random_loops_under_weight(space: str, seed: int) -> None:
 def test_random_loops_of_rigid_links_under_weight(space: str, seed: int) -> None:
     tree, q, _ = random_closed(seed, space, 1 + seed % 3 // 2, seed % 2 == 0, ("rigid",))
     agree_under_weight(tree, q, direction(tree, seed))
+
+
+def agree_for_unit_weights(tree: Tree, q: Any, g: np.ndarray) -> None:
+    """K_g in numbers, from forces that displacements tell, is what the pencil has in symbols."""
+    plain = built(tree)
+    stated = matrices(pulled(tree, 50.0 * g), q)[0] - matrices(plain, q)[0]
+    (pose,) = stiffness_under_load(plain.case, plain.numbers, plain.motion).at(plain.x(q))
+    pull = pose.weight()
+    units = pose.stressed(pull, pose.displaced(pull)).matrices()
+    found = sum(50.0 * share * each.toarray() for share, each in zip(g, units, strict=True))
+    np.testing.assert_allclose(found, stated, atol=1e-9 * np.abs(stated).max())
+
+
+@pytest.mark.parametrize("draw", DRAWS[::2], ids=str)
+def test_unit_weights_of_random_mechanisms_add_up_to_any(draw: tuple[Any, ...]) -> None:
+    tree, q = drawn(draw)
+    agree_for_unit_weights(tree, q, direction(tree, draw[0]))
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_unit_weights_of_known_mechanisms_add_up_to_any(name: str) -> None:
+    make, q = KNOWN[name]
+    tree = make()
+    agree_for_unit_weights(tree, q, direction(tree, 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_unit_weights_of_many_mechanisms_add_up_to_any(space: str, seed: int) -> None:
+    if seed % 2:
+        tree, q = random_open(2000 + seed, space, seed % 4 == 1)
+    else:
+        tree, q, _ = random_closed(seed // 2, space, 1 + (seed % 5 == 4), seed % 4 == 2)
+    agree_for_unit_weights(tree, q, direction(tree, seed))
 
 
 # --- what must always hold

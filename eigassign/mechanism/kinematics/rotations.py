@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.expression import Expression, Scalar, cos, sin
+from eigassign.series.expression import Scalar, cos, sin
 
 Objects = NDArray[np.object_]
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ def present(a: Objects | Floats) -> NDArray[np.bool_]:
 
 def some(value: Scalar) -> bool:
     """True where it is not the plain number zero."""
-    return isinstance(value, Expression) or value != 0.0
+    return not isinstance(value, (float, int)) or value != 0.0
 
 
 def carried(R: Objects | Floats, lever: Objects) -> Objects:

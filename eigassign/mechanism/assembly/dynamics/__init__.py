@@ -3,4 +3,5 @@
 Read in this order:
 
     velocity_terms  the velocity terms of eq. (1) that the method neglects
+    under_load      the stiffness under any loads: of weight, motion and modes
 """

@@ -224,6 +224,11 @@ class StackedElements:
         turn = np.kron(np.eye(4), strand.axes).astype(np.float64)
         return cls(np.hstack([slots[:-1], slots[1:]]), turn, n_whole)
 
+    def seen(self, values: Floats) -> Floats:
+        """Values (n_whole, count) at the dofs of each element in its axes, (n, 12, count)."""
+        own = np.where((self.dofs >= 0)[..., None], values[self.dofs], 0.0)
+        return np.asarray(self.turn @ own)
+
     def assembled(self, blocks: Floats) -> sparse.csr_array:
         """Matrices (n, 12, 12) of the elements in the section's axes, on the dofs of all links."""
         blocks = self.turn.T @ blocks @ self.turn

@@ -157,6 +157,14 @@ def _about(wrench: Objects, point: Objects) -> Objects:
     return np.concatenate([wrench[:3], wrench[3:] - cross(point, wrench[:3])])
 
 
+def passive_rates(case: CaseFile, known: ModelParameters, motion: Kinematics) -> Kinematics:
+    """The motion with the passive freedoms as its columns, each by itself."""
+    tree, coords = motion.tree, motion.coordinates
+    values = [known.freedom(k) for k in range(len(tree.freedoms))]
+    unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
+    return walk(case, known, tree, coords, values, unit)
+
+
 def _closing(
     known: ModelParameters, motion: Kinematics, loops: Sequence[JointEdge], found: _Wrenches
 ) -> list[tuple[JointEdge, Objects]]:
@@ -166,11 +174,7 @@ def _closing(
     """
     if not loops:
         return []
-    tree, coords, case = motion.tree, motion.coordinates, found.case
-    values = [known.freedom(k) for k in range(len(tree.freedoms))]
-    unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
-    moved = walk(case, known, tree, coords, values, unit)
-    kept = list(DOFS[case.mechanism.space])
+    moved, kept = passive_rates(found.case, known, motion), list(DOFS[found.case.mechanism.space])
     J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
     right = np.zeros((J.shape[1], 1), dtype=object)  # G
     for p in moved.placements:

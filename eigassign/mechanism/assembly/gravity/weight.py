@@ -14,7 +14,11 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed
-from eigassign.mechanism.assembly.gravity.beam_stress import ElementForces, stress_terms
+from eigassign.mechanism.assembly.gravity.beam_stress import (
+    ElementForces,
+    axial_forces,
+    stress_terms,
+)
 from eigassign.mechanism.assembly.gravity.curvature import (
     add_arm,
     add_joint,
@@ -74,7 +78,7 @@ def add_weight(
     if coarse is not None:
         few = {p.link: c for p, c in zip(motion.placements, coarse[0], strict=True)}, coarse[1]
     found = statics(case, parameters, motion, local, gravity, few)
-    weight = _Weight(K, case, known, motion, local, nodes, found)
+    weight = Weight(K, case, known, motion, local, nodes, found)
     for name, link in local.items():
         terms = weight.stressed(name)
         if terms:
@@ -86,7 +90,7 @@ def add_weight(
 
 
 @dataclass(frozen=True, eq=False)
-class _Weight:
+class Weight:
     """The weight of a mechanism and the motions on which it works."""
 
     K: AffineEntries
@@ -341,16 +345,13 @@ def _through_element(
     its own.
     """
     F, M = multiply(turn, beyond[:3]), multiply(turn, beyond[3:])
-    axial = [F[0], *(0.0 for _ in range(len(p) + 1))]
-    for degree, load in enumerate(p[:, 0]):  # ∫ P_l dξ from ξ to 1
-        share = load * h * (0.5 / (2 * degree + 1))
-        axial[degree - 1 if degree else 0] += share
-        axial[degree + 1] += share * -1.0
     weight = scaled(p[0], h)
     # ∫ ξ P_l dξ = 1/2, 1/6 for l = 0, 1
     first = p[0] * 0.5 + (p[1] * (1.0 / 6.0) if len(p) > 1 else 0.0)
     along = np.array([1.0, 0.0, 0.0], dtype=object)
     M_a = M + scaled(cross(along, F), h) + scaled(cross(along, first), h * h)
-    forces = ElementForces(axial, M[0], np.array([M_a * -1.0, M], dtype=object), p)
+    forces = ElementForces(
+        axial_forces(F[0], p[:, 0], h), M[0], np.array([M_a * -1.0, M], dtype=object), p
+    )
     total = np.concatenate([multiply(turn.T, F + weight), multiply(turn.T, M_a)])
     return forces, total

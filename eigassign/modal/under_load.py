@@ -1,0 +1,122 @@
+"""What the weight does to frequencies by the forces inside, and by bending the links.
+
+Of modes K φ = λ M φ, φᵀMφ = 1, one m/s² along an axis of the ground changes λ by
+
+    φᵀ K_g[g] φ + 2 u₀ᵀ K_g[p] φ,   K u₀ = Bᵀ m g with the coordinates held,   p = λ m B φ :
+
+the stress, and the sag u₀. The second is φᵀ(∂K/∂x·u₀ − λ ∂M/∂x·u₀)φ without assembling anything
+anew, for the third derivative of the potential is symmetric: the forces inside that u₀ meets while
+the mode moves are those that the mode meets while u₀ bends it. Both are linear in g.
+
+Where modes are near, weight mixes them: the small matrix C of a cluster takes the place of a
+number, and mode k changes by |C_kk| + Σ_j min(|C_kj|, g C_kj²/|λ_j − λ_k|) at most, g = 9.81 m/s².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.linalg import eigvalsh
+from scipy.sparse import linalg
+
+from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
+from eigassign.mechanism.assembly.mode_shapes import shapes
+from eigassign.mechanism.assembly.pencil import DENSE_LIMIT
+from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
+from eigassign.modal.model import Model
+
+Floats = NDArray[np.float64]
+STANDARD_GRAVITY = 9.81  # m/s²
+
+
+@dataclass(frozen=True, eq=False)
+class WeightChanges:
+    """∂λ/λ per 1 m/s² along each axis of the ground, (n_samples, n_modes, n_axes)."""
+
+    stress: Floats  # by the forces inside
+    sag: Floats  # by the geometry that bends
+
+
+def weight_changes(model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) -> WeightChanges:
+    """What one more m/s² would change of the ``modes`` (from 1) at samples q, y."""
+    x = model.x(q, y)
+    found = [
+        _changes(model, pose, model.pencil.theta(own[None]), modes)
+        for own, pose in zip(x, model.under_load.at(x), strict=True)
+    ]
+    both = np.array(found).reshape(len(x), 2, len(modes), -1)
+    return WeightChanges(both[:, 0], both[:, 1])
+
+
+def _changes(model: Model, pose: LoadedPose, theta: Floats, modes: Sequence[int]) -> Floats:
+    """Stress and sag (2, n_modes, n_axes) at one pose."""
+    found, groups = whole_clusters(model.pencil, theta, modes, CLUSTER_GAP)
+    members = [mode for group in groups for mode in group]
+    part = np.array(members) - 1
+    lam, phi = found.lam[0, part], found.phi[0][:, part]
+    weight = pose.weight()
+    pull = np.hstack([weight, lam * np.asarray(pose.B @ phi)])
+    n, axes = model.under_load.n_u, weight.shape[1]
+    u = pose.displaced(weight)
+    moved = np.hstack([u, pose.displaced(pull[:, axes:], phi[n:])])
+    works = pose.stressed(pull, moved).works(np.hstack([u, phi]))
+    stress = works[:axes, axes:, axes:]
+    mixed = works[axes:, :axes, axes:].transpose(1, 0, 2)
+    by_axis = np.array([stress, mixed + mixed.transpose(0, 2, 1)])  # (2, axes, r, r)
+    out = np.zeros((2, len(modes), axes))
+    for k, mode in enumerate(modes):
+        (group,) = (g for g in groups if mode in g)
+        own = [members.index(each) for each in group]
+        out[:, k] = _of_mode(by_axis[..., own][..., own, :], lam[own], group.index(mode))
+    return out
+
+
+def _of_mode(C: Floats, lam: Floats, k: int) -> Floats:
+    """∂λ/λ of mode k of a cluster: C_kk, and what its neighbours can add to it by mixing."""
+    others = np.arange(len(lam)) != k
+    apart, c = np.abs(lam - lam[k])[others] / STANDARD_GRAVITY, np.abs(C[..., k, others])
+    mixed = c * np.divide(c, np.maximum(c, apart), out=np.zeros_like(c), where=c > 0.0)
+    return np.asarray((C[..., k, k] + np.copysign(mixed.sum(axis=-1), C[..., k, k])) / lam[k])
+
+
+def sag_of_nodes(
+    model: Model, q: ArrayLike, y: ArrayLike, g: ArrayLike
+) -> tuple[tuple[str, ...], Floats]:
+    """Names link.node, and by how much the weight displaces them, (n_samples, n_nodes, 3) in m.
+
+    In ground axes, all coordinates held; ``g`` (n_axes,) in m/s² is the gravity.
+    """
+    x, weight = model.x(q, y), np.asarray(g, dtype=np.float64)[:, None]
+    u = np.array([p.displaced(p.weight() @ weight) for p in model.under_load.at(x)])
+    found = [one.nodes for one in shapes(model.poses, x, u)]
+    named = [node for node in found[0] if not node[1].startswith("@")]
+    moved = [[nodes[node].motion[0, :3] for node in named] for nodes in found]
+    return tuple(".".join(node) for node in named), np.array(moved)
+
+
+def buckling(model: Model, q: ArrayLike, y: ArrayLike, g: ArrayLike) -> Floats:
+    """The weight over that at which the mechanism buckles, P/P_cr (n_samples,), 0 where it cannot.
+
+    With all coordinates held: 1/κ of the least κ > 0 at which K + κ K_g has no stiffness left.
+    """
+    weight = np.asarray(g, dtype=np.float64)[:, None]
+    return np.array([_share(pose, weight) for pose in model.under_load.at(model.x(q, y))])
+
+
+def _share(pose: LoadedPose, g: Floats) -> float:
+    """The largest μ of −K_g x = μ K x, coordinates held."""
+    n = pose.model.n_u
+    pull = pose.weight() @ g
+    (K_g,) = pose.stressed(pull, pose.displaced(pull)).matrices()
+    A, K = sparse.csc_array(-K_g)[:n, :n], pose.held_stiffness[:, :n]
+    if n <= DENSE_LIMIT:
+        return max(float(eigvalsh(A.toarray(), K.toarray())[-1]), 0.0) if n else 0.0
+    inverse = linalg.LinearOperator((n, n), matvec=factorise(K).solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    found = linalg.eigsh(A, 1, M=K, Minv=inverse, which="LA", v0=start, tol=1e-6)
+    return max(float(found[0][0]), 0.0)
