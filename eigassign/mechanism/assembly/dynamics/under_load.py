@@ -84,10 +84,15 @@ class Strut(NamedTuple):
 
 
 class End(NamedTuple):
-    """A node where joints or springs act: its link (−1: the ground) and its dofs, if it has any."""
+    """A node where joints or springs act: its link (−1: the ground), and its dofs if it deforms."""
 
     link: int
     slots: Ints
+
+    def same(self, other: End) -> bool:
+        """True where both are one node that deforms."""
+        shared = self.slots == other.slots
+        return bool(self.link == other.link and shared.all() and (self.slots >= 0).any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,16 +369,11 @@ class _Acting:
             act(start, wrench)
             act(end, -wrench)
         through = [np.zeros((6, n_loads))] * n_tree
-        loops = joints[n_tree:]
-        for base, follower in loops[: model.n_elastic]:
-            node, place = follower
-            wrench = self._in_world(node.link, place, _picked(self.received, node.slots))
-            for end, other in pulled:
-                same = end.link == node.link and np.array_equal(end.slots, node.slots)
-                wrench = wrench - other if same else wrench
+        loops = joints[n_tree : n_tree + model.n_elastic]
+        for (base, follower), wrench in zip(loops, self._closing(total, pulled), strict=True):
             act(follower, wrench)
             through.append(act(base, -wrench))
-        rest, kept = loops[model.n_elastic :], list(model.kept)
+        rest, kept = joints[n_tree + model.n_elastic :], list(model.kept)
         if rest:
             twists = now.gaps[len(kept) * len(rest) :].reshape(n_tree, 6, -1)
             gaps = now.gaps[: len(kept) * len(rest)]
@@ -391,6 +391,35 @@ class _Acting:
             through[k] = act(base, hung[k])
             act(follower, -hung[k])
         return np.array(through), moments[:-1]
+
+    def _closing(self, total: Floats, pulled: Sequence[tuple[End, Floats]]) -> Floats:
+        """The wrenches (n_elastic, 6, n_loads) on followers of the loops that close at nodes that
+        deform, in the world: all that acts on such a node adds up to what it receives.
+
+        Beside ``total``, that of each link and its springs, and what these have ``pulled``.
+        """
+        model, n_loads = self.pose.model, self.x.shape[1]
+        n_tree = len(model.beyond)
+        tree, loops = model.edges[:n_tree], model.edges[n_tree:][: model.n_elastic]
+        on_links = np.zeros((len(total), len(loops)))
+        for k, (base, follower) in enumerate(loops):
+            on_links[follower.link, k] += 1.0
+            on_links[base.link, k] -= 1.0
+        A, b = [np.zeros((0, len(loops)))], [np.zeros((0, 6 * n_loads))]
+        places = self.pose.numbers.places[2 * n_tree :]
+        nodes = zip([end for pair in loops for end in pair], places, strict=False)
+        for node, place in nodes:
+            if not node.same(node):
+                continue
+            hung = np.array([node.same(base) - node.same(own) for base, own in tree])
+            closed = np.array([node.same(own) - node.same(base) for base, own in loops])
+            here = self._in_world(node.link, place, _picked(self.received, node.slots))
+            here = here - np.einsum("e,ek,kil->il", hung, model.beyond, total[:-1])
+            here = here - sum(wrench * node.same(end) for end, wrench in pulled)
+            A.append((closed + hung @ model.beyond @ on_links[:-1])[None])
+            b.append(here.reshape(1, -1))
+        found = np.linalg.lstsq(np.concatenate(A), np.concatenate(b), rcond=None)[0]
+        return np.asarray(found.reshape(len(loops), 6, n_loads))
 
     def _in_world(self, link: int, place: Floats, wrench: Floats) -> Floats:
         """A wrench (6, n_loads) about a place of a link, about the world's origin."""
@@ -487,7 +516,10 @@ def stiffness_under_load(
         return vector([0.0]) if node == GROUND else node_position(case, known, tree, node)
 
     def end(node: NodeName) -> End:
-        return End(-1 if node == GROUND else names.index(node[0]), slots(node))
+        if node == GROUND:
+            return End(-1, slots(node))
+        deforms = "@origin" not in meshes[node[0]].nodes
+        return End(names.index(node[0]), slots(node if deforms else GROUND))
 
     edges = [*tree.edges, *tree.loops]
     springs = list(SpringEnds(case, known, motion, nodes.rows, nodes.count).each())

@@ -82,7 +82,7 @@ def statics(
         springs = [(spring, sag.stretched(spring)) for spring in ends]
         for spring, force in springs:
             found.stretch(spring, force)
-        for edge in loops[: motion.tree.n_elastic]:
+        for edge in closed_last(loops[: motion.tree.n_elastic]):
             found.close(edge, sag.on_node(edge.follower) - found.acting_on(edge.follower))
         loops = loops[motion.tree.n_elastic :]
     for edge, wrench in _closing(known, motion, loops, found):
@@ -155,6 +155,16 @@ def handed(wrench: Objects, rotation: Objects, lever: Objects) -> Objects:
 def _about(wrench: Objects, point: Objects) -> Objects:
     """The wrench about another point of the same link: M − X × F."""
     return np.concatenate([wrench[:3], wrench[3:] - cross(point, wrench[:3])])
+
+
+def closed_last(loops: Sequence[JointEdge]) -> list[JointEdge]:
+    """The loops in an order in which those that close on the follower of another come before it."""
+    order, waiting = [], list(loops)
+    while waiting:
+        bases = [edge.base for edge in waiting]
+        order.append(next((e for e in waiting if e.follower not in bases), waiting[0]))
+        waiting.remove(order[-1])
+    return order
 
 
 def passive_rates(case: CaseFile, known: ModelParameters, motion: Kinematics) -> Kinematics:
