@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import gravity, rigid_links
 from eigassign.mechanism.assembly.congruence import inertia
-from eigassign.mechanism.assembly.velocity_terms import IMAGINARY
+from eigassign.mechanism.assembly.dynamics.velocity_terms import IMAGINARY
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
