@@ -15,7 +15,7 @@ In reading order:
     discretisation  what a mesh leaves out, bounded
     model        the model of a case, as notebooks meet it
     under_load   what the weight changes by its forces, and by bending the links
-    slow_motion  how much the neglected velocity terms would move the frequencies
+    slow_motion  how much the neglected motion would move the frequencies
     adaptive     the least mesh, order and reduction that meet an accuracy
     fit          polynomials through exact frequencies, with an error estimate
 """
@@ -53,7 +53,7 @@ __all__, __getattr__, __dir__ = face(
         "reduced.reduce": "reduce",
         "reduced.residual": "half_solve residual_gram residual_terms",
         "slopes": "exact_slopes",
-        "slow_motion": "change_at motion_effect moving_modes theta_in_time",
+        "slow_motion": "change_at motion_effect moving_modes stiffening theta_in_time",
         "storage": (
             "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
         ),

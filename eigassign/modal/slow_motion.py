@@ -5,9 +5,10 @@ With all modes Φ(t) of (K, M), ΦᵀMΦ = I, and u = Φ η it becomes
 
     η̈ + C_η η̇ + K_η η = 0,   C_η = Φᵀ(C Φ + 2 M Φ̇),   K_η = Λ + Φᵀ(K_v Φ + C Φ̇ + M Φ̈),
 
-where C_η is skew. In a slow motion a vibration in mode k has η_k = exp ∫ s dt, and the others
-follow by η_j = −i ω C_jk/(λ_j − λ_k) η_k. To second order in the speed its phase, that of φ_kᵀMu,
-turns at
+where C_η is skew. With K_v counts the stiffness K_g of the loads −m a of the rigid motion, which is
+of the same order in the speed: they stretch and compress the links. In a slow motion a vibration in
+mode k has η_k = exp ∫ s dt, and the others follow by η_j = −i ω C_jk/(λ_j − λ_k) η_k. To second
+order in the speed its phase, that of φ_kᵀMu, turns at
 
     Ω² = λ + φᵀ(K_v φ + C φ̇ + M φ̈) − λ Σ_j C_jk²/(λ_j − λ) + 5/16 (λ̇/λ)² − λ̈/(4 λ),
 
@@ -33,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.mechanism.assembly.dynamics.under_load import StiffnessUnderLoad
 from eigassign.mechanism.assembly.dynamics.velocity_terms import VelocityTerms
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Rates
@@ -67,17 +69,38 @@ def motion_effect(
     y: Floats,
     wanted: tuple[int, ...],
     instants: int = 9,
+    loads: StiffnessUnderLoad | None = None,
 ) -> MotionEffect:
-    """Effect at the fastest instants of a motion at design y.
+    """Effect at the fastest instants of a motion at design y, with ``loads`` that of its forces.
 
     Of nine instants the worst is within 7 % of that of 45 in the shipped cases, in one within 21 %.
     """
-    chosen = _fastest(motion, instants)
+    chosen, rates = _fastest(motion, instants), (motion.q, motion.rate, motion.acceleration)
     found = [
-        change_at(pencil, terms, motion.q[k], motion.rate[k], motion.acceleration[k], y, wanted)
-        for k in chosen
+        change_at(pencil, terms, *(each[k] for each in rates), y, wanted, loads) for k in chosen
     ]
     return MotionEffect(motion.samples[chosen], np.array(found).reshape(-1, len(wanted)))
+
+
+def stiffening(
+    pencil: Pencil,
+    loads: StiffnessUnderLoad,
+    motion: Rates,
+    y: Floats,
+    wanted: tuple[int, ...],
+    instants: int = 9,
+) -> float:
+    """The largest relative change of a frequency by the forces of a motion, ‖φᵀ K_g φ‖/2λ."""
+    worst = 0.0
+    for k in _fastest(motion, instants):
+        K = loads.in_motion(motion.q[k], y, motion.rate[k], motion.acceleration[k])
+        theta = pencil.theta(np.concatenate([motion.q[k], y])[None])
+        found, groups = whole_clusters(pencil, theta, wanted, CLUSTER_GAP)
+        for group in groups:
+            own = np.array(group) - 1
+            phi, lam = found.phi[0][:, own], found.lam[0, own]
+            worst = max(worst, float(np.linalg.norm(phi.T @ (K @ phi), 2) / (2.0 * lam.min())))
+    return worst
 
 
 def _fastest(motion: Rates, count: int) -> NDArray[np.intp]:
@@ -97,10 +120,12 @@ def change_at(
     acceleration: Floats,
     y: Floats,
     wanted: tuple[int, ...],
+    loads: StiffnessUnderLoad | None = None,
 ) -> Floats:
     """Relative change Ω/ω − 1 of the ``wanted`` modes (n_modes,) for q, q̇ and q̈ (n_q,)."""
     theta = theta_in_time(pencil, q, rate, acceleration, y)
-    velocity = terms.at(q, y, rate, acceleration)
+    C, K_v = terms.at(q, y, rate, acceleration)
+    velocity = C, K_v if loads is None else K_v + loads.in_motion(q, y, rate, acceleration)
     alone = _changes(pencil, theta, velocity, wanted, 0.0)
     mixing = tuple(k for k in wanted if k not in alone)
     together = _changes(pencil, theta, velocity, mixing, CLUSTER_GAP) if mixing else {}

@@ -33,6 +33,7 @@ from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink, add_stressed
 from eigassign.mechanism.assembly.dynamics.velocity_terms import (
+    STEP,
     Matrix,
     Pattern,
     StackedElements,
@@ -124,6 +125,31 @@ class StiffnessUnderLoad:
         rows = zip(*self.at_rest(z), strict=True)
         return [LoadedPose(self, own, list(row)) for own, row in zip(z.T, rows, strict=True)]
 
+    def in_motion(
+        self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
+    ) -> sparse.csr_array:
+        """K_g (n_dof, n_dof) of the loads −m a of the rigid motion, for q, q̇, q̈ of one instant.
+
+        With the twists t of the links a = N ṫ + ω̃ N t, ṫ by central differences.
+        """
+        (here,) = self.at(np.concatenate([q, y])[None])
+        h = STEP * self.stack.time_scale(here.stack, rate, acceleration)
+        ends = self.at(
+            np.array([np.append(q + t * (rate + 0.5 * t * acceleration), y) for t in (-h, h)])
+        )
+        n, kept = self.stack.rates.shape[1], list(self.kept)
+        before, twists, after = (
+            self.stack.twists(pose.stack, (rate + t * acceleration)[:n])
+            for pose, t in zip((ends[0], here, ends[1]), (-h, 0.0, h), strict=True)
+        )
+        push, speed = (
+            np.asarray(here.rigid @ each[:, kept].reshape(-1, 1))
+            for each in ((after - before) * (0.5 / h), twists)
+        )
+        pull = -(push + self.stack.turned(here.stack, rate[:n], speed))
+        spin = twists[:, 3:]
+        return here.stressed(pull, here.displaced(pull, spin=spin), spin).matrices()[0]
+
 
 @dataclass(frozen=True, eq=False)
 class Stressed:
@@ -166,32 +192,33 @@ class LoadedPose:
         return _Numbers(*self.values[5:14])
 
     @property
-    def _stack(self) -> Values:
+    def stack(self) -> Values:
+        """The numbers of `StackedLinks`."""
         return self.values[:5]
 
     @cached_property
     def B(self) -> Matrix:
         """The motion (n_whole, n_dof) of all dofs of all links."""
-        return self.model.stack.motion(self._stack)
+        return self.model.stack.motion(self.stack)
 
     @cached_property
     def mass(self) -> Matrix:
         """m (n_whole, n_whole)."""
-        return self.model.stack.mass(self._stack)
+        return self.model.stack.mass(self.stack)
 
     @cached_property
     def strained(self) -> Matrix:
         """The elastic part Ψ U of B."""
-        stack = self.model.stack
-        U = stack.joined.at(self._stack[0])
-        return U if stack.basis is None else stack.basis @ U
+        links = self.model.stack
+        U = links.joined.at(self.stack[0])
+        return U if links.basis is None else links.basis @ U
 
     @cached_property
     def rigid(self) -> Matrix:
         """Ψ N: the motion of all dofs per twist of each link."""
-        stack = self.model.stack
-        N = stack.spread.at(self._stack[1])
-        return N if stack.basis is None else stack.basis @ N
+        links = self.model.stack
+        N = links.spread.at(self.stack[1])
+        return N if links.basis is None else links.basis @ N
 
     @cached_property
     def stiffness(self) -> Matrix:
@@ -237,12 +264,14 @@ class LoadedPose:
         a[:, :3] = R.transpose(0, 2, 1)[:, :, :axes]
         return np.asarray(self.rigid @ a[:, list(kept)].reshape(-1, axes))
 
-    def displaced(self, pull: Floats, moved: Floats | None = None) -> Floats:
+    def displaced(
+        self, pull: Floats, moved: Floats | None = None, spin: Floats | None = None
+    ) -> Floats:
         """Displacements [u; q] (n_dof, n_loads) under a pull, the coordinates held at ``moved``."""
         n, K = self.model.n_u, self.held_stiffness
         x = np.zeros((self.B.shape[1], pull.shape[1]))
         x[n:] = 0.0 if moved is None else moved
-        f = (self.B.T @ (self.mass @ pull))[:n] - K[:, n:] @ x[n:]
+        f = (self.B.T @ _Acting(self, pull, x, spin).forces)[:n] - K[:, n:] @ x[n:]
         if n:
             x[:n] = factorise(sparse.csc_array(K[:, :n])).solve(np.ascontiguousarray(f))
         return x
@@ -252,8 +281,7 @@ class LoadedPose:
 
         ``spin`` (n_links, 3) is ω of each link where the pull is that of a motion.
         """
-        still = np.zeros((len(self.numbers.rotations), 3))
-        acting = _Acting(self, pull, x, still if spin is None else spin)
+        acting = _Acting(self, pull, x, spin)
         model = self.model
         z = np.vstack([np.tile(self.z[:, None], pull.shape[1]), acting.inputs()])
         curved = [model.curved.at(c) for c in model.in_load(z)[0]]
@@ -281,7 +309,7 @@ class _Acting:
     pose: LoadedPose
     pull: Floats
     x: Floats
-    spin: Floats
+    spin: Floats | None
 
     @cached_property
     def on_sites(self) -> list[tuple[Floats, Floats, Floats]]:
@@ -292,7 +320,8 @@ class _Acting:
         for k, site in enumerate(self.pose.model.sites):
             m = masses[6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
             first, J = np.array([m[1, 5], -m[0, 5], m[0, 4]]), m[3:, 3:]
-            pull, w = _picked(self.pull, site.slots), self.spin[site.link]
+            pull = _picked(self.pull, site.slots)
+            w = np.zeros(3) if self.spin is None else self.spin[site.link]
             E = 0.5 * np.trace(J) * np.eye(3) - J
             spun = -np.cross(w, [np.cross(w, first), J @ w]).ravel()
             turned = _crossed(pull[3:].T) - _crossed(w) @ _crossed(w)

@@ -52,6 +52,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker
 Values = Sequence[Floats]  # the numbers of all matrices at one instant, see `StackedLinks`
+# Of differences in `StackedLinks.time_scale`: they err by its square, 1e-8, and by round-off over
+# it, 1e-12.
+STEP = 1e-4
 IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
 
 
@@ -62,9 +65,7 @@ class VelocityTerms:
     stack: StackedLinks
     table: CompiledArrays
     parameters: ModelParameters
-    # Of the differences, in the time in which the fastest coordinate or spin moves, or would, by
-    # 1 rad or m: they err by its square, 1e-8, and by round-off over it, 1e-12.
-    step: float = 1e-4
+    step: float = STEP
 
     def at(
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
@@ -91,15 +92,9 @@ class VelocityTerms:
         return sparse.csr_array(C), sparse.csr_array(K)
 
     def interval(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
-        """The interval of the differences, s: a screw turns much faster than its nut travels."""
+        """The interval of the differences, s."""
         (z,) = self.values(q[None], y)
-        turned = (self.stack.twists(z, self._joints(each))[:, 3:] for each in (rate, acceleration))
-        fastest, hardest = (
-            np.abs(np.concatenate([both[0], both[1].ravel()])).max()
-            for both in zip((rate, acceleration), turned, strict=True)
-        )
-        speed = max(float(fastest), float(np.sqrt(hardest)))
-        return self.step / speed if speed > 0.0 else self.step
+        return self.step * self.stack.time_scale(z, rate, acceleration)
 
     def values(self, q: Floats, y: Floats) -> list[Values]:
         """The numbers of all matrices at each of the poses q (n, n_q)."""
@@ -346,6 +341,18 @@ class StackedLinks:
     def twists(self, z: Values, rate: Floats) -> Floats:
         """Twist (v, ω) of every link in its own axes, (n_links, 6)."""
         return np.asarray(self.rates.at(z[4]) @ rate).reshape(-1, 6)
+
+    def time_scale(self, z: Values, rate: Floats, acceleration: Floats) -> float:
+        """The time, s, in which the fastest coordinate or spin moves, or would, by 1 rad or m.
+
+        A screw turns much faster than its nut travels. At rest 1 s.
+        """
+        n, sizes = self.rates.shape[1], []
+        for each in (rate, acceleration):
+            spins = self.twists(z, each[..., :n])[:, 3:]
+            sizes.append(float(np.abs(np.concatenate([each, spins.ravel()])).max()))
+        speed = max(sizes[0], float(np.sqrt(sizes[1])))
+        return 1.0 / speed if speed > 0.0 else 1.0
 
     def motion(self, z: Values) -> Matrix:
         """B (n_whole, n_dof)."""
