@@ -15,6 +15,7 @@ all that is a product, by rates along the imaginary axis, which lose no digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Numbers = NDArray[Any]  # real, or complex with slopes along the imaginary axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +115,14 @@ class DriveForces:
 
 def _exerted(
     A: Floats,
-    T: Floats,
-    T_rate: Floats,
-    g: Floats,
-    J: Floats,
-    drives: Floats,
-    rate: Floats,
-    acceleration: Floats,
-) -> Floats:
+    T: Numbers,
+    T_rate: Numbers,
+    g: Numbers,
+    J: Numbers,
+    drives: Numbers,
+    rate: Numbers,
+    acceleration: Numbers,
+) -> Numbers:
     """τ (…, n) of the formula above, T (…, n_links, 6, n)."""
     q_rate, q_push = (each[..., None, :, None] for each in (rate, acceleration))
     V = T @ q_rate

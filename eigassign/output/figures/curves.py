@@ -81,7 +81,7 @@ def drives(results: RunResults) -> FigurePlan:
         curves = (Curve(row.initial_curve, _BEFORE), Curve(row.optimal_curve, _AFTER))
         edges = () if row.limit is None else (row.limit, -row.limit)
         label = labelled(short(row.name, 12), row.unit)
-        marks = (*(Rule(edge, EDGE) for edge in edges), *curves)
+        marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
         panels.append(Panel(label, marks, 1.3, holds=(np.array([0.0, *edges]),)))
     key = (*BEFORE_AND_AFTER, *((("limit", EDGE),) * any(row.limit for row in results.drives)))
     panels[0] = replace(panels[0], key=key)
