@@ -53,6 +53,8 @@ def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) 
     n = len(c.relative)
     rates = np.zeros((len(motion.tree.freedoms), n))
     rates[:n] = c.relative
+    if np.array_equal(rates, c.rates):
+        return motion
     coords = replace(c, columns=tuple(range(n)), rates=rates)
     return closed_kinematics(case, parameters, motion.tree, coords)
 

@@ -79,7 +79,8 @@ def drives(results: RunResults) -> FigurePlan:
     panels = []
     for row in results.drives:
         curves = (Curve(row.initial_curve, _BEFORE), Curve(row.optimal_curve, _AFTER))
-        edges = () if row.limit is None else (row.limit, -row.limit)
+        edges = [] if row.limit is None else [row.limit, -row.limit]
+        edges = [e for e in edges if any((e * curve.y).max() > 0.0 for curve in curves)]
         label = labelled(short(row.name, 12), row.unit)
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
         panels.append(Panel(label, marks, 1.3, holds=(np.array([0.0, *edges]),)))
