@@ -15,6 +15,7 @@ all that is a product, by rates along the imaginary axis, which lose no digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+BLOCK = 1_000_000  # complex numbers evaluated together: 16 MB
 Numbers = NDArray[Any]  # real, or complex with slopes along the imaginary axis
 
 
@@ -73,7 +75,14 @@ class DriveForces:
             [np.concatenate(each) for each in zip(*(m[k] for m in motions), strict=True)]
             for k in (0, 1)
         )
-        return np.concatenate(samples), *self.at(here, by_design, y, slopes)
+        size = max(prod(self.table.shapes[0]), self.table.table.program.n_atoms)
+        block = max(1, BLOCK // (size * (1 + len(y) * slopes)))
+        parts = [
+            self.at(*([a[k : k + block] for a in each] for each in (here, by_design)), y, slopes)
+            for k in range(0, len(here[0]), block)
+        ]
+        tau, by_y = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return np.concatenate(samples), tau, by_y
 
     def curves(self, path: Trajectories, y: Floats) -> Floats:
         """τ (n_t, n) at all samples: of a corner the larger side, at instants between linear."""
