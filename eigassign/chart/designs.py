@@ -52,7 +52,7 @@ def chart_designs(
     lower, upper = scene.bounds
     wanted, design = scene.file.targets, scene.file.design
     plain = (t.is_goal and not (t.followed or t.during) for t in wanted)
-    limited = design.catalogues or design.mass or design.torque
+    limited = bool(design.catalogues or design.mass or design.torque)
     limited = limited or scene.file.assignment.objective != "least_squares"
     if not (wanted and all(plain) and len(lower) and np.isfinite(upper - lower).all()) or limited:
         return (), ()

@@ -77,10 +77,10 @@ class DriveForces:
         )
         size = max(prod(self.table.shapes[0]), self.table.table.program.n_atoms)
         block = max(1, BLOCK // (size * (1 + len(y) * slopes)))
-        parts = [
-            self.at(*([a[k : k + block] for a in each] for each in (here, by_design)), y, slopes)
-            for k in range(0, len(here[0]), block)
-        ]
+        parts = []
+        for first in range(0, len(here[0]), block):
+            q, q_by_y = ([a[first : first + block] for a in each] for each in (here, by_design))
+            parts.append(self.at(q, q_by_y, y, slopes))
         tau, by_y = (np.concatenate(each) for each in zip(*parts, strict=True))
         return np.concatenate(samples), tau, by_y
 

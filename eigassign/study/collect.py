@@ -36,6 +36,7 @@ from eigassign.study.results import (
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+ROUND_OFF = 1e-13  # of the weight, or of the largest load: what a level direction leaves of it
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,9 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     """What every drive exerts before and after; none where there is no weight and no motion."""
     file, path, g = scene.file, scene.path, scene.file.mechanism.gravity
     curves = [scene.model.drives.curves(path, each) for each in (scene.initial, y)]
+    pull = scene.model.mass(y) * float(np.linalg.norm(g)) if isinstance(g, tuple) else 0.0
+    small = ROUND_OFF * max(pull, *(np.abs(curve).max(initial=0.0) for curve in curves))
+    curves = [np.where(np.abs(curve) > small, curve, 0.0) for curve in curves]
     weights = time_weights(path)
     weights = weights / weights.sum()
     of = "weight and motion" if isinstance(g, tuple) else "the motion alone, gravity being none"

@@ -465,6 +465,9 @@ def rates(trajectory: Trajectory) -> Rates:
     rate, acceleration = np.concatenate(first), np.concatenate(second)
     resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
     rate[:, resting] = acceleration[:, resting] = 0.0
+    # what q rounded to 1e-16 leaves of second differences where the velocity does not change
+    rounded = 1e-15 * np.abs(q).max(axis=0) / np.diff(time_s).min() ** 2
+    acceleration[np.abs(acceleration) <= rounded] = 0.0
     return Rates(samples, q[samples], rate, acceleration)
 
 
