@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from imported_parts import arm, beam_arm, exported, part, write
+from scipy import linalg
 from spatial_cases import ALLOY, built
 from spatial_examples import arm3r, ball_screw, four_bar, gantry, rigid, slotted_lever, straight
 from spatial_oracle import Tree
@@ -22,7 +23,7 @@ from weight_comparison import (
     pulled,
     turned_about,
 )
-from weight_oracle import lowest, weigh
+from weight_oracle import lowest, sag_slopes, weigh
 
 from eigassign.mechanism import stiffness_under_load
 
@@ -178,6 +179,47 @@ def test_unit_weights_of_many_mechanisms_add_up_to_any(space: str, seed: int) ->
     else:
         tree, q, _ = random_closed(seed // 2, space, 1 + (seed % 5 == 4), seed % 4 == 2)
     agree_for_unit_weights(tree, q, direction(tree, seed))
+
+
+def agree_about_sag(tree: Tree, q: Any, g: np.ndarray) -> None:
+    """What sag changes of the lowest λ, from the forces that a mode's own inertia causes."""
+    found, plain = weigh(tree, q, g), built(tree)
+    lam, expected = sag_slopes(found, 3)
+    K, M = matrices(plain, q)
+    (pose,) = stiffness_under_load(plain.case, plain.numbers, plain.motion).at(plain.x(q))
+    shift = np.trace(K) / np.trace(M) * 1e-6
+    modes = linalg.eigh(M, K + shift * M)[1]
+    phi = modes[:, ::-1][:, found.n_free : found.n_free + 3]
+    phi = phi / np.sqrt(np.einsum("ik,ij,jk->k", phi, M, phi))
+    weight, pull = pose.weight() @ g[:, None], lam * np.asarray(pose.B @ phi)
+    moved = pose.displaced(pull, phi[pose.model.n_u :])
+    works = pose.stressed(pull, moved).works(np.hstack([pose.displaced(weight), phi]))
+    slopes = np.array([2.0 * works[k, 0, 1 + k] for k in range(3)])
+    np.testing.assert_allclose(slopes, expected, atol=5e-3 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("draw", [*DRAWS[4:7], *DRAWS[-3:]], ids=str)
+def test_sag_of_random_mechanisms_is_that_of_the_nonlinear_potential(draw: tuple[Any, ...]) -> None:
+    tree, q = drawn(draw)
+    agree_about_sag(tree, q, direction(tree, draw[0]))
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_sag_of_known_mechanisms_is_that_of_the_nonlinear_potential(name: str) -> None:
+    make, q = KNOWN[name]
+    tree = make()
+    agree_about_sag(tree, q, direction(tree, 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(50))
+def test_sag_of_many_mechanisms_is_that_of_the_nonlinear_potential(seed: int) -> None:
+    space = "spatial" if seed % 2 else "planar"
+    if seed % 4 < 2:
+        tree, q = random_open(3000 + seed, space, seed % 8 > 3)
+    else:
+        tree, q, _ = random_closed(seed, space, 1, seed % 8 > 3)
+    agree_about_sag(tree, q, direction(tree, seed))
 
 
 # --- what must always hold

@@ -38,6 +38,7 @@ from spatial_oracle import (
     Z,
     base_of,
     bending,
+    body,
     cross,
     dimensions,
     mount,
@@ -201,6 +202,9 @@ def moved_joint(joint: Tree, c: Jet) -> tuple[Jet, Jet]:
 # Parts
 
 
+Pull = Callable[[float], Array]
+
+
 @dataclass
 class Strained:
     """Strains ε by the unknowns ``dofs``, with forces C ε; the multipliers' closures have none."""
@@ -245,25 +249,28 @@ class Beam:
         """(2, 12): deflection (0), slope (1) or curvature (2) of both planes."""
         return np.array([plane[1 + order] @ self.T for plane in bending(s, self.h)])
 
-    def weight(self, x: Jet, g: Array) -> Jet:
-        """−∫ ρA g · (displacement) dx."""
+    def weight(self, x: Jet, pull: Pull) -> Jet:
+        """−∫ ρA a · (displacement) dx, a the pull at a share s of the length."""
         frame, chord, local = self.local(x)
         total = x[0] * 0.0
         for s, w in zip(POINTS, WEIGHTS, strict=True):
             bent = by(frame[:, 1:], by(self.shapes(s, 0), local))
             at = x[0:3] + chord * s + bent
-            total = total - dot(at, g) * (w * self.h * self.mass(s))
+            total = total - dot(at, pull(s)) * (w * self.h * self.mass(s))
         return total
 
-    def bowing(self, x: Jet, g: Array, pulled: float) -> Jet:
+    def bowing(self, x: Jet, pull: Pull, pulled: float) -> Jet:
         """½ ∫ N w'² dx; ``pulled`` is what the stretch alone gives on the last node."""
         _, _, local = self.local(x)
-        p = self.axes[:, 0] @ g * self.h
-        last = pulled - p * sum(w * s * self.mass(s) for s, w in zip(POINTS, WEIGHTS, strict=True))
+
+        def p(s: float) -> float:
+            return float(self.axes[:, 0] @ pull(s)) * self.h * self.mass(s)
+
+        last = pulled - sum(w * s * p(s) for s, w in zip(POINTS, WEIGHTS, strict=True))
         total = x[0] * 0.0
         for s, w in zip(POINTS, WEIGHTS, strict=True):
-            beyond = [self.mass(s + (1 - s) * t) for t in POINTS]
-            N = last + p * (1 - s) * float(WEIGHTS @ beyond)
+            beyond = [p(s + (1 - s) * t) for t in POINTS]
+            N = last + (1 - s) * float(WEIGHTS @ beyond)
             slopes = by(self.shapes(s, 1), local)
             total = total + dot(slopes, slopes) * (0.5 * w * self.h * N)
         return total
@@ -286,6 +293,7 @@ class WeightBuilder(Builder):
         self.beams: list[Beam] = []
         self.strained: list[Strained] = []
         self.hung: list[tuple[int, float, Array]] = []  # node, mass, arm in world axes
+        self.spun: list[tuple[int, Array]] = []  # node, inertia about its centre in world axes
         self.driven: list[int] = []
 
     def beam(
@@ -314,6 +322,8 @@ class WeightBuilder(Builder):
         if link.get("type", "beam") == "rigid":
             center = self.pose.R[name] @ point(link.get("center"))
             self.hung.append((self.n, link.get("mass", 0.0), center))
+            own = body(0.0, link.get("inertia", 0.0), np.zeros(3), self.pose.R[name])
+            self.spun.append((self.n, own[3:, 3:]))
         super().add_link(name)
 
     def tie(self, follower: int, base: int | None, lever: Array) -> None:
@@ -336,6 +346,7 @@ class WeightBuilder(Builder):
         R = self.pose.R[data["at"].split(".")[0]]
         at = self.where[data["at"]]
         self.hung.append((at, data.get("mass", 0.0), R @ point(data.get("offset"))))
+        self.spun.append((at, body(0.0, data.get("inertia", 0.0), np.zeros(3), R)[3:, 3:]))
 
     def add_spring(self, data: Tree, planar: bool) -> None:
         super().add_spring(data, planar)
@@ -514,7 +525,7 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
         x = unknowns(6)
         add(np.arange(node, node + 6), dot(x[0:3] + by(rotated(x[3:6]), arm), g * -mass))
     for beam in b.beams:
-        add(beam.dofs, beam.weight(unknowns(12), g))
+        add(beam.dofs, beam.weight(unknowns(12), lambda _: g))
     weight = np.abs(slope)
     sag, forces = statics(K, rows, -slope, np.setdiff1d(keep, b.driven))
     for part in b.strained:
@@ -528,7 +539,7 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
     for beam in b.beams:
         x = unknowns(12)
         pulled = float((beam.k @ (beam.local(x)[2].g @ sag[beam.dofs]))[6])
-        add(beam.dofs, beam.bowing(x, g, pulled))
+        add(beam.dofs, beam.bowing(x, lambda _: g, pulled))
     held = np.setdiff1d(keep, b.driven)
     assert np.abs(slope[held]).max() < 1e-6 * max(np.abs(forces).max(initial=0.0), 1.0)
     T = np.zeros((b.n, 0))
@@ -546,6 +557,61 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
         T.T @ slope,
         float((np.abs(T.T) @ weight).max()),
     )
+
+
+def sag_slopes(found: Weighed, count: int) -> tuple[Array, Array]:
+    """The lowest elastic λ, and by how much the sag of the weight changes them to first order.
+
+    Of V(x) − λ T(x) with closures c(x): with n, μ the forces and multipliers in a mode φ, p = λ m φ
+    its inertia forces, w the places of matter, 2 uᵀ (n·ε'' + μ·c'' − p·w'') φ, u the sag.
+    """
+    b = found.builder
+    K, M = b.dense()
+    rows = np.zeros((len(b.rows), b.n))
+    for i, row in enumerate(b.rows):
+        rows[i, list(row)] = list(row.values())
+    shift = np.trace(found.K) / np.trace(found.M) * 1e-6
+    mu, z = linalg.eigh(found.M, found.K + shift * found.M)
+    order = np.argsort(-mu)[found.n_free : found.n_free + count]
+    lam, slopes = 1.0 / mu[order] - shift, []
+    kept = np.abs(found.T).max(axis=1) > 0.0
+    for each, mode in zip(lam, (found.T @ z[:, order]).T, strict=True):
+        phi, curve = mode / np.sqrt(mode @ M @ mode), np.zeros_like(K)
+
+        def add(dofs: Array, value: Jet, curve: Array = curve) -> None:
+            curve[np.ix_(dofs, dofs)] += value.h
+
+        left = (each * M @ phi - K @ phi)[kept]
+        forces = np.linalg.lstsq(rows[:, kept].T, left, rcond=1e-12)[0]
+        for part in b.strained:
+            strain = part.strain(unknowns(len(part.dofs)))
+            inside = forces[part.rows]
+            if part.stiffness is not None:
+                inside = part.stiffness @ (strain.g @ phi[part.dofs])
+            add(part.dofs, dot(strain, inside))
+        for node, mass, arm in b.hung:
+            v, x = phi[node : node + 6], unknowns(6)
+            pull = v[:3] + np.cross(v[3:], arm)
+            at = x[0:3] + by(rotated(x[3:6]), arm)
+            add(np.arange(node, node + 6), dot(at, -each * mass * pull))
+        for node, J in b.spun:
+            dofs, second = np.arange(node, node + 6), 0.5 * np.trace(J) * np.eye(3) - J
+            work = -each * cross(phi[node + 3 : node + 6]) @ second
+            add(dofs, product("ij,ij->", rotated(unknowns(6)[3:6]), work))
+        for beam in b.beams:
+            x, v = unknowns(12), phi[beam.dofs]
+            local = beam.local(x)[2].g @ v
+
+            def pulled(
+                s: float, v: Array = v, beam: Beam = beam, local: Array = local, lam: float = each
+            ) -> Array:
+                bent = beam.axes[:, 1:] @ (beam.shapes(s, 0) @ local)
+                return np.asarray(lam * ((1 - s) * v[:3] + s * v[6:9] + bent))
+
+            add(beam.dofs, beam.weight(x, pulled))
+            add(beam.dofs, beam.bowing(x, pulled, float((beam.k @ local)[6])))
+        slopes.append(2.0 * found.sag @ curve @ phi)
+    return lam, np.array(slopes)
 
 
 def statics(K: Array, rows: Array, f: Array, held: Array) -> tuple[Array, Array]:

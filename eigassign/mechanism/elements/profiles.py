@@ -23,9 +23,9 @@ from eigassign.series.expression import Scalar, is_constant, one_atom
 
 Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
-STATIONS, _SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is evaluated
+STATIONS, SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is evaluated
 # by what values at the stations give P_0 … P_4, (l, g)
-_PROJECTION = (_SHARES[:, None] * legendre.legvander(STATIONS, TERMS - 1)).T
+_PROJECTION = (SHARES[:, None] * legendre.legvander(STATIONS, TERMS - 1)).T
 _PROJECTION = _PROJECTION * (np.arange(TERMS)[:, None] + 0.5)
 
 

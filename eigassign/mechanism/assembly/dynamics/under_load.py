@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -46,15 +46,16 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
 )
 from eigassign.mechanism.assembly.gravity.beam_stress import end_forces, stress_terms
 from eigassign.mechanism.assembly.gravity.curvature import add_bilinear
-from eigassign.mechanism.assembly.gravity.imported import strut_terms
+from eigassign.mechanism.assembly.gravity.imported import CROSSED, strut_terms
 from eigassign.mechanism.assembly.gravity.statics import Statics, passive_rates
 from eigassign.mechanism.assembly.gravity.weight import Weight
 from eigassign.mechanism.assembly.inside_links import Alike
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
-from eigassign.mechanism.elements.beam import element_mass, element_stiffness, shear
+from eigassign.mechanism.elements.beam import Shear, element_mass, element_stiffness, fields, shear
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand
+from eigassign.mechanism.elements.profiles import SHARES, STATIONS, Profile
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -312,30 +313,32 @@ class _Acting:
     spin: Floats | None
 
     @cached_property
-    def on_sites(self) -> list[tuple[Floats, Floats, Floats]]:
-        """Of the bodies of each site their wrenches (6, n_loads) about its node, the part (6,) of
-        them that comes with the spin alone, and D (n_loads, 3, 3).
-        """
+    def on_sites(self) -> list[tuple[Floats, Floats]]:
+        """Of the bodies of each site the wrenches (6, n_loads) about its node, and D."""
         found, masses = [], _dense(self.pose.model.bodies.at(self.pose.numbers.bodies))
         for k, site in enumerate(self.pose.model.sites):
             m = masses[6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
             first, J = np.array([m[1, 5], -m[0, 5], m[0, 4]]), m[3:, 3:]
             pull = _picked(self.pull, site.slots)
-            w = np.zeros(3) if self.spin is None else self.spin[site.link]
+            wrench, turned = m @ pull, _crossed(pull[3:].T)
+            if self.spin is not None:
+                w = _crossed(self.spin[site.link])
+                wrench[:3, 0] -= w @ w @ first
+                wrench[3:, 0] -= w @ J @ self.spin[site.link]
+                turned = turned - w @ w
             E = 0.5 * np.trace(J) * np.eye(3) - J
-            spun = -np.cross(w, [np.cross(w, first), J @ w]).ravel()
-            turned = _crossed(pull[3:].T) - _crossed(w) @ _crossed(w)
-            D = np.einsum("il,j->lij", pull[:3], first) + turned @ E
-            found.append((m @ pull + spun[:, None], spun, D))
+            found.append((wrench, np.einsum("il,j->lij", pull[:3], first) + turned @ E))
         return found
 
     @cached_property
     def forces(self) -> Floats:
-        """f (n_whole, n_loads)."""
-        f = np.asarray(self.pose.mass @ self.pull)
-        for site, (_, spun, _) in zip(self.pose.model.sites, self.on_sites, strict=True):
-            there = site.slots >= 0
-            f[site.slots[there]] += spun[there, None]
+        """f (n_whole, n_loads): m a, and what the spin adds of bodies on arms."""
+        f, model = np.asarray(self.pose.mass @ self.pull), self.pose.model
+        if self.spin is not None:
+            still = replace(self, spin=None).on_sites
+            for site, (wrench, _), (part, _) in zip(model.sites, self.on_sites, still, strict=True):
+                there = site.slots >= 0
+                f[site.slots[there]] += (wrench - part)[there]
         return f
 
     @cached_property
@@ -467,14 +470,14 @@ class _Acting:
         model, (through, moments) = self.pose.model, self.through
         n_loads = self.x.shape[1]
         parts = [through, self.in_springs]
-        for site, (_, _, D) in zip(model.sites, self.on_sites, strict=True):
+        for site, (_, D) in zip(model.sites, self.on_sites, strict=True):
             D = D + moments[site.link] if site.rigid else D
             trace = np.trace(D, axis1=1, axis2=2)[:, None, None] * np.eye(3)
             parts.append(0.5 * (trace - D).reshape(n_loads, 9).T)
         for strut in model.struts:
             here = [_picked(self.received, slots) for slots in strut.slots]
             left = self.own[strut.link][:3]
-            for site, (wrench, _, _) in zip(model.sites, self.on_sites, strict=True):
+            for site, (wrench, _) in zip(model.sites, self.on_sites, strict=True):
                 for k, slots in enumerate(strut.slots):
                     if np.array_equal(site.slots, slots):
                         here[k], left = here[k] + wrench, left - wrench[:3]
@@ -492,11 +495,26 @@ class _Acting:
                 for terms in (element_stiffness, element_mass)
             )
             r = (k @ v - m @ pull).transpose(1, 2, 0)
-            mass = [np.asarray(beam.mass) for beam in profile[:3]]
-            forces = end_forces(r, pull.transpose(1, 2, 0), mass, h)
-            c, matrices = zip(*stress_terms(forces, h, shear(profile, h), planar), strict=True)
+            bent = shear(profile, h)
+            forces = end_forces(r, _along(profile, h, bent, pull), h)
+            c, matrices = zip(*stress_terms(forces, h, bent, planar), strict=True)
             found.append((elements, np.tensordot(np.array(c), np.array(matrices), (0, 0))))
         return found
+
+
+def _along(profile: Profile, h: Floats, bent: tuple[Shear, Shear], pull: Floats) -> Floats:
+    """The load per length (4, 3, n_loads, n) by degree, of pulls (n, 12, n_loads) at the ends.
+
+    Between them the pull takes the shapes that mass has, cubic ones; degree 3 is the last for which
+    N(ξ) is known. Five points integrate all that counts.
+    """
+    phi = np.array([[np.broadcast_to(v, h.shape) for v in each] for each in bent])
+    xi = np.tile(0.5 * (1.0 + STATIONS), (len(h), 1))
+    N = fields(xi, h[:, None], phi.transpose(2, 0, 1)[:, None])[..., :3, :]
+    P = np.polynomial.legendre.legvander(STATIONS, 3)
+    heavy = sum(np.outer(beam.mass, p) for beam, p in zip(profile, P.T[:3], strict=False))
+    heavy = heavy[..., None] * P * SHARES[:, None] * (np.arange(4) + 0.5)
+    return np.asarray((np.einsum("ngl,ngij->lnij", heavy, N) @ pull).transpose(0, 2, 3, 1))
 
 
 def _dense(A: Matrix) -> Floats:
@@ -510,12 +528,12 @@ def _picked(values: Floats, slots: Ints) -> Floats:
 
 def _crossed(a: Floats) -> Floats:
     """[a]× (…, 3, 3) of vectors (…, 3)."""
-    return np.cross(a[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    return np.asarray(np.einsum("...i,kij->...kj", a, CROSSED))
 
 
 def _about_origin(wrench: Floats, place: Floats) -> Floats:
     """A wrench (6, n_loads) at a place, in the same axes about the origin: M + X × F."""
-    return np.concatenate([wrench[:3], wrench[3:] + np.cross(place, wrench[:3].T).T])
+    return np.concatenate([wrench[:3], wrench[3:] + _crossed(place) @ wrench[:3]])
 
 
 # --- built once

@@ -53,20 +53,13 @@ class ElementForces:
     weight: Objects
 
 
-def end_forces(r: Floats, pull: Floats, mass: Sequence[Floats], h: Floats) -> ElementForces:
+def end_forces(r: Floats, load: Floats, h: Floats) -> ElementForces:
     """The forces in n elements from what their ends receive in m loads, all in their axes.
 
-    r and the ``pull`` of the ends are (12, m, n), mass per length (n,) by degree. Between the ends
-    the pull is linear: P_1 P_l = ((l + 1) P_{l+1} + l P_{l−1})/(2l + 1).
+    r (12, m, n), and the load per length along them (n_legendre, 3, m, n).
     """
-    mean, half = 0.5 * (pull[:3] + pull[6:9]), 0.5 * (pull[6:9] - pull[:3])
-    p = np.zeros((len(mass) + 1, *mean.shape))
-    for degree, own in enumerate(mass):
-        p[degree] += own * mean
-        p[degree + 1] += own * half * ((degree + 1) / (2 * degree + 1))
-        p[degree - 1 if degree else 0] += own * half * (degree / (2 * degree + 1))
-    axial = axial_forces(r[6], p[:, X], h)
-    return ElementForces(axial, 0.5 * (r[9] - r[3]), np.stack([r[3:6], r[9:]]), p)
+    axial = axial_forces(r[6], load[:, X], h)
+    return ElementForces(axial, 0.5 * (r[9] - r[3]), np.stack([r[3:6], r[9:]]), load)
 
 
 def axial_forces(end: Scalar, load: Sequence[Scalar], h: Scalar) -> list[Scalar]:
