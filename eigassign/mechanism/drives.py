@@ -29,7 +29,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import DOFS, multiply
-from eigassign.mechanism.trajectory.trajectory import Rates, Trajectories, Trajectory, rates_at
+from eigassign.mechanism.trajectory.trajectory import Trajectories, rates_at
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays
 
@@ -67,13 +67,13 @@ class DriveForces:
         """
         samples, motions = [], []
         for part, rows in zip(path.parts, path.rows, strict=True):
-            motion = _motion(part.trajectory, y)
+            motion = rates_at(part.trajectory, y)
             given = np.flatnonzero(~part.trajectory.inserted)
             samples.append(rows.start + given[motion[0].samples])
             motions.append([[m.q, m.rate, m.acceleration] for m in motion])
         here, by_design = (
-            [np.concatenate(each) for each in zip(*(m[k] for m in motions), strict=True)]
-            for k in (0, 1)
+            [np.concatenate(each) for each in zip(*own, strict=True)]
+            for own in zip(*motions, strict=True)
         )
         size = max(prod(self.table.shapes[0]), self.table.table.program.n_atoms)
         block = max(1, BLOCK // (size * (1 + len(y) * slopes)))
@@ -122,17 +122,9 @@ class DriveForces:
         return value, np.moveaxis(_exerted(A, *steps).imag / IMAGINARY, 0, 2)
 
 
-def _exerted(
-    A: Floats,
-    T: Numbers,
-    T_rate: Numbers,
-    g: Numbers,
-    J: Numbers,
-    drives: Numbers,
-    rate: Numbers,
-    acceleration: Numbers,
-) -> Numbers:
-    """τ (…, n) of the formula above, T (…, n_links, 6, n)."""
+def _exerted(A: Floats, *terms: Numbers) -> Numbers:
+    """τ (…, n) of the formula above; T, Ṫ, (Rᵀg, 0) and J (…, n_links, 6, n), J_d, q̇ and q̈."""
+    T, T_rate, g, J, drives, rate, acceleration = terms
     q_rate, q_push = (each[..., None, :, None] for each in (rate, acceleration))
     V = T @ q_rate
     momentum = (J @ V)[..., 0]
@@ -143,30 +135,13 @@ def _exerted(
     return np.asarray(work @ np.linalg.inv(A) + drives * (acceleration @ A.T))
 
 
-def _motion(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
-    """The rates at every sample, and their slopes in the design; 0 where none are known."""
-    own = trajectory.given
-    known = rates_at(trajectory, y)
-    alone = np.setdiff1d(np.arange(len(own.time_s)), known[0].samples)
-    if not len(alone):
-        return known
-    both = []
-    for found, at in zip(known, own.at(y), strict=True):
-        rest = np.zeros_like(at[alone])
-        samples = np.concatenate([found.samples, alone])
-        pairs = ((found.q, at[alone]), (found.rate, rest), (found.acceleration, rest))
-        both.append(Rates(samples, *(np.concatenate(pair) for pair in pairs)))
-    return both[0], both[1]
-
-
 def drive_forces(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> DriveForces:
     """The drives of a mechanism, with its weight where `mechanism.gravity` is a vector."""
     moving, kept = all_moving(case, parameters, motion), list(DOFS[case.mechanism.space])
     g = gravity(case)
     parts = []
-    for placement, link in zip(
-        moving.placements, rigid_links(case, parameters, motion), strict=True
-    ):
+    links = rigid_links(case, parameters, motion)
+    for placement, link in zip(moving.placements, links, strict=True):
         J = np.zeros((6, 6), dtype=object)
         J[np.ix_(kept, kept)] = inertia(link)
         if not J.any():

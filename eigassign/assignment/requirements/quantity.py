@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar, Self
 
 import numpy as np
@@ -21,11 +22,11 @@ from eigassign.assignment.requirements.requirement import (
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.mechanism.assembly.total_mass import TotalMass
-from eigassign.mechanism.drives import DriveForces
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 
+Path = Trajectories | None
 _MASS = "design.mass"
 _NO_MODES = Frequencies(np.zeros((1, 0)), np.zeros((1, 0, 0)))
 
@@ -37,9 +38,7 @@ class LimitedQuantity(Requirement):
     extreme: ClassVar[tuple[str, str]] = ("the least is", "the most is")
 
     @classmethod
-    def of_case(
-        cls, file: CaseFile, model: Model, path: Trajectories | None
-    ) -> Iterator[LimitedQuantity]:
+    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
         """Yield what the case file limits, and nothing where it limits nothing."""
         raise NotImplementedError
 
@@ -149,9 +148,7 @@ class MassLimit(LimitedQuantity):
     extreme = ("the lightest design has", "the heaviest design has")
 
     @classmethod
-    def of_case(
-        cls, file: CaseFile, model: Model, path: Trajectories | None
-    ) -> Iterator[LimitedQuantity]:
+    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
         """Yield the limits of the mass, if there are any."""
         if (given := file.design.mass) is not None:
             yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
@@ -174,36 +171,27 @@ class MassLimit(LimitedQuantity):
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedLoads:
-    """What all drives exert along whole trajectories; of the last design it is remembered."""
-
-    drives: DriveForces
-    path: Trajectories
-    known: dict[bytes, tuple[Ints, Floats, Floats]] = field(default_factory=dict)
-
-    def __call__(self, y: Floats) -> tuple[Ints, Floats, Floats]:
-        """Samples (m,), τ (m, n) of a design (n_y,), its slopes (m, n, n_y); see `DriveForces`."""
-        key = np.asarray(y, dtype=np.float64).tobytes()
-        if key not in self.known:
-            found = self.drives.along(self.path, y, slopes=True)
-            self.known.clear()
-            self.known[key] = found
-        return self.known[key]
-
-
-@dataclass(frozen=True, eq=False)
 class CarriedLoad:
-    """The load of one drive, in N m or N: (m,) at all samples, with slopes (m, n_y)."""
+    """The load of one drive, in N m or N: (m,) at all samples, with slopes (m, n_y).
 
-    loads: CarriedLoads
+    ``loads`` are those of all drives at a design, as its bytes: see `DriveForces.along`.
+    """
+
+    loads: Callable[[bytes], tuple[Ints, Floats, Floats]]
+    path: Trajectories
     name: str
     column: int
     unit: str
+    is_affine: bool
+
+    def samples(self, y: Floats) -> tuple[Ints, Floats, Floats]:
+        """The samples (m,), and its values and slopes there, at a design y (n_y,)."""
+        samples, tau, slopes = self.loads(np.asarray(y, dtype=np.float64).tobytes())
+        return samples, tau[:, self.column], slopes[:, self.column]
 
     def __call__(self, y: Floats) -> tuple[Floats, Floats]:
-        """Its values and slopes at a design y (n_y,)."""
-        _, tau, slopes = self.loads(y)
-        return tau[:, self.column], slopes[:, self.column]
+        """Values and slopes alone."""
+        return self.samples(y)[1:]
 
 
 class DriveLimit(LimitedQuantity):
@@ -212,19 +200,22 @@ class DriveLimit(LimitedQuantity):
     extreme = ("the least found is", "the least found is")
 
     @classmethod
-    def of_case(
-        cls, file: CaseFile, model: Model, path: Trajectories | None
-    ) -> Iterator[LimitedQuantity]:
+    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
         """Yield the limits of all drives, along all trajectories whole."""
         if path is None or not file.design.torque:
             return
-        loads = CarriedLoads(model.drives, path.whole)
-        rows = len(loads(initial_design(file))[0])
+
+        @lru_cache(maxsize=1)  # all drives ask for the same design
+        def loads(y: bytes) -> tuple[Ints, Floats, Floats]:
+            return model.drives.along(path.whole, np.frombuffer(y), slopes=True)
+
+        affine = model.drives.is_affine and not path.follows_design
         for column, (name, unit) in enumerate(zip(file.coordinates, file.drive_units, strict=True)):
             if name in file.design.torque:
-                edge = np.full(rows, file.design.torque[name].max)
-                load, place = CarriedLoad(loads, name, column, unit), f"design.torque.{name}"
-                yield cls(place, place, ((load, 1.0),), slice(0, rows), -edge, edge)
+                load = CarriedLoad(loads, path.whole, name, column, unit, affine)
+                edge = np.full(len(load(initial_design(file))[0]), file.design.torque[name].max)
+                place = f"design.torque.{name}"
+                yield cls(place, place, ((load, 1.0),), slice(0, len(edge)), -edge, edge)
 
     @property
     def load(self) -> CarriedLoad:
@@ -236,7 +227,7 @@ class DriveLimit(LimitedQuantity):
     @property
     def is_affine(self) -> bool:
         """True where the load is affine in the design, at every sample."""
-        return self.load.loads.drives.is_affine and not self.load.loads.path.follows_design
+        return self.load.is_affine
 
     @property
     def is_decided(self) -> bool:
@@ -270,9 +261,8 @@ class DriveLimit(LimitedQuantity):
 
     def where(self, y: Floats) -> str:
         """`` at sample 12 (t = 0.3 s)``."""
-        samples, tau, _ = self.load.loads(y)
-        k = int(samples[np.abs(tau[:, self.load.column]).argmax()])
-        return f" at {self.load.loads.path.where(k)}"
+        samples, tau, _ = self.load.samples(y)
+        return f" at {self.load.path.where(int(samples[np.abs(tau).argmax()]))}"
 
     @property
     def in_words(self) -> str:
@@ -290,9 +280,7 @@ class LinearLimit(LimitedQuantity):
     in_one_shot = True
 
     @classmethod
-    def of_case(
-        cls, file: CaseFile, model: Model, path: Trajectories | None
-    ) -> Iterator[LimitedQuantity]:
+    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
         """Yield the linear limits between design parameters."""
         for name, given in file.design.constraints.items():
             factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])

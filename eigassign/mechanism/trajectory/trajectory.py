@@ -446,15 +446,17 @@ class Rates:
     acceleration: Floats
 
 
-def rates(trajectory: Trajectory) -> Rates:
+def rates(trajectory: Trajectory, everywhere: bool = False) -> Rates:
     """Rates by differences within each smooth part; of a part with one sample nothing is known.
 
+    Samples of such parts alone are left out, or stand still where ``everywhere`` is asked for.
     Instants between samples have no part in them: there q is linear, and its corners are none.
     """
     trajectory = trajectory.given
     parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
     samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
     q, time_s = trajectory.q, trajectory.time_s
+    alone = np.setdiff1d(np.arange(len(q) * everywhere), samples)
     first: list[Floats] = [np.zeros((0, q.shape[1]))]
     second = first[:]
     for part in parts:  # of two samples their difference, and no acceleration
@@ -462,7 +464,8 @@ def rates(trajectory: Trajectory) -> Rates:
         rate = np.gradient(q[part], time_s[part], axis=0, edge_order=order)
         first.append(rate)
         second.append(np.gradient(rate, time_s[part], axis=0, edge_order=order))
-    rate, acceleration = np.concatenate(first), np.concatenate(second)
+    still, samples = np.zeros((len(alone), q.shape[1])), np.append(samples, alone)
+    rate, acceleration = np.concatenate([*first, still]), np.concatenate([*second, still])
     resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
     rate[:, resting] = acceleration[:, resting] = 0.0
     # what q rounded to 1e-16 leaves of second differences where the velocity does not change
@@ -472,10 +475,12 @@ def rates(trajectory: Trajectory) -> Rates:
 
 
 def rates_at(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
-    """Rates at design y (n_y,), and the slopes in it of q, q̇ and q̈, each (m, n_q, n_y)."""
+    """Rates everywhere at design y (n_y,), and the slopes of q, q̇ and q̈, each (m, n_q, n_y)."""
     own = trajectory.given
     q, slopes = own.at(y)
-    found, flat = rates(replace(own, q=q)), rates(replace(own, q=slopes.reshape(len(q), -1)))
+    found, flat = (
+        rates(replace(own, q=each), everywhere=True) for each in (q, slopes.reshape(len(q), -1))
+    )
     shape = (len(found.samples), *slopes.shape[1:])
     by_design = (each.reshape(shape) for each in (flat.q, flat.rate, flat.acceleration))
     return found, Rates(found.samples, *by_design)
