@@ -167,3 +167,43 @@ def test_lists_of_values_keep_limits_of_torques() -> None:
     best = min((y for y in peaks if peaks[y] <= asked), key=worth)
     assert tuple(result.design.values()) == pytest.approx(best)
     assert row.optimality.kind == "proved"
+
+
+VARIED = {  # that move the links, and that do not
+    "m1": ("bodies.elbow_mass.mass", 0.0, 0.25),
+    "m2": ("bodies.tool_mass.mass", 0.0, 0.25),
+    "l": ("links.forearm.length", 0.43, 0.47),
+    "k": ("coordinates.q1.drive.stiffness", 5e4, 3e5),
+    "J": ("coordinates.q2.drive.inertia", 0.001, 0.05),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_no_design_of_a_grid_keeps_a_random_limit_and_is_better(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    names = rng.choice(list(VARIED), 2, replace=False)
+    own = [VARIED[name] for name in names]
+    design = "design:\n" + "".join(
+        f"  {name}: {{parameter: {path}, min: {low}, max: {high}}}\n"
+        for name, (path, low, high) in zip(names, own, strict=True)
+    )
+    head = HEAD.replace("duration: 1 s", f"duration: {rng.choice([0.3, 1.0])} s")
+    case = BuiltCase(parse((head + design + TAIL + WANTED).encode(), "case.yaml"))
+    model, path, column = case.model(), case.trajectory, int(rng.integers(2))
+    weights = np.gradient(path.time_s)
+    weights[[0, -1]] /= 2
+    grid = [np.array(y) for y in product(*(np.linspace(low, high, 13) for _, low, high in own))]
+    peaks = [np.abs(model.drives.along(path, y)[1][:, column]).max() for y in grid]
+    hz = [model.frequencies(path.at(y)[0], y, 1)[:, 0] for y in grid]
+    means = [weights @ one / weights.sum() for one in hz]
+    asked = round(float(rng.uniform(min(means), max(means))), 4)
+    limit = float(np.quantile(peaks, rng.uniform(0.0, 0.5)))
+    errors = [np.sqrt(weights @ (one / asked - 1.0) ** 2 / weights.sum()) for one in hz]
+    best = min(error for error, peak in zip(errors, peaks, strict=True) if peak <= limit)
+    torque = f"  torque: {{q{column + 1}: {{max: {limit!r}}}}}\n"
+    result, row = solved(design + torque, f"  - {{mode: 1, frequency: {asked} Hz}}\n", head)
+    assert result.results.drives[column].optimal.peak <= limit * (1 + 1e-7)
+    assert result.results.error is not None
+    assert result.results.error.exact.rms_relative <= best * (1 + 1e-6)
+    assert row.verdict != "infeasible"
