@@ -188,6 +188,7 @@ def modes(
             )
         else:
             answer = queries.modes(case, q, y, count, beyond_bounds, how["allow_outside"])
+        reporter.warn(answer.warnings)
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:
@@ -200,6 +201,7 @@ def modes(
 
 
 def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
+    from eigassign.facts import capital
     from eigassign.output.console import print_tables
     from eigassign.output.tables import modes_table
     from eigassign.study.accuracy import rounding_line
@@ -210,7 +212,8 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         where=answer.where,
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
-        note=rounding_line(answer.round_off),
+        weight=answer.weight,
+        note=". ".join(map(capital, (rounding_line(answer.round_off), *answer.notes))),
     )
     print_tables([found])
     if folder is not None:

@@ -36,6 +36,7 @@ from eigassign.study.results import (
     TargetStudy,
     ToleranceRows,
     TradeOff,
+    WeightRow,
 )
 from eigassign.study.updating.fit import UpdateResults
 
@@ -187,6 +188,7 @@ class RunDocument(OriginDocument):
     trade_off: Annotated[TradeOff | None, Fact("error against mass or price")]
     other_modes: Annotated[Sequence[ModeDocument], Fact("some modes without a target")]
     discretisation: Annotated[MeshError | None, Fact("how much too high the mesh is")]
+    weight: Annotated[WeightRow | None, Fact("what gravity changes that is not computed")]
     approximation: Annotated[Sequence[StudyDocument], Fact("of the expansion, mode by mode")]
     trajectory: Annotated[MotionDocument, Fact("all samples")]
     trajectories: Annotated[Sequence[TrajectoryDocument], Fact("in the order of the case")]

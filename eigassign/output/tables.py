@@ -20,9 +20,11 @@ from eigassign.study.results import (
     RunResults,
     TargetStudy,
     ValidationRow,
+    WeightRow,
 )
 
 Floats = NDArray[np.float64]
+SAGGING = 6  # nodes in the table; results.json has all
 STAGES = {  # of a run, as they are named in results.json
     "model": "assembly of K and M",
     "trajectory": "trajectory",
@@ -89,8 +91,8 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
     Those that there is something to show in.
     """
     kinds = (
-        design, errors, required, drives, clearances, combinations, optima, sensitivity, limits,
-        reach, tolerance, trade_off, approximation, solver, timing,
+        design, errors, required, drives, weight, clearances, combinations, optima, sensitivity,
+        limits, reach, tolerance, trade_off, approximation, solver, timing,
     )  # fmt: skip
     return tuple(table for table in (kind(results) for kind in kinds) if table.rows)
 
@@ -393,6 +395,18 @@ def timing(results: RunResults) -> Table:
     return Table("Timing", ("stage", "time"), rows)
 
 
+def weight(results: RunResults) -> Table:
+    """The nodes that the stated weight moves most, and how near it is to buckling."""
+    found = results.weight
+    if found is None or not found.sag:
+        return Table("Weight", (), ())
+    rows, where = found.sag[:SAGGING], f"over {found.poses} poses of the {found.design} design"
+    caption = f"Where each is farthest off, {where}"
+    if found.buckling is not None:
+        caption += f"; the weight is at most {percent(found.buckling)} of that which buckles it"
+    return facts_table("Sag under the weight", rows, "node sag most", f"{caption}.")
+
+
 def validation_table(rows: Sequence[ValidationRow]) -> Table:
     """Errors of both expansions, and whether the full one is within the case's tolerance."""
     names = "case mode where points order worst_taylor worst_linearised limit passed"
@@ -406,12 +420,14 @@ def modes_table(
     where: str,
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
+    weight: WeightRow | None = None,
     note: str = "",
 ) -> Table:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
-    mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
+    mesh and reduced links raise each frequency at most, relative; ``weight`` is what gravity
+    changes; ``note`` is said below.
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
@@ -422,6 +438,11 @@ def modes_table(
             columns[f"{cause}: too high by at most"] = [
                 f"{100 * e:.2g} %" if math.isfinite(e) else "cannot be bounded" for e in errors
             ]
+    if weight is not None:
+        stated = weight.gravity is not None
+        columns["sag: changes it by" if stated else "gravity: may change it by"] = [
+            f"{100 * e:.2g} %" if math.isfinite(e) else "may buckle or fall" for e in weight.change
+        ]
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
     caption += f" {capital(note)}." if note else ""
     rows = tuple(zip(*columns.values(), strict=True))

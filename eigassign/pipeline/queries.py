@@ -29,7 +29,9 @@ from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
+from eigassign.study.results import WeightRow
 from eigassign.study.updating.measured import read_measurements
+from eigassign.study.weight import study_weight
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +52,9 @@ class ModesAnswer:
     round_off: Annotated[Share, Fact("at most; infinite: not known", may_lack=True)] = 0.0
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
+    weight: Annotated[WeightRow | None, Fact("what gravity changes that is not in it")] = None
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -158,6 +163,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     every = tuple(range(1, len(hz) + 1))
     lost = model.truncation_error(q, y, every)[0] if model.reduced else None
     coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
+    weight = study_weight(file, model, every, q[None], y, "given")
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),
@@ -167,6 +173,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
+        *(weight.row, weight.notes, weight.warnings),
     )
 
 
@@ -206,7 +213,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     if trajectory is not None:
         requirements_of(file, with_instants(file, trajectory))
     notes += read_measurements(case)[1]
-    plan = None
+    plan, said = None, ()
     if trajectory is not None or file.expansion.q != "auto":
         needed = expansion_needed(file)
         plan = plan_expansion(file, model, trajectory, needed=needed)
@@ -216,6 +223,10 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += tuple(
             mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"))
         )
+        first = q[:1]  # one pose is quick
+        weight = study_weight(file, model, plan.modes, first, y, "initial")
+        notes += weight.lines
+        said = tuple(file.problem("mechanism", each) for each in weight.warnings)
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
     takes = None if plan is None else outlook(case, plan, trajectory)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
@@ -232,7 +243,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes=tuple(notes),
         outlook=takes,
         next=next_step(file),
-        warnings=file.warnings,
+        warnings=(*file.warnings, *said),
     )
 
 

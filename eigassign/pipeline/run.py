@@ -32,7 +32,7 @@ from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages, silent
-from eigassign.study.accuracy import study_accuracy, truncation_notes
+from eigassign.study.accuracy import study_accuracy, truncation_notes, weight_at
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import (
@@ -142,11 +142,12 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
         with stages("assignment", "assigning the frequencies"):
             answer = find_answer(scene, wanted, options.progress)
         solved = _solved(scene, wanted, answer, stages)
-        with stages("comparison", "comparing the expansion with exact frequencies"):
-            studies = study_modes(scene, solved.initial.hz)
-            accuracy = study_accuracy(scene, answer.y)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
+        with stages("comparison", "comparing the expansion with exact frequencies"):
+            studies = study_modes(scene, solved.initial.hz)
+            more = {mode for target in targets for mode in target.judged}
+            accuracy = study_accuracy(scene, answer.y, more)
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
             meaning = study_meaning(scene, answer, wanted, solved.exact, accepted, asked)
@@ -300,9 +301,10 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
         scene = prepare(case, stages, _cache(options))
         with stages("validation", "comparing both expansions with exact frequencies"):
             rows = validate_expansions(scene)
-            notes = (*scene.notes, *truncation_notes(scene))
+            weight = weight_at(scene, scene.initial, "initial")
+            notes = (*scene.notes, *weight.lines, *truncation_notes(scene))
     along = [(row.worst_taylor, row.mode) for row in rows if row.where.startswith(TRAJECTORY)]
-    warnings = (*scene.warnings, *reach_warnings(scene, along))
+    warnings = (*scene.warnings, *reach_warnings(scene, along), *weight.warnings)
     return Validation(rows, notes, warnings, stages.total_s)
 
 

@@ -9,6 +9,7 @@ Reading order:
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
+    weight      what gravity changes that is not in the frequencies
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict

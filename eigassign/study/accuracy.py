@@ -35,6 +35,7 @@ from eigassign.modal.slow_motion import motion_effect, stiffening
 from eigassign.study.planning import poses_at, travelled
 from eigassign.study.results import MeshError
 from eigassign.study.scene import Scene
+from eigassign.study.weight import WeightStudy, study_weight
 
 Floats = NDArray[np.float64]
 POSES = 9  # at which the mesh is judged; each costs an exact solve
@@ -49,24 +50,34 @@ class Accuracy:
     """The errors of a run's numbers: of the mesh, and of all in lines of text."""
 
     mesh: MeshError | None  # None without beams
+    weight: WeightStudy
     notes: tuple[str, ...]
 
 
-def study_accuracy(scene: Scene, optimum: Floats | None = None) -> Accuracy:
-    """Errors of mesh, reduced links, expansion and round-off, per mode.
+def study_accuracy(
+    scene: Scene, optimum: Floats | None = None, more: Collection[int] = ()
+) -> Accuracy:
+    """Errors of mesh, reduced links, expansion and round-off, and what gravity changes, per mode.
 
     Those of mesh and links at the ``optimum`` (n_y,), of the mesh at the initial design without
     one. Where there is one, the expansion is compared with exact solves at every sample, and its
-    error not estimated too.
+    error not estimated too. ``more`` modes than are expanded are asked for by targets.
     """
     q = scene.q0[None] if scene.trajectory is None else scene.path.q
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
     mesh = judged_mesh(scene.model, scene.modes, scene.trajectory, scene.q0, y, design)
-    lines = mesh_lines(mesh)
+    weight = weight_at(scene, y, design, more)
+    lines = [*mesh_lines(mesh), *weight.lines]
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
-    return Accuracy(mesh, (*lines, _rounding_note(scene, y)))
+    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y)))
+
+
+def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) -> WeightStudy:
+    """`study_weight` of the expanded and ``more`` modes at the poses where the mesh is judged."""
+    q = _judged_at(scene.model, scene.trajectory, scene.q0, y)
+    return study_weight(scene.file, scene.model, sorted({*scene.modes, *more}), q, y, design)
 
 
 def model_errors(
@@ -121,9 +132,14 @@ def judged_mesh(
     """
     if model.meshed is None:
         return None
-    q = q0[None] if trajectory is None else judged_poses(model, poses_at(trajectory, y))
+    q = _judged_at(model, trajectory, q0, y)
     error = model.discretisation_error(q, y, modes).max(axis=0)
     return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
+
+
+def _judged_at(model: Model, trajectory: Trajectories | None, q0: Floats, y: Floats) -> Floats:
+    """The poses at which design y is judged: those of its trajectory, or q0."""
+    return q0[None] if trajectory is None else judged_poses(model, poses_at(trajectory, y))
 
 
 def judged_poses(model: Model, q: Floats) -> Floats:

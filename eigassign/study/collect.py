@@ -76,29 +76,35 @@ def collect_results(
         trajectories=_trajectories(file, trajectory),
         poses=_poses(scene),
         studies=studies.rows,
-        warnings=(*scene.warnings, *reach),
+        warnings=(*scene.warnings, *reach, *accuracy.weight.warnings),
         notes=(*scene.notes, *studies.notes, *accuracy.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         discretisation=accuracy.mesh,
+        weight=accuracy.weight.row,
         moving=moving,
     )
-    return results if assigned is None else _with_answer(results, scene, assigned, reach)
+    return results if assigned is None else _with_answer(results, scene, assigned, reach, accuracy)
 
 
 def _with_answer(
-    results: RunResults, scene: Scene, assigned: VerifiedAssignment, reach: tuple[str, ...]
+    results: RunResults,
+    scene: Scene,
+    assigned: VerifiedAssignment,
+    reach: tuple[str, ...],
+    accuracy: Accuracy,
 ) -> RunResults:
     """The results with those of the answer; ``reach`` matters to one that the expansion gave."""
     answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
     row = assignment_row(
         *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
-        *(results.discretisation, meaning.unreachable),
+        *(results.discretisation, results.weight, meaning.unreachable),
     )
     reach = reach if answer.found is None else ()
     motion = study_motion(scene, answer.y, assigned.solved.exact.hz)
     slow, fast = ("", None) if motion is None else (motion.note, motion.warning)
-    warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, fast)
+    weight = accuracy.weight.warnings
+    warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, *weight, fast)
     notes = (*assigned.solved.notes, *_notes(scene, assigned, row), slow, *meaning.notes)
     return replace(
         results,

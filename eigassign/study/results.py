@@ -44,6 +44,11 @@ def frozen(array: Floats) -> Floats:
     return array
 
 
+def _metres(along: Floats) -> str:
+    """``0, -0.0123``: three digits each."""
+    return ", ".join(f"{value + 0.0:.3g}" for value in along.tolist())
+
+
 # --- How good an expansion is
 
 
@@ -288,6 +293,11 @@ class TargetStudy(Brief):
         """The modes that it names, or that a followed one is with the answer."""
         row = self.followed
         return set(self.asked.modes if row is None else row.exact_numbers.tolist())
+
+    @property
+    def judged(self) -> set[int]:
+        """``numbers``, and of a band those about it."""
+        return self.numbers.union(() if self.near is None else self.near.modes)
 
     @property
     def approximation_error(self) -> float:
@@ -651,6 +661,38 @@ class MeshError:
     design: Annotated[str, Fact("of which it is: initial or optimal")]
 
 
+@dataclass(frozen=True)
+class SagRow:
+    """How far the weight bends a named node from its place, where that is farthest."""
+
+    node: str
+    sag: Annotated[Floats, Fact("along the axes of the ground", "sag", unit="m", digits=_metres)]
+
+    @property
+    def most(self) -> Annotated[float, Fact("at its largest", unit="m", digits=".3g")]:
+        """Its length."""
+        return float(np.linalg.norm(self.sag))
+
+
+@dataclass(frozen=True)
+class WeightRow:
+    """What gravity changes of each mode's frequency, relative, that is not in it.
+
+    Of stated ``gravity`` (m/s²) that is sag. Not stated (null), it is the forces inside and the sag
+    of 9.81 m/s², whichever way is down.
+    """
+
+    gravity: Annotated[Floats | None, Fact("as stated", unit="m/s²")]
+    modes: tuple[int, ...]
+    change: Annotated[
+        tuple[Share, ...], Fact("of each mode; infinite: it may buckle or fall", may_lack=True)
+    ]
+    poses: Annotated[int, Fact("at which it was judged")]
+    design: Annotated[str, Fact("of which it is: initial, optimal or updated")]
+    sag: Annotated[tuple[SagRow, ...], Fact("of named nodes, the farthest first")] = ()
+    buckling: Annotated[Share | None, Fact("the weight, relative to that which buckles")] = None
+
+
 @dataclass(frozen=True, repr=False)
 class RunResults(Brief):
     """Everything a run folder shows."""
@@ -680,6 +722,7 @@ class RunResults(Brief):
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
     mass: MassRow | None = None
     discretisation: MeshError | None = None
+    weight: WeightRow | None = None  # None where gravity is left out on purpose
     only: str | None = None  # of several trajectories the one that these are results of
     meaning: Meaning = field(default_factory=Meaning)
     spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for

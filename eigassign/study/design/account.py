@@ -32,8 +32,10 @@ from eigassign.study.results import (
     OptimalityRow,
     StepRow,
     TargetStudy,
+    WeightRow,
 )
 from eigassign.study.scene import Scene
+from eigassign.study.weight import weight_doubt
 
 Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
@@ -49,12 +51,14 @@ def assignment_row(
     targets: Sequence[TargetStudy],
     exact: Solved,
     mesh: MeshError | None,
+    weight: WeightRow | None,
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers.
 
-    ``exact`` are its frequencies, ``mesh`` is the mesh's error there; ``unreachable`` says in words
-    which targets are out of reach within the bounds.
+    ``exact`` are its frequencies, ``mesh`` is the mesh's error there and ``weight`` what gravity
+    changes that is not in them; ``unreachable`` says in words which targets are out of reach within
+    the bounds.
     """
     keys, found = scene.file.assignment, answer.found
     initial, optimal = _merits(answer, targets)
@@ -79,6 +83,7 @@ def assignment_row(
     undecided = dict(_undecided(targets, exact, of_model, accepted))
     beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
     doubts = [] if trusted else [UNTRUSTED]
+    doubts += weight_doubt(scene.file, weight, {m for t in targets for m in t.judged}, largest)
     if undecided and (len(beyond) < len(unreachable) or set(conflicting) & set(undecided)):
         doubts += undecided.values() if not beyond else ()
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)

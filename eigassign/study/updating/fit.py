@@ -30,10 +30,12 @@ from eigassign.case.units import handy_unit
 from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import in_hz
+from eigassign.study.accuracy import judged_poses
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.variants import spread_designs
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
+from eigassign.study.weight import study_weight
 
 Floats = NDArray[np.float64]
 STARTS = 100  # at most
@@ -258,6 +260,8 @@ def collect_update(
     """Everything that was found, as plain numbers and words."""
     case = problem.case
     directions = tuple(_direction(row, found.y, problem) for row in found.unidentified)
+    q, modes = judged_poses(problem.model, problem.q), {each.mode for each in problem.measured}
+    weight = study_weight(case.file, problem.model, sorted(modes), q, found.y, "updated")
     return UpdateResults(
         title=case.file.title,
         reference=case.file.reference,
@@ -291,8 +295,8 @@ def collect_update(
             str(found.fit.end),
         ),
         verdict=found.verdict,
-        notes=(*problem.notes, *_notes(problem, found)),
-        warnings=(*map(str, case.file.warnings), *_warnings(problem, found)),
+        notes=(*problem.notes, *_notes(problem, found), *weight.lines),
+        warnings=(*map(str, case.file.warnings), *_warnings(problem, found), *weight.warnings),
         timing_s=dict(timing_s),
     )
 

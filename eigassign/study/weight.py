@@ -1,0 +1,149 @@
+"""What gravity changes that the frequencies do not contain, beside the errors of mesh and links.
+
+Where the case states gravity, they contain the forces inside, and what the links sag by is left;
+where it does not, both are, whichever way is down: c (n_axes,) of an axis each, relative to λ and
+linear in g, give x = |g·c| or 9.81 m/s² ‖c‖, and of λ (1 ± x) the worse is 1 − √(1 − x) away in
+frequency. From x = 1 on the mechanism may buckle, or fall.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from operator import itemgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import EigassignError
+from eigassign.modal.model import Model
+from eigassign.modal.under_load import STANDARD_GRAVITY, buckling, sag_of_nodes, weight_changes
+from eigassign.study.results import SagRow, WeightRow
+
+Floats = NDArray[np.float64]
+WARNED = 0.005  # of a frequency: what a measurement tells, and a mesh of few elements leaves out
+SAID = 1e-5  # below which a line has no digits: symmetry makes many of these round-off
+# of the buckling load: λ, linear in the load, is then off by some 1 % as the links bend more
+NEAR_BUCKLING = 0.2
+
+
+@dataclass(frozen=True)
+class WeightStudy:
+    """The numbers, None where gravity is left out on purpose, and the words for them."""
+
+    row: WeightRow | None
+    notes: tuple[str, ...]  # of the whole
+    warnings: tuple[str, ...] = ()
+    of_modes: tuple[str, ...] = ()
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Every mode's, and those of the whole."""
+        return (*self.of_modes, *self.notes)
+
+
+def study_weight(
+    file: CaseFile, model: Model, modes: Sequence[int], q: Floats, y: Floats, design: str
+) -> WeightStudy:
+    """What gravity changes of ``modes`` at poses q (n, n_q) of one ``design`` y (n_y,)."""
+    gravity = file.mechanism.gravity
+    if gravity == "none":
+        return WeightStudy(None, ("gravity is left out on purpose (mechanism.gravity: none)",))
+    try:
+        row = _row(model, modes, q, y, design, None if gravity is None else np.array(gravity))
+    except EigassignError as error:
+        return WeightStudy(None, (), (f"what gravity changes is not known: {error}",))
+    where = f"over {len(q)} poses" if len(q) > 1 else "at one pose"
+    whole, modes_ = (
+        tuple(f"{line}, {where} of the {design} design" for line in lines)
+        for lines in (_of_whole(row), _of_modes(row))
+    )
+    if model.n_rigid and gravity is None:
+        whole += ("stated gravity lets free coordinates swing or fall, and counts these as modes",)
+    return WeightStudy(row, whole, tuple(_warnings(file, row)), modes_)
+
+
+def _row(
+    model: Model, modes: Sequence[int], q: Floats, y: Floats, design: str, g: Floats | None
+) -> WeightRow:
+    found = weight_changes(model, q, y, modes)
+    if g is None:
+        x = STANDARD_GRAVITY * np.linalg.norm(found.stress + found.sag, axis=2)
+    else:
+        x = np.abs(found.sag @ g)
+    x = x.max(axis=0)
+    change = np.where(x < 1.0, 1.0 - np.sqrt(1.0 - np.minimum(x, 1.0)), np.inf)
+    row = WeightRow(g, tuple(modes), tuple(change.tolist()), len(q), design)
+    if g is None:
+        return row
+    sag = sag_of_nodes(model, q, y, g)
+    far = {name: at[np.linalg.norm(at, axis=1).argmax()] for name, at in sag.items()}
+    rows = [SagRow(name, along) for name, along in far.items()]
+    rows.sort(key=lambda one: -one.most)
+    return replace(row, sag=tuple(rows), buckling=float(buckling(model, q, y, g).max()))
+
+
+def weight_doubt(
+    file: CaseFile, row: WeightRow | None, asked: Collection[int], accepted: float
+) -> Iterator[str]:
+    """Say why no number can be vouched for: gravity changes a mode ``asked`` for by too much."""
+    said, change = ("", 0.0) if row is None else _worst(row, asked)
+    if change > accepted:
+        yield f"{said}, and {100 * accepted:.3g} % are accepted{_advice(file)}"
+
+
+def _warnings(file: CaseFile, row: WeightRow) -> Iterator[str]:
+    said, change = _worst(row, row.modes)
+    if change > WARNED:
+        yield f"{said}{_advice(file)}"
+    if row.buckling is not None and row.buckling > NEAR_BUCKLING:
+        yield (
+            f"the weight is {100 * row.buckling:.3g} % of that which buckles the mechanism: beyond "
+            f"{100 * NEAR_BUCKLING:g} % what is linear in it is too little"
+        )
+
+
+def _worst(row: WeightRow, modes: Collection[int]) -> tuple[str, float]:
+    """What gravity changes most of these modes, in words and relative."""
+    own = [each for each in zip(row.change, row.modes, strict=True) if each[1] in modes]
+    change, mode = max(own, key=itemgetter(0), default=(0.0, 0))
+    most = f"{100 * change:.2g} %"
+    if row.gravity is None:
+        how = f"which may change mode {mode} by up to {most}"
+        how = how if np.isfinite(change) else f"under which mode {mode} may buckle or fall"
+        return f"the case does not state gravity, {how}", change
+    how = f"by about {most}" if np.isfinite(change) else "by more than can be told"
+    return f"the links sag, which changes mode {mode} {how} and is not in its frequency", change
+
+
+def _advice(file: CaseFile) -> str:
+    """The key to write, where it is not there."""
+    if file.mechanism.gravity is not None:
+        return ""
+    down = "[0, -9.81]" if file.mechanism.space == "planar" else "[0, 0, -9.81]"
+    return (
+        f": write mechanism.gravity: {down}, or none if the machine lies flat or this is on purpose"
+    )
+
+
+def _of_modes(row: WeightRow) -> Iterator[str]:
+    for mode, change in zip(row.modes, row.change, strict=True):
+        known, most = np.isfinite(change), f"{100 * max(change, SAID):.2g} %"
+        if row.gravity is not None:
+            told = f"{'less than' if change < SAID else 'about'} {most}"
+            told = told if known else "more than can be told"
+            yield f"mode {mode}: the links' sag, which is left out, changes it by {told}"
+        elif known:
+            told = f"{'less than' if change < SAID else 'up to'} {most}, whichever way is down"
+            yield f"mode {mode}: gravity, which is not stated, changes it by {told}"
+        else:
+            yield f"mode {mode}: under gravity, which is not stated, it may buckle or fall"
+
+
+def _of_whole(row: WeightRow) -> Iterator[str]:
+    """Say of stated gravity what sags most, and how near it is to buckling."""
+    if row.sag:
+        yield f"{row.sag[0].node} sags by {row.sag[0].most:.3g} m under the weight"
+    if row.buckling is not None:
+        yield f"the weight is {100 * row.buckling:.3g} % of that which buckles the mechanism"
