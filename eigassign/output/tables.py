@@ -400,7 +400,8 @@ def weight(results: RunResults) -> Table:
     found = results.weight
     if found is None or not found.sag:
         return Table("Weight", (), ())
-    rows, where = found.sag[:SAGGING], f"over {found.poses} poses of the {found.design} design"
+    rows = [row for row in found.sag if row.most][:SAGGING]
+    where = f"over {found.poses} poses of the {found.design} design"
     caption = f"Where each is farthest off, {where}"
     if found.buckling is not None:
         caption += f"; the weight is at most {percent(found.buckling)} of that which buckles it"

@@ -77,9 +77,10 @@ def _row(
     row = WeightRow(g, tuple(modes), tuple(change.tolist()), len(q), design)
     if g is None:
         return row
-    sag = sag_of_nodes(model, q, y, g)
-    far = {name: at[np.linalg.norm(at, axis=1).argmax()] for name, at in sag.items()}
-    rows = [SagRow(name, along) for name, along in far.items()]
+    names, moved = sag_of_nodes(model, q, y, g)
+    worst = np.linalg.norm(moved, axis=2).argmax(axis=0)
+    far = moved[worst, np.arange(len(names)), : len(g)]
+    rows = [SagRow(name, along) for name, along in zip(names, far, strict=True)]
     rows.sort(key=lambda one: -one.most)
     return replace(row, sag=tuple(rows), buckling=float(buckling(model, q, y, g).max()))
 

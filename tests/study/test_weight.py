@@ -27,6 +27,7 @@ design: {{m: {{parameter: bodies.load.mass, min: {low}, max: {high}}}}}
 targets: [{target}]
 {more}
 """
+REFERENCES = Path(__file__).parents[1] / "mechanism" / "weight_references"
 SAID = "the case does not state gravity"
 DOWN = "mechanism.gravity: [0, -9.81]"
 
@@ -113,7 +114,7 @@ def test_the_sag_of_a_straight_boom_changes_nothing_but_is_there(tmp_path: Path)
     """The tip of a clamped boom goes down by (m g + 3/8 w L) L³ cos α / 3 EI across it."""
     found = solved(tmp_path, "[0, -9.81]", load=800.0, target="{mode: 1, at_most: 5 Hz}")
     weight, y = found.weight, found.design[0].optimal
-    assert weight.change[0] < 1e-6
+    assert weight.change[0] < 1e-4  # it is pressed shorter
     assert weight.sag[0].node == "boom.end"
     area = np.pi / 4 * (0.6**2 - 0.576**2)
     EI = 210e9 * np.pi / 64 * (0.6**4 - 0.576**4)
@@ -130,15 +131,29 @@ def test_beyond_a_fifth_of_buckling_a_warning_has_the_factor(tmp_path: Path) -> 
     assert found.assignment.verdict == "reached"
 
 
-@pytest.mark.parametrize(("load", "verdict"), [(200.0, "reached"), (3000.0, "do_not_use")])
+@pytest.mark.parametrize(("accepted", "verdict"), [("5 %", "reached"), ("1 %", "do_not_use")])
 def test_sag_beyond_what_is_accepted_makes_an_answer_unusable(
-    tmp_path: Path, load: float, verdict: str
+    tmp_path: Path, accepted: str, verdict: str
 ) -> None:
-    """A body off the boom's axis turns with the tip."""
-    target = "{mode: 1, at_most: 5 Hz}"
-    found = solved(tmp_path, "[0, -9.81]", load=load, offset="[0, 6]", target=target)
+    """Of the second mode of an arm with a tool on one side, it is 1.8 % by another program."""
+    text = (REFERENCES / "double_arm.yaml").read_text(encoding="utf-8")
+    text = text.replace("min: 0, max: 1000", "min: 0.79, max: 0.81")
+    file = tmp_path / "arm.yaml"
+    file.write_text(
+        f"""{text}
+trajectory: {{q: [[0.4, -1.1], [0.41, -1.1], [0.42, -1.1]], duration: 20 s}}
+targets: [{{mode: 2, at_most: 5 Hz}}]
+assignment: {{max_error: {accepted}}}
+""",
+        encoding="utf-8",
+    )
+    found = ea.assign(ea.load_case(file)).results
+    change = dict(zip(found.weight.modes, found.weight.change, strict=True))[2]
+    assert change == pytest.approx(1.0 - 3.875506707507744 / 3.9456612087395126, rel=0.03)
+    (warning,) = (each for each in found.warnings if "links sag" in each)
+    assert "mode 2 by about 1.8 %" in warning
     assert found.assignment.verdict == verdict
-    assert ("sag" in found.assignment.reason) == (verdict != "reached")
+    assert ("links sag" in found.assignment.reason) == (verdict != "reached")
 
 
 # --- other commands
@@ -152,7 +167,7 @@ def test_modes_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert DOWN in said.err
     assert main(["modes", str(boom(tmp_path, "[0, -9.81]")), "--q", "80 deg"]) == 0
     said = capsys.readouterr()
-    assert "oom.end sags by 1.4" in said.out
+    assert "oom.end sags by 1.92 m" in said.out
     assert "of that which buckles" in said.err
     assert main(["modes", str(boom(tmp_path, "none")), "--q", "80 deg"]) == 0
     said = capsys.readouterr()
