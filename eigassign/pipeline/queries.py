@@ -31,7 +31,7 @@ from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import WeightRow
 from eigassign.study.updating.measured import read_measurements
-from eigassign.study.weight import study_weight
+from eigassign.study.weight import GIVEN, study_weight
 
 Floats = NDArray[np.float64]
 
@@ -163,7 +163,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     every = tuple(range(1, len(hz) + 1))
     lost = model.truncation_error(q, y, every)[0] if model.reduced else None
     coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
-    weight = study_weight(file, model, every, q[None], y, "given")
+    weight = study_weight(file, model, every, q[None], y, GIVEN)
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),

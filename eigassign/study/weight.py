@@ -22,6 +22,7 @@ from eigassign.modal.under_load import STANDARD_GRAVITY, buckling, sag_of_nodes,
 from eigassign.study.results import SagRow, WeightRow
 
 Floats = NDArray[np.float64]
+GIVEN = "given"  # a pose and design that stand above what is said
 WARNED = 0.005  # of a frequency: what a measurement tells, and a mesh of few elements leaves out
 SAID = 1e-5  # below which a line has no digits: symmetry makes many of these round-off
 # of the buckling load: λ, linear in the load, is then off by some 1 % as the links bend more
@@ -54,14 +55,14 @@ def study_weight(
         row = _row(model, modes, q, y, design, None if gravity is None else np.array(gravity))
     except EigassignError as error:
         return WeightStudy(None, (), (f"what gravity changes is not known: {error}",))
-    where = f"over {len(q)} poses" if len(q) > 1 else "at one pose"
-    whole, modes_ = (
-        tuple(f"{line}, {where} of the {design} design" for line in lines)
-        for lines in (_of_whole(row), _of_modes(row))
+    where = f", {f'over {len(q)} poses' if len(q) > 1 else 'at one pose'} of the {design} design"
+    where = "" if design == GIVEN else where
+    whole, of_modes = (
+        tuple(f"{line}{where}" for line in lines) for lines in (_of_whole(row), _of_modes(row))
     )
     if model.n_rigid and gravity is None:
         whole += ("stated gravity lets free coordinates swing or fall, and counts these as modes",)
-    return WeightStudy(row, whole, tuple(_warnings(file, row)), modes_)
+    return WeightStudy(row, whole, tuple(_warnings(file, row)), of_modes)
 
 
 def _row(
