@@ -213,7 +213,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     if trajectory is not None:
         requirements_of(file, with_instants(file, trajectory))
     notes += read_measurements(case)[1]
-    plan, said = None, ()
+    plan, warnings = None, file.warnings
     if trajectory is not None or file.expansion.q != "auto":
         needed = expansion_needed(file)
         plan = plan_expansion(file, model, trajectory, needed=needed)
@@ -223,10 +223,9 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += tuple(
             mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"))
         )
-        first = q[:1]  # one pose is quick
-        weight = study_weight(file, model, plan.modes, first, y, "initial")
+        weight = study_weight(file, model, plan.modes, q[:1], y, "initial")  # quick
         notes += weight.lines
-        said = tuple(file.problem("mechanism", each) for each in weight.warnings)
+        warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
     takes = None if plan is None else outlook(case, plan, trajectory)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
@@ -243,7 +242,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes=tuple(notes),
         outlook=takes,
         next=next_step(file),
-        warnings=(*file.warnings, *said),
+        warnings=warnings,
     )
 
 
