@@ -37,6 +37,7 @@ Floats = NDArray[np.float64]
 
 
 Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
+Words = Annotated[tuple[str, ...], Fact(is_key=True)]
 TooHigh = Annotated[list[Share] | None, Fact("at most", optional=True, may_lack=True)]
 
 
@@ -52,9 +53,9 @@ class ModesAnswer:
     round_off: Annotated[Share, Fact("at most; infinite: not known", may_lack=True)] = 0.0
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
-    weight: Annotated[WeightRow | None, Fact("what gravity changes that is not in it")] = None
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    weight: Annotated[WeightRow | None, Fact("what gravity changes", optional=True)] = None
+    notes: Words = ()  # of gravity
+    warnings: Words = ()
 
 
 @dataclass(frozen=True)
