@@ -32,7 +32,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.inner import InnerPart, inner_parts
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.truncation import BESIDE as BESIDE_LINKS
-from eigassign.modal.truncation import REFUSED, LeftOut, truncation_bounds
+from eigassign.modal.truncation import REFUSED, LeftOut, truncation_bounds, under_weight
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -62,10 +62,12 @@ def discretisation_error(
         mu = 1.0 / found.lam[0]
         z = found.phi[0] * np.sqrt(mu)
         gram, own, beta = inside.at(x[s], z, mu)
+        gram, beta = under_weight(pencil, x[s], z, mu, (gram, beta))
         most = float(beta.max())
         bounds = _bounds(mu, gram, most, inside.tie, highest, pencil)
         if left_out is not None:
-            left = (gram, most), left_out.at(x[s], z, mu)
+            beside = under_weight(pencil, x[s], z, mu, left_out.at(x[s], z, mu), in_links=True)
+            left = (gram, most), beside
             bounds = np.maximum(bounds, _beside_links(mu, *left, inside.tie, highest, pencil))
         total[s] = bounds[pick]
         room = np.maximum(mu[pick] - beta[:, None], 0.0)

@@ -15,7 +15,6 @@ from eigassign.mechanism.assembly.affine_entries import (
     AffineEntries,
     Entries,
     Ints,
-    joined,
     pattern,
 )
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
@@ -79,19 +78,21 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    g, weight, K_g = gravity(case), AffineEntries(summed=True), None
+    g, weight, K_g, inside = gravity(case), AffineEntries(summed=True), None, None
     if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
             coarse = local_links(in_few_elements(case), parameters, motion)
-        add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
+        elements = add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
+        inside = parameters.compiled(np.array(elements, dtype=object).reshape(-1, 16))
     _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
     if g is not None:
         known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
-    return _compile(K, M, K_g, case, parameters, motion, nodes.count)
+    pencil = _compile(K, M, K_g, case, parameters, motion, nodes.count)
+    return pencil if K_g is None else replace(pencil, weight=replace(pencil.weight, inside=inside))
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -279,9 +280,7 @@ def _compile(
     n_dof = n_u + len(motion.columns)
     if not n_dof:
         raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
-    entries = [stiffness, mass]
-    if weight is not None:
-        entries = [joined(stiffness, weight), mass, weight]
+    entries = [stiffness, mass] if weight is None else [stiffness, mass, weight]
     used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
     used[0] = True
     for entry in entries:
@@ -295,7 +294,7 @@ def _compile(
         rigid=n_u + np.array(motion.rigid, dtype=np.intp),
         rows=rows,
         columns=columns,
-        stiffness=weights[0],
+        stiffness=weights[0] + weights[2] if weight is not None else weights[0],
         mass=weights[1],
         program=compile_program(parameters.recorder, atoms.tolist(), parameters.count),
         to_program=parameters.to_z,
@@ -304,22 +303,23 @@ def _compile(
         n_loads=len(parameters.loads),
         limits=property_limits(case),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
-        weight=_weight(stiffness[0], (rows, columns), weights[2:], case, motion, n_u),
+        weight=_weight((rows, columns), weights, case, motion, n_u),
     )
 
 
 def _weight(
-    held: Ints,
     places: tuple[Ints, Ints],
-    K_g: Sequence[sparse.csr_array],
+    weights: Sequence[sparse.csr_array],
     case: CaseFile,
     motion: Kinematics,
     n_u: int,
 ) -> Weight | None:
-    """K_g at its ``places``; ``held`` are the unknowns that K has entries of without it."""
+    """K_g beside K and M with these ``weights`` at their ``places``; None without gravity."""
     g = gravity(case)
     if g is None:
         return None
+    K, _, K_g = weights
+    held = places[0][np.diff(K.indptr) > 0]
     columns = [k for k in range(len(motion.columns)) if k not in motion.rigid]
     joints, names = n_u + np.array(columns, dtype=np.intp), tuple(case.coordinates)
     entries = np.flatnonzero(np.isin(places, joints).all(axis=0))
@@ -327,9 +327,10 @@ def _weight(
     at = np.ones(len(entries)), (i * len(joints) + j, np.arange(len(entries)))
     spread = sparse.csr_array(at, shape=(len(joints) ** 2, len(entries)))
     return Weight(
-        stiffness=K_g[0],
+        stiffness=K_g,
+        without=K,
         joints=joints,
-        among_joints=sparse.csr_array(spread @ K_g[0][entries]),
+        among_joints=sparse.csr_array(spread @ K_g[entries]),
         swinging=np.flatnonzero(~np.isin(joints, held)),
         names=tuple(names[motion.columns[k]] for k in columns),
         coordinates=names,

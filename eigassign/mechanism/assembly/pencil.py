@@ -17,7 +17,7 @@ from scipy import sparse
 
 from eigassign.brief import Brief
 from eigassign.series.algebra import Samples, Tangents, Truncated
-from eigassign.series.compiler import Program
+from eigassign.series.compiler import CompiledArrays, Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
 if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and case
@@ -57,12 +57,14 @@ class Weight:
     """K_g by itself, which is in K as well, and what to say of coordinates that it moves."""
 
     stiffness: sparse.csr_array  # (n_nonzeros, n_theta) on the pencil's pattern
+    without: sparse.csr_array  # K without it, likewise
     joints: Ints  # the dofs of joint coordinates that are not rigid (n_joints,)
     among_joints: sparse.csr_array  # their own K_g, (n_joints², n_theta)
     swinging: Ints  # places in ``joints`` of those that nothing but the weight holds
     names: tuple[str, ...]  # of ``joints``
     coordinates: tuple[str, ...]  # of all, which the samples begin with
     gravity: float  # |g| in m/s²
+    inside: CompiledArrays | None = None  # of z: `add_weight` of beam elements, (n, 16)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -99,7 +99,7 @@ def _buckled(pencil: Pencil, theta: Floats, where: str) -> str:
     S = weight.joints[weight.swinging]
     H = np.setdiff1d(pencil.elastic, S)
     data = weight.stiffness @ theta
-    K_0 = principal(pencil, pencil.stiffness @ theta - data, H)
+    K_0 = principal(pencil, weight.without @ theta, H)
     K_g = principal(pencil, data, np.union1d(H, S)).tocsr()
     inner, outer = (np.isin(np.union1d(H, S), each) for each in (H, S))
     G, across = K_g[inner][:, inner], K_g[inner][:, outer].toarray()

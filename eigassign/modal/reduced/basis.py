@@ -174,11 +174,12 @@ def mean_theta(pencil: Pencil, points: Floats) -> Floats:
     """Mean θ (n_theta,) over quarter turns of all angles from ``points`` (n_points, n_x).
 
     The design is that of the first point. Loops are not turned: where they close at all, a passive
-    carriage may have left its beam, whose stiffness is then not one.
+    carriage may have left its beam, whose stiffness is then not one; nor are mechanisms under their
+    weight, which might fall.
     """
     z = points @ pencil.to_program.T + pencil.shift
     n = pencil.n_joints
-    if pencil.program.is_implicit:
+    if pencil.program.is_implicit or pencil.weight is not None:
         return np.asarray(pencil.theta(points[(z[:, n:] == z[0, n:]).all(axis=1)]).mean(axis=1))
     z[:, n:] = z[0, n:]
     turns = np.zeros(len(pencil.shift))

@@ -7,7 +7,9 @@ of each of them, so that the ratio r_t = θ_t(q, y)/θ_t(q, y0) is the same for 
     α K(q, y0) ≤ K(q, y) ≤ β K(q, y0) ,   α = min_t r_t ,  β = max_t r_t .
 
 Parameters that change the motion of the parts too, such as lengths, stay at y0 in the ratios of
-terms that joint coordinates enter: they act like another pose. A shape φ is softened to
+terms that joint coordinates enter: they act like another pose. Of K_g, which may be negative, none
+of this is true: it is left out here, and what it does is read off the reduced model (see
+`error_estimate`). A shape φ is softened to
 Σ_t r_t e_t, e_t = θ_t φᵀK_tφ / φᵀKφ being the share of a term in its energy.
 """
 
@@ -39,6 +41,7 @@ class DesignStiffness:
     steers: Flags  # (n_loads + n_y,): parameters that change the motion, too
     at_points: Floats  # (n_points, n_terms): r_t at the expansion points
     energy: Floats  # (n_points, n_terms, c): e_t of the shapes there
+    weighs: bool = False  # True where there is K_g beside these terms
 
     def scaling(self, y: Floats, y0: Floats) -> Floats:
         """y (n, n_y) with the parameters that steer at y0."""
@@ -60,7 +63,8 @@ class DesignStiffness:
 
 def design_stiffness(pencil: Pencil, points: Floats, phi: Floats) -> DesignStiffness:
     """The terms at ``points`` (n_points, n_x), the modes ``phi`` (n_points, n_dof, c) there."""
-    terms, n = pencil.by_term[0], pencil.n_joints
+    weight, n = pencil.weight, pencil.n_joints
+    terms = pencil.by_term[0] if weight is None else weight.without.tocsc()
     stiff = np.flatnonzero(np.diff(terms.indptr))
     moving = np.append(False, pencil.program.dependence[:, :n].any(axis=1))[stiff]
     still, moving = stiff[~moving], stiff[moving]
@@ -77,7 +81,8 @@ def design_stiffness(pencil: Pencil, points: Floats, phi: Floats) -> DesignStiff
         i, j, data = entries(pencil, terms, t)
         energy.append(theta[t][:, None] * np.einsum("e,pec,pec->pc", data, phi[:, i], phi[:, j]))
     shares = np.array(energy).swapaxes(0, 1)
-    return replace(made, at_points=ratio, energy=shares / shares.sum(axis=1, keepdims=True))
+    shares = shares / shares.sum(axis=1, keepdims=True)
+    return replace(made, at_points=ratio, energy=shares, weighs=weight is not None)
 
 
 def _steering(pencil: Pencil, x0: Floats, moving: Ints) -> Flags:

@@ -13,8 +13,10 @@ f ∝ μ^{−1/2}, the relative error in frequency is √((μ̂ + ε)/μ̂) − 
 
 The residual is known in K_E(q, y0)⁻¹ (see `residual`). Where design parameters soften links to α of
 their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y) (see `design_stiffness`), and ‖ρ‖²/α is a bound.
-Where they add mass, ν grows by what that mass adds to the modes beside the basis (see
-`added_mass`), and where riders travel along beams, by what their longer spans do (see `spans`).
+Under gravity K_g softens as well: α is no more than the least eigenvalue of K̂(q, y) in K̂(q, y0),
+and where that buckles there is no answer. Where they add mass, ν grows by what that mass adds to
+the modes beside the basis (see `added_mass`), and where riders travel along beams, by what their
+longer spans do (see `spans`).
 
 The estimate is infinite, that is, the answer is refused, where a pair stands for no mode any more,
 or where a mode that the basis does not hold may lie below it.
@@ -26,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from eigassign.errors import SingularityError
 from eigassign.mechanism.elements.sparse_factor import factorise
@@ -101,7 +104,11 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     turned, closes = _with_design(reduced, x, np.broadcast_to(y0, (len(x), len(y0))))
     scaled, stays = _with_design(reduced, x, terms.stiffness.scaling(x[:, n:], y0), theta)
     ratio = terms.stiffness.ratio(theta, scaled, turned)
-    softest = np.maximum(ratio.min(axis=0, initial=1.0), LEAST)
+    softest = ratio.min(axis=0, initial=1.0)
+    if terms.stiffness.weighs:
+        softest = np.minimum(softest, _softened(K, reduced.at(turned)[0]))
+        stays &= (softest > 0.0) & terms.joints.stands(turned)
+    softest = np.maximum(softest, LEAST)
     gram = residual_gram(terms.residual, terms.joints, theta, turned, mu, wide)
     gram = gram / softest[:, None, None]
     heavy, posed = _with_design(reduced, x, terms.added.heaviest(x[:, n:], y0), theta)
@@ -113,6 +120,10 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     outside = largest_outside(terms, mu, beside / terms.added.factor(theta), travel)
     outside += terms.added.lifted(heavy, turned) / beside
     error = frequency_error(mu, gram, outside, terms.anchors)
+    if terms.stiffness.weighs:  # the basis is stiffer than K_E by as much as its modes may err
+        softer = (1.0 + np.minimum(error.max(axis=1), REFUSED)) ** 2
+        gram, outside = gram * softer[:, None, None], outside * softer
+        error = frequency_error(mu, gram, outside, terms.anchors)
     error[~(closes & posed & stays)] = np.inf
     shares = _mass_shares(terms, M_c, all_mu, all_z)
     heavier = terms.added.heavier_shapes(theta, turned)
@@ -250,6 +261,16 @@ def _mass_shares(terms: ErrorTerms, M_c: Floats, mu: Floats, z: Floats) -> Float
 
 
 # --- Designs, and round-off
+
+
+def _softened(K: Floats, before: Floats) -> Floats:
+    """The least eigenvalue (n,) of K (n, k, k) in K ``before``; 0 where that is not definite."""
+    least = np.zeros(len(K))
+    for k, (one, other) in enumerate(zip(K, before, strict=True)):
+        L, info = lapack.dpotrf(other, lower=1)
+        if not info:
+            least[k] = np.linalg.eigvalsh(lapack.dsygst(one, L, lower=1)[0])[0]
+    return least
 
 
 def _with_design(

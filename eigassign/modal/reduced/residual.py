@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import solve_triangular
+from scipy.linalg import lapack, solve_triangular
 from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
@@ -65,10 +65,20 @@ class JointCorrection:
     flexibility: Floats  # G (j, j)
     rows: ResidualTerms  # of the map E_Jᵀ K0⁻¹
 
+    def turned(self, theta: Floats) -> Floats:
+        """Δ (n, j, j)."""
+        return np.tensordot((theta[self.terms] - self.theta0[:, None]).T, self.stiffness, axes=1)
+
+    def stands(self, theta: Floats) -> NDArray[np.bool_]:
+        """Where K_E(q, y0) is definite as K0 is, (n,): where I + Cᵀ Δ C is, G = C Cᵀ."""
+        values, turns = np.linalg.eigh(self.flexibility)
+        C = turns * np.sqrt(np.maximum(values, 0.0))
+        inner = np.eye(len(C)) + C.T @ self.turned(theta) @ C
+        return np.array([not lapack.dpotrf(each, lower=1)[1] for each in inner])
+
     def subtract(self, gram: Floats, theta: Floats, g: Floats) -> Floats:
         """ρ_iᵀ K_E(q, y0)⁻¹ ρ_j (n, c, c) from ρ_iᵀ K0⁻¹ ρ_j, θ at (q, y0) and g (n, j, c)."""
-        delta = np.tensordot((theta[self.terms] - self.theta0[:, None]).T, self.stiffness, axes=1)
-        eye = np.eye(delta.shape[1])
+        delta, eye = self.turned(theta), np.eye(len(self.flexibility))
         less = np.swapaxes(g, 1, 2) @ np.linalg.solve(eye + delta @ self.flexibility, delta @ g)
         kept = gram - 0.5 * (less + np.swapaxes(less, 1, 2))
         diagonal = np.arange(gram.shape[1])
@@ -204,13 +214,14 @@ def joint_correction(
 ) -> JointCorrection:
     """Δ's terms and K0⁻¹ on the rows where K_E depends on q; none where these are too many.
 
-    ``factor`` is that of K0, ``theta0`` (n_theta,) are its θ, ``wide`` is [V 0; 0 I_F].
+    ``factor`` is that of K0, ``theta0`` (n_theta,) are its θ, ``wide`` is [V 0; 0 I_F]. K_g, which
+    turns on all rows, is left out of Δ where only that is too many.
     """
-    of_joints = np.flatnonzero(pencil.program.dependence[:, : pencil.n_joints].any(axis=1)) + 1
     columns, k = pencil.by_term[0], wide.shape[1] - len(pencil.rigid)
-    terms = np.array([t for t in of_joints if columns.indptr[t + 1] > columns.indptr[t]], np.intp)
-    entries = np.unique(columns[:, terms].tocoo().coords[0]) if len(terms) else terms
-    dofs = np.union1d(pencil.rows[entries], pencil.columns[entries]).astype(np.intp)
+    terms, dofs = _turned(pencil, columns)
+    if len(dofs) > MOST_JOINT_ROWS and pencil.weight is not None:
+        columns = pencil.weight.without.tocsc()
+        terms, dofs = _turned(pencil, columns)
     if len(dofs) > MOST_JOINT_ROWS:
         dofs, terms = dofs[:0], terms[:0]
     responses = np.zeros((pencil.n_dof, len(dofs)))  # K0⁻¹ E_J
@@ -223,18 +234,26 @@ def joint_correction(
     return JointCorrection(
         terms=terms,
         theta0=theta0[terms],
-        stiffness=_joint_blocks(pencil, terms, dofs),
+        stiffness=_joint_blocks(pencil, columns, terms, dofs),
         flexibility=responses[dofs],
         rows=ResidualTerms(k_terms, stiffness[k_terms, :, :k], m_terms, mass[m_terms]),
     )
 
 
-def _joint_blocks(pencil: Pencil, terms: Ints, dofs: Ints) -> Floats:
+def _turned(pencil: Pencil, columns: sparse.csc_array) -> tuple[Ints, Ints]:
+    """The terms of a matrix that joint coordinates enter, and the rows that these are on."""
+    of_joints = np.flatnonzero(pencil.program.dependence[:, : pencil.n_joints].any(axis=1)) + 1
+    terms = np.array([t for t in of_joints if columns.indptr[t + 1] > columns.indptr[t]], np.intp)
+    entries = np.unique(columns[:, terms].tocoo().coords[0]) if len(terms) else terms
+    return terms, np.union1d(pencil.rows[entries], pencil.columns[entries]).astype(np.intp)
+
+
+def _joint_blocks(pencil: Pencil, columns: sparse.csc_array, terms: Ints, dofs: Ints) -> Floats:
     """The stiffness terms on rows and columns ``dofs``, (n_terms, j, j)."""
     blocks = np.zeros((len(terms), len(dofs), len(dofs)))
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
     position[dofs] = np.arange(len(dofs))
     for block, term in zip(blocks, terms.tolist(), strict=True):
-        i, j, data = entries(pencil, pencil.by_term[0], term)
+        i, j, data = entries(pencil, columns, term)
         block[position[i], position[j]] = data
     return blocks
