@@ -22,7 +22,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     stacked,
     whole_size,
 )
-from eigassign.mechanism.assembly.gravity.beam_stress import end_forces, stress_terms
+from eigassign.mechanism.assembly.gravity.beam_stress import Numbers, end_forces, stress_terms
 from eigassign.mechanism.assembly.gravity.curvature import add_bilinear
 from eigassign.mechanism.assembly.gravity.imported import CROSSED, strut_terms
 from eigassign.mechanism.assembly.gravity.statics import Statics, passive_rates
@@ -52,10 +52,10 @@ from eigassign.mechanism.assembly.gravity.weight import Weight
 from eigassign.mechanism.assembly.inside_links import Alike
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
-from eigassign.mechanism.elements.beam import Shear, element_mass, element_stiffness, fields, shear
+from eigassign.mechanism.elements.beam import element_mass, element_stiffness, fields, shear
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand
-from eigassign.mechanism.elements.profiles import SHARES, STATIONS, Profile
+from eigassign.mechanism.elements.profiles import SHARES, STATIONS
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -369,7 +369,7 @@ class _Acting:
     def in_springs(self) -> Floats:
         """The wrenches (n_springs, 6, n_loads) on their first ends, in their axes."""
         k, moved = self.pose.numbers.spring_stiffness, np.asarray(self.pose.springs @ self.x)
-        return k[..., None] * moved.reshape(*k.shape, self.x.shape[1])
+        return np.asarray(k[..., None] * moved.reshape(*k.shape, self.x.shape[1]))
 
     @cached_property
     def through(self) -> tuple[Floats, Floats]:
@@ -488,12 +488,10 @@ class _Acting:
         """k_σ (n_loads, n, 12, 12) of the elements of each strand."""
         planar, found = len(self.pose.model.kept) == 3, []
         for elements, alike in self.pose.elements:
-            profile, h = alike.profile(), alike.h
+            profile, h = alike.profile(), cast(Numbers, alike.h)
             v, pull = (elements.seen(each) for each in (self.v, self.pull))
-            k, m = (
-                sum(np.multiply.outer(c, a) if np.ndim(c) else c * a for c, a in terms(profile, h))
-                for terms in (element_stiffness, element_mass)
-            )
+            ((_, k),) = element_stiffness(profile, h)  # numbers: all in one term
+            ((_, m),) = element_mass(profile, h)
             r = (k @ v - m @ pull).transpose(1, 2, 0)
             bent = shear(profile, h)
             forces = end_forces(r, _along(profile, h, bent, pull), h)
@@ -502,18 +500,18 @@ class _Acting:
         return found
 
 
-def _along(profile: Profile, h: Floats, bent: tuple[Shear, Shear], pull: Floats) -> Floats:
+def _along(profile: Numbers, h: Floats, bent: Numbers, pull: Floats) -> Floats:
     """The load per length (4, 3, n_loads, n) by degree, of pulls (n, 12, n_loads) at the ends.
 
     Between them the pull takes the shapes that mass has, cubic ones; degree 3 is the last for which
     N(ξ) is known. Five points integrate all that counts.
     """
-    phi = np.array([[np.broadcast_to(v, h.shape) for v in each] for each in bent])
+    phi = np.array([[np.zeros_like(h) + v for v in each] for each in bent])
     xi = np.tile(0.5 * (1.0 + STATIONS), (len(h), 1))
     N = fields(xi, h[:, None], phi.transpose(2, 0, 1)[:, None])[..., :3, :]
     P = np.polynomial.legendre.legvander(STATIONS, 3)
-    heavy = sum(np.outer(beam.mass, p) for beam, p in zip(profile, P.T[:3], strict=False))
-    heavy = heavy[..., None] * P * SHARES[:, None] * (np.arange(4) + 0.5)
+    mass = np.array([beam.mass for beam in profile[:3]])
+    heavy = (mass.T @ P.T[: len(mass)])[..., None] * P * SHARES[:, None] * (np.arange(4) + 0.5)
     return np.asarray((np.einsum("ngl,ngij->lnij", heavy, N) @ pull).transpose(0, 2, 3, 1))
 
 
@@ -702,7 +700,7 @@ def _sites(
 
 def _own_mass(mesh: LinkMesh) -> float:
     """Mass of a part that is known by its matrices, without its bodies."""
-    along = sum(np.asarray(t.matrix.toarray()) for t in mesh.rigid)[:, 0]
+    along = np.sum([t.matrix.toarray()[:, 0] for t in mesh.rigid], axis=0)
     return float(along @ (mesh.mass[0].matrix @ along))
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ from eigassign.mechanism.kinematics.rotations import Objects, some
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
+Numbers: TypeAlias = Any  # arrays in place of scalars, for many loads and elements
 X, Y, Z = range(3)
 
 
@@ -53,7 +55,7 @@ class ElementForces:
     weight: Objects
 
 
-def end_forces(r: Floats, load: Floats, h: Floats) -> ElementForces:
+def end_forces(r: Numbers, load: Numbers, h: Numbers) -> ElementForces:
     """The forces in n elements from what their ends receive in m loads, all in their axes.
 
     r (12, m, n), and the load per length along them (n_legendre, 3, m, n).
@@ -62,7 +64,7 @@ def end_forces(r: Floats, load: Floats, h: Floats) -> ElementForces:
     return ElementForces(axial, 0.5 * (r[9] - r[3]), np.stack([r[3:6], r[9:]]), load)
 
 
-def axial_forces(end: Scalar, load: Sequence[Scalar], h: Scalar) -> list[Scalar]:
+def axial_forces(end: Scalar, load: Sequence[Scalar] | Objects, h: Scalar) -> list[Scalar]:
     """Legendre coefficients of N(ξ), N at the end b and those of the load per length along it."""
     axial = [end, *(0.0 for _ in range(len(load) + 1))]
     for degree, p in enumerate(load):  # ∫ P_l dξ from ξ to 1
