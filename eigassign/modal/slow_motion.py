@@ -91,9 +91,9 @@ def stiffening(
     instants: int = 9,
 ) -> float:
     """The largest relative change of a frequency by the forces of a motion, ‖φᵀ K_g φ‖/2λ."""
-    worst = 0.0
-    for k in _fastest(motion, instants):
-        K = loads.in_motion(motion.q[k], y, motion.rate[k], motion.acceleration[k])
+    worst, chosen = 0.0, _fastest(motion, instants)
+    rate, push = motion.rate[chosen], motion.acceleration[chosen]
+    for k, K in zip(chosen, loads.in_motion(motion.q[chosen], y, rate, push), strict=True):
         theta = pencil.theta(np.concatenate([motion.q[k], y])[None])
         found, groups = whole_clusters(pencil, theta, wanted, CLUSTER_GAP)
         for group in groups:
@@ -125,7 +125,10 @@ def change_at(
     """Relative change Ω/ω − 1 of the ``wanted`` modes (n_modes,) for q, q̇ and q̈ (n_q,)."""
     theta = theta_in_time(pencil, q, rate, acceleration, y)
     C, K_v = terms.at(q, y, rate, acceleration)
-    velocity = C, K_v if loads is None else K_v + loads.in_motion(q, y, rate, acceleration)
+    if loads is not None:
+        (K_g,) = loads.in_motion(q[None], y, rate[None], acceleration[None])
+        K_v = K_v + K_g
+    velocity = C, K_v
     alone = _changes(pencil, theta, velocity, wanted, 0.0)
     mixing = tuple(k for k in wanted if k not in alone)
     together = _changes(pencil, theta, velocity, mixing, CLUSTER_GAP) if mixing else {}

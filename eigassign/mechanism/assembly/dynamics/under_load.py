@@ -22,7 +22,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,13 @@ from eigassign.mechanism.assembly.gravity.weight import Weight
 from eigassign.mechanism.assembly.inside_links import Alike
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
-from eigassign.mechanism.elements.beam import element_mass, element_stiffness, fields, shear
+from eigassign.mechanism.elements.beam import (
+    Shear,
+    element_mass,
+    element_stiffness,
+    fields,
+    shear,
+)
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand
 from eigassign.mechanism.elements.profiles import SHARES, STATIONS
@@ -98,6 +104,52 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class Beams:
+    """The elements of a strand, with their lengths and values."""
+
+    elements: StackedElements
+    alike: Alike
+
+    def same(self, other: Beams) -> bool:
+        """True where lengths and values are the same."""
+        one, two = self.alike, other.alike
+        return np.array_equal(one.h, two.h) and np.array_equal(one.values, two.values)
+
+    @property
+    def h(self) -> Numbers:
+        """Lengths (n,) in m."""
+        return self.alike.h
+
+    @cached_property
+    def bent(self) -> tuple[Shear, Shear]:
+        """The numbers of shear in both planes."""
+        return shear(self.alike.profile(), self.h)
+
+    @cached_property
+    def matrices(self) -> tuple[Floats, Floats]:
+        """k and m (n, 12, 12); of numbers all is in one term."""
+        profile = self.alike.profile()
+        ((_, k),), ((_, m),) = element_stiffness(profile, self.h), element_mass(profile, self.h)
+        return k, m
+
+    @cached_property
+    def carried(self) -> Floats:
+        """The load per length by degree, of pulls on the dofs, (4, n, 3, 12).
+
+        Between the ends a pull takes the shapes that mass has, cubic ones; degree 3 is the last
+        for which N(ξ) is known. Five points integrate all that counts.
+        """
+        bent: Any = self.bent
+        phi = np.array([[np.zeros_like(self.h) + v for v in each] for each in bent])
+        xi = np.tile(0.5 * (1.0 + STATIONS), (len(self.h), 1))
+        N = fields(xi, self.h[:, None], phi.transpose(2, 0, 1)[:, None])[..., :3, :]
+        P = np.polynomial.legendre.legvander(STATIONS, 3)
+        mass: Any = np.array([beam.mass for beam in self.alike.profile()[:3]])
+        heavy = (mass.T @ P.T[: len(mass)])[..., None] * P * SHARES[:, None]
+        return np.asarray(np.einsum("ngl,ngij->lnij", heavy * (np.arange(4) + 0.5), N))
+
+
+@dataclass(frozen=True, eq=False)
 class StiffnessUnderLoad:
     """K_g of a mechanism for any loads; built once, evaluated at samples."""
 
@@ -124,16 +176,34 @@ class StiffnessUnderLoad:
         """The mechanism at samples x (n, n_x)."""
         z = self.parameters.z(np.atleast_2d(x))
         rows = zip(*self.at_rest(z), strict=True)
-        return [LoadedPose(self, own, list(row)) for own, row in zip(z.T, rows, strict=True)]
+        poses: list[LoadedPose] = []
+        for own, row in zip(z.T, rows, strict=True):
+            beams = [
+                Beams(elements, Alike(np.arange(len(h)), h, profile, sheared))
+                for (elements, sheared), h, profile in zip(
+                    self.elements, row[14::2], row[15::2], strict=True
+                )
+            ]
+            if poses:  # most are the same in every pose
+                known = zip(beams, poses[0].beams, strict=True)
+                beams = [first if one.same(first) else one for one, first in known]
+            poses.append(LoadedPose(self, own, list(row), beams))
+        return poses
 
     def in_motion(
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
-    ) -> sparse.csr_array:
-        """K_g (n_dof, n_dof) of the loads −m a of the rigid motion, for q, q̇, q̈ of one instant.
+    ) -> list[sparse.csr_array]:
+        """K_g (n_dof, n_dof) of the loads −m a of the rigid motion, for q, q̇, q̈ (n, n_q).
 
         With the twists t of the links a = N ṫ + ω̃ N t, ṫ by central differences.
         """
-        (here,) = self.at(np.concatenate([q, y])[None])
+        poses = self.at(np.hstack([q, np.tile(y, (len(q), 1))]))
+        each = zip(poses, q, rate, acceleration, strict=True)
+        return [self._moving(pose, own, v, a, y) for pose, own, v, a in each]
+
+    def _moving(
+        self, here: LoadedPose, q: Floats, rate: Floats, acceleration: Floats, y: Floats
+    ) -> sparse.csr_array:
         h = STEP * self.stack.time_scale(here.stack, rate, acceleration)
         ends = self.at(
             np.array([np.append(q + t * (rate + 0.5 * t * acceleration), y) for t in (-h, h)])
@@ -184,6 +254,7 @@ class LoadedPose:
     model: StiffnessUnderLoad
     z: Floats
     values: Sequence[Floats]
+    beams: Sequence[Beams]
 
     # --- numbers of the pose
 
@@ -239,15 +310,6 @@ class LoadedPose:
         weighted = sparse.diags_array(self.numbers.spring_stiffness.ravel()) @ S
         whole = Q.T @ (sparse.csr_array(self.stiffness) @ Q) + S.T @ weighted
         return sparse.csc_array(sparse.csc_array(whole)[:n])
-
-    @cached_property
-    def elements(self) -> list[tuple[StackedElements, Alike]]:
-        """Those of each strand with their values."""
-        found = []
-        pairs = zip(self.values[14::2], self.values[15::2], strict=True)
-        for (elements, sheared), (h, profile) in zip(self.model.elements, pairs, strict=True):
-            found.append((elements, Alike(np.arange(len(h)), h, profile, sheared)))
-        return found
 
     def frame(self, link: int) -> tuple[Floats, Floats]:
         """Rotation and origin of a link in the world, −1 the ground's."""
@@ -487,32 +549,14 @@ class _Acting:
     def elements(self) -> list[tuple[StackedElements, Floats]]:
         """k_σ (n_loads, n, 12, 12) of the elements of each strand."""
         planar, found = len(self.pose.model.kept) == 3, []
-        for elements, alike in self.pose.elements:
-            profile, h = alike.profile(), cast(Numbers, alike.h)
-            v, pull = (elements.seen(each) for each in (self.v, self.pull))
-            ((_, k),) = element_stiffness(profile, h)  # numbers: all in one term
-            ((_, m),) = element_mass(profile, h)
+        for one in self.pose.beams:
+            v, pull = (one.elements.seen(each) for each in (self.v, self.pull))
+            k, m = one.matrices
             r = (k @ v - m @ pull).transpose(1, 2, 0)
-            bent = shear(profile, h)
-            forces = end_forces(r, _along(profile, h, bent, pull), h)
-            c, matrices = zip(*stress_terms(forces, h, bent, planar), strict=True)
-            found.append((elements, np.tensordot(np.array(c), np.array(matrices), (0, 0))))
+            forces = end_forces(r, (one.carried @ pull).transpose(0, 2, 3, 1), one.h)
+            c, matrices = zip(*stress_terms(forces, one.h, one.bent, planar), strict=True)
+            found.append((one.elements, np.tensordot(np.array(c), np.array(matrices), (0, 0))))
         return found
-
-
-def _along(profile: Numbers, h: Floats, bent: Numbers, pull: Floats) -> Floats:
-    """The load per length (4, 3, n_loads, n) by degree, of pulls (n, 12, n_loads) at the ends.
-
-    Between them the pull takes the shapes that mass has, cubic ones; degree 3 is the last for which
-    N(ξ) is known. Five points integrate all that counts.
-    """
-    phi = np.array([[np.zeros_like(h) + v for v in each] for each in bent])
-    xi = np.tile(0.5 * (1.0 + STATIONS), (len(h), 1))
-    N = fields(xi, h[:, None], phi.transpose(2, 0, 1)[:, None])[..., :3, :]
-    P = np.polynomial.legendre.legvander(STATIONS, 3)
-    mass = np.array([beam.mass for beam in profile[:3]])
-    heavy = (mass.T @ P.T[: len(mass)])[..., None] * P * SHARES[:, None] * (np.arange(4) + 0.5)
-    return np.asarray((np.einsum("ngl,ngij->lnij", heavy, N) @ pull).transpose(0, 2, 3, 1))
 
 
 def _dense(A: Matrix) -> Floats:
