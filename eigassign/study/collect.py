@@ -21,6 +21,7 @@ from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, s
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
+    WEIGHED,
     AssignmentRow,
     DrawnPoses,
     DriveLoad,
@@ -137,7 +138,7 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     curves = [np.where(np.abs(curve) > small, curve, 0.0) for curve in curves]
     weights = time_weights(path)
     weights = weights / weights.sum()
-    of = "weight and motion" if isinstance(g, tuple) else "the motion alone, gravity being none"
+    of = WEIGHED if isinstance(g, tuple) else "the motion alone, gravity being none"
     if g is None:
         of = "the motion alone, mechanism.gravity not being given"
     if not isinstance(g, tuple) and not any(curve.any() for curve in curves):

@@ -34,6 +34,7 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=".6g")]
+WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
 
@@ -203,6 +204,11 @@ class DriveRow(Brief):
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
         """The unit that people read it in, and the size of that in SI."""
         return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
+
+    @property
+    def is_asked(self) -> bool:
+        """True where the case says something of it: gravity, or its limit."""
+        return self.of == WEIGHED or self.limit is not None
 
     @property
     def quantity(self) -> str:

@@ -68,6 +68,9 @@ def test_without_weight_the_motion_is_told_alone_and_without_both_nothing() -> N
     assert {row.of for row in result.results.drives} == {
         "the motion alone, mechanism.gravity not being given"
     }
+    assert "drives" not in [plan.name for plan in run_figures(result.results)]
+    limited, _ = solved(DESIGN + "  torque: {q1: {max: 50 N m}}\n", head=head)
+    assert "drives" in [plan.name for plan in run_figures(limited.results)]
     still = head[: head.index("trajectory:")] + "trajectory: {q: [[1, 5], [1, 5]], duration: 1 s}\n"
     result, _ = solved(head=still)
     assert result.results.drives == ()

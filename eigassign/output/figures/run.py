@@ -28,7 +28,8 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     for one in each:
         if one.others is not None and one.others.initial_hz.size:
             yield curves.other_modes(one, one.others)
-    yield from (curves.drives(one) for one in each if one.drives)
+    asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
+    yield from (curves.drives(one) for one in each if asked)
     yield from meaning_figures(results)
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)
