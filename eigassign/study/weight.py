@@ -112,7 +112,7 @@ def _worst(row: WeightRow, modes: Collection[int]) -> tuple[str, float]:
     change, mode = max(own, key=itemgetter(0), default=(0.0, 0))
     most = f"{100 * change:.2g} %"
     if row.gravity is None:
-        how = f"which may change mode {mode} by up to {most}"
+        how = f"which may change mode {mode} by up to about {most}"
         how = how if np.isfinite(change) else f"under which mode {mode} may buckle or fall"
         return f"the case does not state gravity, {how}", change
     how = f"by about {most}" if np.isfinite(change) else "by more than can be told"
@@ -137,7 +137,9 @@ def _of_modes(row: WeightRow) -> Iterator[str]:
             told = told if known else "more than can be told"
             yield f"mode {mode}: the links' sag, which is left out, changes it by {told}"
         elif known:
-            told = f"{'less than' if change < SAID else 'up to'} {most}, whichever way is down"
+            told = (
+                f"{'less than' if change < SAID else 'up to about'} {most}, whichever way is down"
+            )
             yield f"mode {mode}: gravity, which is not stated, changes it by {told}"
         else:
             yield f"mode {mode}: under gravity, which is not stated, it may buckle or fall"
