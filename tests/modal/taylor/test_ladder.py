@@ -134,8 +134,6 @@ def test_the_estimates_cover_the_error_along_the_trajectory_and_over_the_design_
     name: str,
 ) -> None:
     s = scene(name)
-    if s.case.file.mechanism.gravity is not None:
-        pytest.skip("bounds of designs under weight are being made")
     rng = np.random.default_rng(1)
     q = s.case.trajectory.q
     low, high = (s.x0 + 2.0 * sign * s.span for sign in (-1.0, 1.0))
