@@ -19,15 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
-from scipy.linalg import eigvalsh
-from scipy.sparse import linalg
 
 from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes
-from eigassign.mechanism.assembly.pencil import DENSE_LIMIT
-from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
+from eigassign.modal.exact.standing import buckling_share
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
@@ -99,24 +95,11 @@ def sag_of_nodes(
     return tuple(".".join(node) for node in named), np.array(moved)
 
 
-def buckling(model: Model, q: ArrayLike, y: ArrayLike, g: ArrayLike) -> Floats:
-    """The weight over that at which the mechanism buckles, P/P_cr (n_samples,), 0 where it cannot.
+def buckling(model: Model, q: ArrayLike, y: ArrayLike) -> Floats:
+    """The stated weight over that at which the mechanism buckles, P/P_cr (n_samples,).
 
-    With all coordinates held: 1/κ of the least κ > 0 at which K + κ K_g has no stiffness left.
+    1/κ of the least κ > 0 at which K_0 + κ K_g has no stiffness left, drives with their stiffness;
+    0 where there is none, as without gravity. Coordinates that hang swing as they hang.
     """
-    weight = np.asarray(g, dtype=np.float64)[:, None]
-    return np.array([_share(pose, weight) for pose in model.under_load.at(model.x(q, y))])
-
-
-def _share(pose: LoadedPose, g: Floats) -> float:
-    """The largest μ of −K_g x = μ K x, coordinates held."""
-    n = pose.model.n_u
-    pull = pose.weight() @ g
-    (K_g,) = pose.stressed(pull, pose.displaced(pull)).matrices()
-    A, K = sparse.csc_array(-K_g)[:n, :n], pose.held_stiffness[:, :n]
-    if n <= DENSE_LIMIT:
-        return max(float(eigvalsh(A.toarray(), K.toarray())[-1]), 0.0) if n else 0.0
-    inverse = linalg.LinearOperator((n, n), matvec=factorise(K).solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(n)
-    found = linalg.eigsh(A, 1, M=K, Minv=inverse, which="LA", v0=start, tol=1e-6)
-    return max(float(found[0][0]), 0.0)
+    theta = model.pencil.theta(model.x(q, y))
+    return np.array([buckling_share(model.pencil, each) for each in theta.T])

@@ -83,7 +83,7 @@ def _row(
     far = moved[worst, np.arange(len(names)), : len(g)]
     rows = [SagRow(name, along) for name, along in zip(names, far, strict=True)]
     rows.sort(key=lambda one: -one.most)
-    return replace(row, sag=tuple(rows), buckling=float(buckling(model, q, y, g).max()))
+    return replace(row, sag=tuple(rows), buckling=float(buckling(model, q, y).max()))
 
 
 def weight_doubt(

@@ -47,12 +47,22 @@ def test_a_boom_loses_as_much_as_it_loses_with_stated_gravity() -> None:
 
 def test_buckling_is_eulers() -> None:
     EI = 2.1e11 * np.pi / 64 * (0.6**4 - 0.576**4)
-    tree = boom(40.0, 8000.0)
+    tree = boom(40.0, 8000.0, gravity=[0.0, -9.81])
     tree["mechanism"]["materials"]["steel"]["density"] = 1e-3
     model = ea.load_case(tree).model()
-    share = buckling(model, [np.pi / 2], [], [0.0, -9.81])[0]
-    assert share == pytest.approx(8000.0 * 9.81 / (np.pi**2 * EI / (4 * 40.0**2)), rel=1e-4)
-    assert buckling(model, [-np.pi / 2], [], [0.0, -9.81])[0] == pytest.approx(0.0, abs=1e-9)
+    share = buckling(model, [[np.pi / 2], [-np.pi / 2]], [])
+    euler = 8000.0 * 9.81 / (np.pi**2 * EI / (4 * 40.0**2))
+    np.testing.assert_allclose(share, [euler, 0.0], rtol=1e-4, atol=1e-9)
+
+
+def test_a_drive_that_gives_way_buckles_too() -> None:
+    tree = boom(2.0, 50.0, gravity=[0.0, -9.81])
+    tree["mechanism"]["links"]["boom"] = {"type": "rigid", "length": 2.0, "mass": 0.0}
+    tree["coordinates"]["luff"]["drive"] = {"stiffness": 4000.0}
+    model = ea.load_case(tree).model()
+    share = buckling(model, [[np.pi / 2], [0.0], [-np.pi / 2]], [])
+    most = 50.0 * 9.81 * 2.0 / 4000.0
+    np.testing.assert_allclose(share, [most, 0.0, 0.0], rtol=1e-12, atol=1e-15)
 
 
 def test_the_sag_of_a_cantilever() -> None:

@@ -94,33 +94,43 @@ def _is_definite(pencil: Pencil, theta: Floats) -> bool:
 
 def _buckled(pencil: Pencil, theta: Floats, where: str) -> str:
     """What a design and pose says whose K is not definite though nothing falls."""
+    share = buckling_share(pencil, theta)
+    if not share > 1.0:
+        return LIMP
+    return (
+        f"buckles under its weight {where}: {1.0 / share:.3g} times the weight is enough; make "
+        "what carries it stiffer or the load lighter, or write `gravity: none`"
+    )
+
+
+def buckling_share(pencil: Pencil, theta: Floats) -> float:
+    """μ = 1/κ at θ (n_theta,): the weight over that which buckles; 0 where none does.
+
+    NaN where K_0,HH is not positive definite.
+    """
     weight = pencil.weight
-    assert weight is not None
+    if weight is None:
+        return 0.0
     S = weight.joints[weight.swinging]
     H = np.setdiff1d(pencil.elastic, S)
     data = weight.stiffness @ theta
-    K_0 = principal(pencil, weight.without @ theta, H)
+    K_0 = principal(pencil, pencil.stiffness @ theta - data, H)
     K_g = principal(pencil, data, np.union1d(H, S)).tocsr()
     inner, outer = (np.isin(np.union1d(H, S), each) for each in (H, S))
     G, across = K_g[inner][:, inner], K_g[inner][:, outer].toarray()
     drawn = np.linalg.solve(K_g[outer][:, outer].toarray(), across.T)
     if len(H) <= pencil.dense_limit:
         try:
-            mu = eigh(across @ drawn - G.toarray(), K_0.toarray(), eigvals_only=True)[-1]
+            mu = eigh(across @ drawn - G.toarray(), K_0.toarray(), eigvals_only=True)
         except np.linalg.LinAlgError:
-            return LIMP
-    else:
-        factor = definite_factor(K_0)
-        if factor is None:
-            return LIMP
-        n = len(H)
-        operator = linalg.LinearOperator((n, n), matvec=lambda v: across @ (drawn @ v) - G @ v)
-        inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
-        start = np.random.default_rng(0).standard_normal(n)
-        mu = linalg.eigsh(operator, 1, M=K_0, Minv=inverse, which="LA", v0=start)[0][0]
-    if mu <= 1.0:
-        return LIMP
-    return (
-        f"buckles under its weight {where}: {1.0 / mu:.3g} times the weight is enough; make what "
-        "carries it stiffer or the load lighter, or write `gravity: none`"
-    )
+            return np.nan
+        return max(float(mu[-1]), 0.0) if len(mu) else 0.0
+    factor = definite_factor(K_0)
+    if factor is None:
+        return np.nan
+    n = len(H)
+    operator = linalg.LinearOperator((n, n), matvec=lambda v: across @ (drawn @ v) - G @ v)
+    inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
+    start = np.random.default_rng(0).standard_normal(n)
+    mu = linalg.eigsh(operator, 1, M=K_0, Minv=inverse, which="LA", v0=start)[0]
+    return max(float(mu[0]), 0.0)
