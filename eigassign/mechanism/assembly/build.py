@@ -92,7 +92,8 @@ def build_pencil(
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
     pencil = _compile(K, M, K_g, case, parameters, motion, nodes.count)
-    return pencil if K_g is None else replace(pencil, weight=replace(pencil.weight, inside=inside))
+    own = pencil.weight
+    return pencil if own is None else replace(pencil, weight=replace(own, inside=inside))
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:

@@ -76,9 +76,10 @@ def require_hanging(
 
 def _pose(pencil: Pencil, x: Floats | None, k: int, label: Label) -> str:
     """Where a sample is, in words."""
-    names = () if x is None or pencil.weight is None else pencil.weight.coordinates
-    pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, x[k] if names else (), strict=False))
-    return (f"in the pose {pose} " if pose else "") + f"({label(k)})"
+    if x is None or pencil.weight is None:
+        return f"({label(k)})"
+    named = zip(pencil.weight.coordinates, x[k], strict=False)
+    return f"in the pose {', '.join(f'{n} = {v:.6g}' for n, v in named)} ({label(k)})"
 
 
 def _is_definite(pencil: Pencil, theta: Floats) -> bool:
