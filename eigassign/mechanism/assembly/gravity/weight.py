@@ -165,6 +165,9 @@ class Weight:
         if self.case.mechanism.joints[edge.joint].type in RIDING and rows[0]:
             work = self._strained(written.base, wrench)
             self.K.add_product(-1.0, list(work.items()), list(rows[0].items()))
+            passive = own[0] >= len(self.parameters.coordinates)
+            if passive:  # not held by a drive: no mesh bounds the curvature at a point
+                self.inside.append([1e6] * 2 + [1.0] * 9 + [0.0] * 5)
 
     def _strained(self, node: NodeName, wrench: Objects) -> MotionRow:
         """F · (u' − θ × e_x) + M · θ' at a node within a beam, the mean of both its sides."""
