@@ -462,13 +462,16 @@ class Weighed:
     pull: Array  # of the weight on the motions, which the drives hold
     weight: float  # the most that it pulls at any
 
-    def spectrum(self, count: int, share: float = 1.0) -> Array:
+    def spectrum(self, count: int, share: float = 1.0, rigid: bool = True) -> Array:
         """The lowest λ of K + share K_g; negative ones are poses that fall.
 
         Motions R on which neither K nor the weight works may be coupled to others by K_g. What that
         does in second order of gravity is left out, for sag would be of the same: to first order
-        other modes feel Pᵀ K_g P with P = I − R (RᵀMR)⁻¹ RᵀM.
+        other modes feel Pᵀ K_g P with P = I − R (RᵀMR)⁻¹ RᵀM. Where no motion is ``rigid`` in every
+        pose, this is left out.
         """
+        if not rigid:
+            return lowest(self.K + share * self.K_g, self.M, count)
         least = 1e-6 * (np.trace(self.K) or 1.0) / np.trace(self.M)
         size = np.sqrt(np.diag(self.K) + least * np.diag(self.M))
         R = null_space(self.K / np.outer(size, size)) / size[:, None]
