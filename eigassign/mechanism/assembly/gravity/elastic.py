@@ -19,7 +19,7 @@ from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.node_motion import MotionRow, NodeMotions
 from eigassign.mechanism.assembly.springs import SpringMotion, resists
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply
-from eigassign.mechanism.kinematics.topology import NodeName
+from eigassign.mechanism.kinematics.topology import GROUND, NodeName
 from eigassign.series.expression import Expression, Recorder, Scalar
 
 
@@ -31,6 +31,10 @@ class Sagging:
     nodes: NodeMotions
     loads: Mapping[str, Objects]  # m N (g, 0) of each link, (n_local,)
     u: Sequence[Scalar]
+
+    def __contains__(self, node: NodeName) -> bool:
+        """True of nodes that deform."""
+        return node != GROUND and "@origin" not in self.nodes.meshes[node[0]].nodes
 
     def moved(self, row: MotionRow) -> Scalar:
         """Σ c_k u_k; rates of coordinates do not count: they are held."""

@@ -21,7 +21,7 @@ import numpy as np
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
-from eigassign.mechanism.assembly.gravity.elastic import sagging
+from eigassign.mechanism.assembly.gravity.elastic import Sagging, sagging
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
@@ -72,7 +72,8 @@ def statics(
     for name, link in links.items():
         pull = np.concatenate([g[name], np.zeros(3, dtype=object)])[kept]
         own[name][kept] = multiply(inertia(link), pull)
-    found = _Wrenches(case, known, motion, own, {name: [] for name in own})
+    hanging = tuple(p.edge for p in reversed(motion.placements))
+    found = _Wrenches(case, known, motion, own, dict(own), {name: [] for name in own}, hanging)
     springs: list[tuple[SpringMotion, Objects]] = []
     loops = motion.tree.loops
     if coarse is not None:
@@ -82,13 +83,12 @@ def statics(
         springs = [(spring, sag.stretched(spring)) for spring in ends]
         for spring, force in springs:
             found.stretch(spring, force)
-        for edge in closed_last(loops[: motion.tree.n_elastic]):
-            found.close(edge, sag.on_node(edge.follower) - found.acting_on(edge.follower))
+        found.close_elastic(sag, loops[: motion.tree.n_elastic], loops[motion.tree.n_elastic :])
         loops = loops[motion.tree.n_elastic :]
     for edge, wrench in _closing(known, motion, loops, found):
         found.close(edge, wrench)
-    for placement in reversed(motion.placements):
-        found.hang(placement.edge)
+    for edge in found.hanging:
+        found.hang(edge)
     return Statics(g, found.on_nodes, found.through, springs)
 
 
@@ -99,14 +99,57 @@ class _Wrenches:
     case: CaseFile
     parameters: ModelParameters
     motion: Kinematics
-    total: dict[str, Objects]  # of each link and all that hangs on it, about its origin
+    own: dict[str, Objects]  # of each link, its springs and closing joints, about its origin
+    total: dict[str, Objects]  # of all that hangs on it as well
     on_nodes: dict[str, list[tuple[str, Objects]]]
+    hanging: tuple[JointEdge, ...]  # what is to be hung yet, the tips first
     through: dict[str, Objects] = field(default_factory=dict)
 
     def acting_on(self, node: NodeName) -> Objects:
         """The sum of what acts on a node so far."""
         found = [wrench for name, wrench in self.on_nodes[node[0]] if name == node[1]]
         return np.asarray(sum(found, np.zeros(6, dtype=object)))
+
+    def close_elastic(
+        self, sag: Sagging, loops: Sequence[JointEdge], later: Sequence[JointEdge]
+    ) -> None:
+        """Close ``loops`` one by one where one of the two nodes receives nothing unknown else.
+
+        What has no loop to wait for, those that close ``later`` among them, is hung meanwhile.
+        Raises MechanismError where no node tells.
+        """
+        waiting = list(loops)
+        while waiting:
+            known = [e for e in self.hanging if self._is_complete(e.follower[0], *waiting, *later)]
+            for edge in known:
+                self.hang(edge)
+            ends = [(e, n) for e in waiting for n in (e.follower, e.base) if n in sag]
+            others = [*self.hanging, *waiting, *later]
+            free = [(e, n) for e, n in ends if not _touched(n, [o for o in others if o is not e])]
+            if free:
+                edge, node = free[0]
+                wrench = sag.on_node(node) - self.acting_on(node)
+                self.close(edge, wrench if node == edge.follower else self._back(edge, wrench))
+                waiting.remove(edge)
+            elif not known:
+                raise MechanismError(
+                    f"mechanism.joints.{waiting[0].joint}",
+                    "closes a loop at nodes where other loops close as well: the forces between "
+                    "them under the weight are not known. Give the links nodes of their own there, "
+                    "or write gravity: none",
+                )
+
+    def _is_complete(self, link: str, *waiting: JointEdge) -> bool:
+        """True where nothing that is to come acts on a link but the joint that it hangs on."""
+        hung = any(edge.base[0] == link for edge in self.hanging)
+        return not hung and all(link not in (e.base[0], e.follower[0]) for e in waiting)
+
+    def _back(self, edge: JointEdge, wrench: Objects) -> Objects:
+        """The wrench on the follower of a closing joint from that on its base node."""
+        loop = next(one for one in self.motion.loops if one.edge == edge)
+        F, M = wrench[:3], wrench[3:] - cross(loop.lever, wrench[:3])
+        turned = [multiply(loop.rotation.T, each) for each in (F, M)]
+        return np.concatenate(turned) * -1.0
 
     def stretch(self, spring: SpringMotion, force: Objects) -> None:
         """A spring's force on the second of its nodes, and its opposite on the first."""
@@ -131,7 +174,12 @@ class _Wrenches:
         self.on_nodes[placement.link].append((edge.follower[1], at_root * -1.0))
         on_base = handed(at_root, placement.rotation, placement.lever)
         self.through[edge.joint] = on_base
-        self._act(edge.base, on_base)
+        self.hanging = tuple(each for each in self.hanging if each is not edge)
+        if edge.base != GROUND:
+            self.on_nodes[edge.base[0]].append((edge.base[1], on_base))
+            self.total[edge.base[0]] = self.total[edge.base[0]] + self._at_origin(
+                edge.base, on_base
+            )
 
     def _act_in_world(self, node: NodeName, wrench: Objects) -> None:
         if node != GROUND:
@@ -141,9 +189,13 @@ class _Wrenches:
     def _act(self, node: NodeName, wrench: Objects) -> None:
         if node == GROUND:
             return
-        place = node_position(self.case, self.parameters, self.motion.tree, node)
         self.on_nodes[node[0]].append((node[1], wrench))
-        self.total[node[0]] = self.total[node[0]] + _about(wrench, place * -1.0)
+        for of_link in (self.own, self.total):
+            of_link[node[0]] = of_link[node[0]] + self._at_origin(node, wrench)
+
+    def _at_origin(self, node: NodeName, wrench: Objects) -> Objects:
+        place = node_position(self.case, self.parameters, self.motion.tree, node)
+        return _about(wrench, place * -1.0)
 
 
 def handed(wrench: Objects, rotation: Objects, lever: Objects) -> Objects:
@@ -157,14 +209,9 @@ def _about(wrench: Objects, point: Objects) -> Objects:
     return np.concatenate([wrench[:3], wrench[3:] - cross(point, wrench[:3])])
 
 
-def closed_last(loops: Sequence[JointEdge]) -> list[JointEdge]:
-    """The loops in an order in which those that close on the follower of another come before it."""
-    order, waiting = [], list(loops)
-    while waiting:
-        bases = [edge.base for edge in waiting]
-        order.append(next((e for e in waiting if e.follower not in bases), waiting[0]))
-        waiting.remove(order[-1])
-    return order
+def _touched(node: NodeName, edges: Sequence[JointEdge]) -> bool:
+    """True where one of the joints is at a node."""
+    return any(node in (edge.base, edge.follower) for edge in edges)
 
 
 def passive_rates(case: CaseFile, known: ModelParameters, motion: Kinematics) -> Kinematics:
@@ -188,7 +235,7 @@ def _closing(
     J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
     right = np.zeros((J.shape[1], 1), dtype=object)  # G
     for p in moved.placements:
-        right[:, 0] = right[:, 0] + multiply(p.twist.T, found.total[p.link])
+        right[:, 0] = right[:, 0] + multiply(p.twist.T, found.own[p.link])
     rows, columns = J.shape
     if rows < columns:
         raise MechanismError(
