@@ -23,6 +23,7 @@ from eigassign.errors import (
     AccuracyError,
     CaseError,
     EigassignError,
+    MechanismError,
     TrajectoryError,
     UsageError,
 )
@@ -76,7 +77,7 @@ def plan_expansion(
     the memory would not suffice; UsageError for such an ``order``.
     """
     q0, q_note = _q0(file, model, trajectory)
-    y0, y_note = _y0(file, model)
+    y0, y_note = _y0(file, model, q0)
     chosen, modes_note = _modes(file, modes)
     _check_modes(file, model, chosen)
     notes = [q_note, y_note, modes_note, *_outside(file, q0, y0, model, trajectory)]
@@ -146,7 +147,7 @@ def central_sample(points: ArrayLike) -> int:
     return int(np.argmin(farthest))
 
 
-def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
+def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
     n_y, given = len(model.y_names), file.expansion.y
     if n_y == 0 and given in ("auto", ()):
         return np.zeros(0), ""
@@ -156,6 +157,13 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
             raise _wrong(file, "expansion.y", f"{len(y0)} values for {n_y} design parameters")
         return y0, f"{_design(file, model, y0)}, from the case file"
     y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
+    if model.pencil.weight is not None:
+        try:
+            model.require_standing(q0, y0)
+        except MechanismError as error:
+            why = f"the initial one, for the middle of the bounds {error.message}"
+            y0 = initial_design(file)
+            return y0, f"{_design(file, model, y0)}, {why}"
     return y0, f"{_design(file, model, y0)}, the middle of the bounds"
 
 
