@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 LIMP = (
     "the stiffness matrix is not positive definite: a link or drive is limp, or at this pose the "
-    "springs resist fewer motions than elsewhere"
+    "springs resist fewer motions than elsewhere, or its weight buckles it"
 )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import TrajectoryError, UsageError
+from eigassign.errors import MechanismError, UsageError
 from eigassign.modal.adaptive.reduced_model import reduce_adaptively
 from eigassign.output.exchange.files import ENDINGS
 from eigassign.output.exchange.reduced_file import save_reduced
@@ -64,9 +64,12 @@ def _samples(case: BuiltCase) -> Floats:
     parts = [case.model().x(path.q, initial)]
     for y in designs:
         try:
-            parts.append(case.model().x(path.at(y)[0][chosen], y))
-        except TrajectoryError:  # lengths with which the tip cannot follow its path
+            q = path.at(y)[0][chosen]
+            if case.model().pencil.weight is not None:
+                case.model().require_standing(q, y)
+        except MechanismError:  # the tip cannot follow its path, or the mechanism falls or buckles
             continue
+        parts.append(case.model().x(q, y))
     return np.concatenate(parts)
 
 

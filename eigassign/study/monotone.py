@@ -4,7 +4,9 @@ K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs an
 and inertias m of bodies and drives, A_i and B_j positive semidefinite at every pose. By the
 min-max principle every λ grows with each k and falls with each m, so that over a box of them the
 least and largest frequency are those of two corners: two exact solves a pose. With gravity masses
-are weights, too, and springs share the load: of neither anything is known then.
+are weights, too, and springs share the load: of neither anything is known then. Nor of inertias
+where a coordinate is free: elastic modes move it along the more the less inertia it has, and what
+the weight does along that way is in K (see `apart_from_rigid`).
 """
 
 from __future__ import annotations
@@ -20,13 +22,16 @@ Floats = NDArray[np.float64]
 def effects(file: CaseFile) -> Floats:
     """+1 for each parameter (n_y,) that raises every frequency, −1 that lowers it, 0 unknown."""
     weighs = isinstance(file.mechanism.gravity, tuple)
+    loose = weighs and any(c.moves == "free" for c in file.coordinates.values())
     columns = file.design.parameters.values()
-    return np.array([_effect(column.parameter, weighs) for column in columns])
+    return np.array([_effect(column.parameter, weighs, loose) for column in columns])
 
 
-def _effect(path: str, weighs: bool) -> float:
+def _effect(path: str, weighs: bool, loose: bool) -> float:
     group, _, *rest = path.split(".")
     if weighs and (group == "springs" or rest == ["mass"]):  # loads and their shares change, too
+        return 0.0
+    if loose and rest[-1] == "inertia":
         return 0.0
     match group, ".".join(rest):
         case ("bodies", "mass" | "inertia") | ("coordinates", "drive.inertia"):

@@ -61,7 +61,8 @@ class ExpansionKeys(Part):
         accuracy: relative error in Hz that `order`, `elements` and `reduce_to` meet where they are
             `auto`
         q: the point; `auto` takes the most central sample of the trajectory
-        y: the point; `auto` takes the middle of the bounds
+        y: the point; `auto` takes the middle of the bounds, or the initial design where the
+            mechanism falls or buckles there
         modes: to expand beside those of the targets
     """
 

@@ -304,7 +304,7 @@ def _compile(
         n_loads=len(parameters.loads),
         limits=property_limits(case),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
-        weight=_weight((rows, columns), weights, case, motion, n_u),
+        weight=_weight((rows, columns), weights, case, parameters, motion, n_u),
     )
 
 
@@ -312,6 +312,7 @@ def _weight(
     places: tuple[Ints, Ints],
     weights: Sequence[sparse.csr_array],
     case: CaseFile,
+    parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
 ) -> Weight | None:
@@ -334,6 +335,6 @@ def _weight(
         among_joints=sparse.csr_array(spread @ K_g[entries]),
         swinging=np.flatnonzero(~np.isin(joints, held)),
         names=tuple(names[motion.columns[k]] for k in columns),
-        coordinates=names,
+        variables=(*parameters.coordinates, *parameters.loads, *parameters.design),
         gravity=float(np.linalg.norm(g)),
     )

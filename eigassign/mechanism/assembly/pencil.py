@@ -62,7 +62,7 @@ class Weight:
     among_joints: sparse.csr_array  # their own K_g, (n_joints², n_theta)
     swinging: Ints  # places in ``joints`` of those that nothing but the weight holds
     names: tuple[str, ...]  # of ``joints``
-    coordinates: tuple[str, ...]  # of all, which the samples begin with
+    variables: tuple[str, ...]  # the names of x
     gravity: float  # |g| in m/s²
     inside: CompiledArrays | None = None  # of z: `add_weight` of beam elements, (n, 16)
 

@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 Label = Callable[[int], str]
 # Of the largest K_g of a coordinate, and of g M_ii per metre: less is round-off, a thousand times
 ZERO = 1e-12
+SHOWN = 8  # values of a pose or design that a message names
 FALLS = "give it a drive stiffness, lock it, or write `gravity: none`"
 
 
@@ -78,8 +79,10 @@ def _pose(pencil: Pencil, x: Floats | None, k: int, label: Label) -> str:
     """Where a sample is, in words."""
     if x is None or pencil.weight is None:
         return f"({label(k)})"
-    named = zip(pencil.weight.coordinates, x[k], strict=False)
-    return f"in the pose {', '.join(f'{n} = {v:.6g}' for n, v in named)} ({label(k)})"
+    n, named = pencil.n_joints, zip(pencil.weight.variables, x[k], strict=True)
+    each = [f"{name} = {value:.6g}" for name, value in named]
+    pose, more = (", ".join(own[:SHOWN]) for own in (each[:n], each[n:]))
+    return f"in the pose {pose}{f' with {more}' if more else ''} ({label(k)})"
 
 
 def _is_definite(pencil: Pencil, theta: Floats) -> bool:
