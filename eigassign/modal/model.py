@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import cut, named
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
+from eigassign.mechanism.assembly.build import build_pencil, refined, with_reduction
 from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
@@ -29,7 +31,7 @@ from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing
 from eigassign.modal.exact.tracking import Tracked, track
 from eigassign.modal.slopes import exact_slopes
-from eigassign.modal.truncation import truncation_error
+from eigassign.modal.truncation import compared_error, truncation_error
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +84,32 @@ class Model:
     def n_dof(self) -> int:
         """Order of K and M of eq. (1)."""
         return self.pencil.n_dof
+
+    @cached_property
+    def whole(self) -> Pencil:
+        """K and M with no link reduced."""
+        return self.pencil if self.reduced is None else self._rebuilt(self._unreduced)
+
+    @cached_property
+    def refinements(self) -> tuple[Pencil, ...]:
+        """Under gravity K and M of `whole` links on meshes of 1 and 2 times the elements.
+
+        And of 4 where a carriage takes the curvature at a point, which converges slowly.
+        """
+        if self.pencil.weight is None:
+            return ()
+        factors = (2.0,) if self.pencil.rails is None else (2.0, 4.0)
+        finer = [self._rebuilt(refined(self._unreduced, factor)[0]) for factor in factors]
+        return (self.whole, *finer)
+
+    @property
+    def _unreduced(self) -> CaseFile:
+        links = self.poses.case.mechanism.links
+        names = [name for name, link in links.items() if getattr(link, "reduce_to", None)]
+        return with_reduction(self.poses.case, dict.fromkeys(names))
+
+    def _rebuilt(self, case: CaseFile) -> Pencil:
+        return build_pencil(case, self.poses.parameters, self.motion)
 
     @cached_property
     def under_load(self) -> StiffnessUnderLoad:
@@ -159,24 +187,28 @@ class Model:
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).
 
-        Zero without reduced links; infinite where nothing can be vouched for.
+        Zero without reduced links; infinite where nothing can be vouched for. Under gravity
+        the links are solved whole.
         """
         x = self.x(q, y)
         if self.reduced is None:
             return np.zeros((len(x), len(modes)))
-        return truncation_error(self.reduced, x, modes)
+        if self.pencil.weight is None:
+            return truncation_error(self.reduced, x, modes)
+        return compared_error(self.pencil, self.whole, x, modes)
 
     def discretisation_error(
         self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)
     ) -> Floats:
         """By how much the mesh raises frequencies at most, relative, (n_samples, n_modes).
 
-        Zero without beams; infinite where the mesh is so coarse that nothing can be said.
+        Zero without beams; infinite where the mesh is so coarse that nothing can be said. Under
+        gravity an estimate from finer meshes.
         """
         x = self.x(q, y)
         if self.meshed is None:
             return np.zeros((len(x), len(modes)))
-        return discretisation_error(self.meshed, x, modes, self.reduced).total
+        return discretisation_error(self.meshed, x, modes, self.reduced, self.refinements).total
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
         """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.

@@ -16,38 +16,30 @@ the last term being there only where constraint modes change with y. S is taken 
 which is stiffer, and a factor makes up for that.
 All of it is a matter of each link's own matrices: no factor of the whole mechanism is needed.
 
-Under gravity K_g reaches into C as well. With c held at the ends of a length ℓ, that of an element,
-or 4.73 (β EI/ρA)^¼ in a reduced link, ‖c‖ ≤ ℓ²/22.4 √(c·K_0 c/EI): an axial force N takes
-∫ N v'' c ≤ N ℓ²/(22.4 EI) of the K_0-energies of v and c, bending moments M and torques T act alike
-on twist and slope. With the largest
-
-    r = N ℓ²/(22.4 EI) + M ℓ/(π √(EI GJ)) + T ℓ/(4.73 EI)
-
-of all elements √G_jj grows by r μ̂_j (z_jᵀ K_0 z_j)^½, and β to β/(1 − r).
+Under gravity K_g is indefinite and reaches into C, and none of this is known. There the links are
+solved whole, and the error is what it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.errors import AccuracyError
+from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.assembly.inside_links import ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import largest_left_out
 from eigassign.mechanism.elements.sparse_factor import factorise, kept_factor
-from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.exact.solver import eigenvalues, lowest_modes
 from eigassign.modal.exact.sparse import principal
 
 Floats = NDArray[np.float64]
 BESIDE = 6  # modes above the highest one asked for that may be drawn in
-CLAMPED = 4.730  # k ℓ of the lowest bending mode of a beam with both ends held
-ENDS = (slice(0, 2), slice(11, 15), slice(15, 16))  # of N, M and T in `Weight.inside`
 SAFETY = 4.0  # on the part that the reduced stiffness is used for
 REFUSED = 0.5  # relative error in frequency above which nothing is said
 
@@ -75,39 +67,20 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
         found = lowest_modes(pencil, pencil.theta(x[s : s + 1]), highest, BESIDE)
         mu = 1.0 / found.lam[0]
         z = found.phi[0] * np.sqrt(mu)
-        gram, beta = under_weight(pencil, x[s], z, mu, left_out.at(x[s], z, mu), in_links=True)
-        out[s] = truncation_bounds(mu, gram, beta, highest, pencil)[pick]
+        out[s] = truncation_bounds(mu, *left_out.at(x[s], z, mu), highest, pencil)[pick]
     return out
 
 
-def under_weight(
-    pencil: Pencil,
-    x: Floats,
-    z: Floats,
-    mu: Floats,
-    left: tuple[Floats, Any],
-    in_links: bool = False,
-) -> tuple[Floats, Any]:
-    """G and β of what is ``left`` out, in elements or in links, with what the weight does there."""
-    weight, (gram, beta) = pencil.weight, left
-    if weight is None or weight.inside is None:
-        return gram, beta
-    inside = weight.inside(pencil.to_program @ x[:, None] + pencil.shift[:, None])[0][0]
-    N, M, T = (np.abs(inside[:, part]).max(axis=1) for part in ENDS)
-    EI, GJ = inside[:, 2:6].min(axis=1), inside[:, 6:8].min(axis=1)
-    span = inside[:, 10]
-    if in_links:
-        span = CLAMPED * (beta * inside[:, 2:6].max(axis=1) / inside[:, 8:10].min(axis=1)) ** 0.25
-    shares = N * (span / CLAMPED) ** 2 / EI
-    shares += M * span / (np.pi * np.sqrt(EI * GJ)) + T * span / (CLAMPED * EI)
-    r = float(shares.max(initial=0.0))
-    K_0, i, j = weight.without @ pencil.theta(x[None])[:, 0], pencil.rows, pencil.columns
-    energy = np.einsum("e,ec,ec->c", K_0, z[i], z[j])
-    more = r * mu * np.sqrt(np.maximum(energy, 0.0))
-    root = np.sqrt(np.maximum(np.diagonal(gram), 0.0))
-    grown = np.divide(root + more, root, out=np.ones_like(root), where=root > 0.0)
-    gram = grown[:, None] * gram * grown + np.diag(np.where(root > 0.0, 0.0, more**2))
-    return gram, beta / max(1.0 - r, 1e-9)
+def compared_error(reduced: Pencil, whole: Pencil, x: Floats, modes: Sequence[int]) -> Floats:
+    """The same under gravity, against the ``whole`` links; infinite where these buckle."""
+    out = np.full((len(x), len(modes)), np.inf)
+    for s in range(len(x)):
+        with suppress(MechanismError):
+            lam, true = (
+                eigenvalues(each, x[s : s + 1], max(modes))[0] for each in (reduced, whole)
+            )
+            out[s] = np.maximum(np.sqrt(lam / true) - 1.0, 0.0)[np.array(modes) - 1]
+    return np.where(out < REFUSED, out, np.inf)
 
 
 class LeftOut:

@@ -434,14 +434,15 @@ def modes_table(
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
         "frequency [Hz]": [f"{hz:.10g}" for hz in frequencies_hz],
     }
-    for cause, errors in (("mesh", discretisation), ("reduced links", truncation)):
+    weighed = weight is not None and weight.gravity is not None
+    of_mesh = ("mesh", discretisation, "about" if weighed else "at most")
+    for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
         if errors is not None:
-            columns[f"{cause}: too high by at most"] = [
+            columns[f"{cause}: too high by {about}"] = [
                 f"{100 * e:.2g} %" if math.isfinite(e) else "cannot be bounded" for e in errors
             ]
     if weight is not None:
-        stated = weight.gravity is not None
-        columns["sag: changes it by" if stated else "gravity: may change it by"] = [
+        columns["sag: changes it by" if weighed else "gravity: may change it by"] = [
             f"{100 * e:.2g} %" if math.isfinite(e) else "may buckle or fall" for e in weight.change
         ]
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."

@@ -222,7 +222,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
         y = case.initial_design
         notes += tuple(
-            mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"))
+            mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"), model)
         )
         weight = study_weight(file, model, plan.modes, q[:1], y, "initial")  # quick
         notes += weight.lines

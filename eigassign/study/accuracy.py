@@ -67,7 +67,7 @@ def study_accuracy(
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
     mesh = judged_mesh(scene.model, scene.modes, scene.trajectory, scene.q0, y, design)
     weight = weight_at(scene, y, design, more)
-    lines = [*mesh_lines(mesh), *weight.lines]
+    lines = [*mesh_lines(mesh, scene.model), *weight.lines]
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
@@ -147,13 +147,14 @@ def judged_poses(model: Model, q: Floats) -> Floats:
     return spread(q, POSES if model.n_dof <= LARGE else POSES_LARGE)
 
 
-def mesh_lines(found: MeshError | None) -> list[str]:
-    """`judged_mesh` in words, one line a mode."""
+def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
+    """`judged_mesh` in words, one line a mode; under gravity it is no bound."""
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
+    about = "at most" if model.pencil.weight is None else "estimated at"
     return [
-        f"mode {mode}: discretisation error at most {100 * error:.2g} % (too high), {where} of "
+        f"mode {mode}: discretisation error {about} {100 * error:.2g} % (too high), {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
         else f"mode {mode}: discretisation error not known, {where} of the {found.design} design: "

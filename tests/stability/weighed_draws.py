@@ -34,30 +34,13 @@ def weighed(seed: int, samples: int) -> Drawn | None:
                 model = build_model(_under(case, g))
                 most = _buckling(model, drawn)
                 if most > 0.0:
-                    model = _times(model, share * min(most, 1e6))
+                    model = build_model(_under(case, g * (share * min(most, 1e6))))
                     model.frequencies(drawn.q, drawn.y, max(drawn.modes))
                     model.frequencies(drawn.q0, drawn.y0, max(drawn.modes))
                     return replace(drawn, model=model)
             except EigassignError:
                 continue
     return None
-
-
-def _times(model: Model, share: float) -> Model:
-    """The same under as many times the weight, in which K_g is linear."""
-    pencil, own = model.pencil, model.pencil.weight
-    scaled = replace(
-        own,
-        stiffness=share * own.stiffness,
-        among_joints=share * own.among_joints,
-        gravity=share * own.gravity,
-        inside=lambda z: [own.inside(z)[0] * np.array([share] * 2 + [1.0] * 9 + [share] * 5)],
-    )
-    stiffness = own.without + scaled.stiffness
-    pencil = replace(pencil, stiffness=stiffness, weight=scaled)
-    inside = {k: getattr(model, k) for k in ("reduced", "meshed")}
-    inside = {k: v and replace(v, pencil=pencil) for k, v in inside.items()}
-    return replace(model, pencil=pencil, **inside)
 
 
 def _under(file: CaseFile, g: Floats) -> CaseFile:

@@ -78,22 +78,19 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    g, weight, K_g, inside = gravity(case), AffineEntries(summed=True), None, None
+    g, weight, K_g = gravity(case), AffineEntries(summed=True), None
     if g is not None:
         coarse = None
         if hangs_on_stiffness(case, motion):
             coarse = local_links(in_few_elements(case), parameters, motion)
-        elements = add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
-        inside = parameters.compiled(np.array(elements, dtype=object).reshape(-1, 16))
+        add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
     _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
     if g is not None:
         known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
-    pencil = _compile(K, M, K_g, case, parameters, motion, nodes.count)
-    own = pencil.weight
-    return pencil if own is None else replace(pencil, weight=replace(own, inside=inside))
+    return _compile(K, M, K_g, case, parameters, motion, nodes.count)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:

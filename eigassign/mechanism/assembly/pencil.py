@@ -17,7 +17,7 @@ from scipy import sparse
 
 from eigassign.brief import Brief
 from eigassign.series.algebra import Samples, Tangents, Truncated
-from eigassign.series.compiler import CompiledArrays, Program
+from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
 if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and case
@@ -64,7 +64,6 @@ class Weight:
     names: tuple[str, ...]  # of ``joints``
     variables: tuple[str, ...]  # the names of x
     gravity: float  # |g| in m/s²
-    inside: CompiledArrays | None = None  # of z: `add_weight` of beam elements, (n, 16)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

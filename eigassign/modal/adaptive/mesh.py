@@ -57,9 +57,9 @@ def meshes(
         if model.meshed is None:
             yield MeshChoice(np.zeros(len(modes)), (), elements=now)
             return
-        found = discretisation_error(model.meshed, x, modes)
+        found = discretisation_error(model.meshed, x, modes, refinements=model.refinements)
         error = found.total.max(axis=0)
-        reasons.append(f"{_shown(now)} elements: {_said(error, modes)}")
+        reasons.append(f"{_shown(now)} elements: {_said(error, modes, model)}")
         yield MeshChoice(error, tuple(reasons), elements=now)
         if not free:
             break
@@ -106,9 +106,10 @@ def _shown(elements: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {n}" for name, n in elements.items())
 
 
-def _said(error: Floats, modes: Sequence[int]) -> str:
+def _said(error: Floats, modes: Sequence[int], model: Model) -> str:
+    about = "at most" if model.pencil.weight is None else "about"
     return ", ".join(
-        f"mode {mode} at most {100.0 * worst:.2g} % too high"
+        f"mode {mode} {about} {100.0 * worst:.2g} % too high"
         if np.isfinite(worst)
         else f"mode {mode} beyond them"
         for mode, worst in zip(modes, error, strict=True)

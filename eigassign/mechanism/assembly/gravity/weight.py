@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -67,12 +67,8 @@ def add_weight(
     nodes: NodeMotions,
     gravity: Floats,
     coarse: tuple[Sequence[LocalLink], NodeMotions] | None,
-) -> list[list[Scalar]]:
+) -> None:
     """K += K_g for gravity g (3,) in m/s²; ``coarse`` as in `statics`.
-
-    Returns (n, 16) what acts inside every beam element: N, and what resists, EI_z, EI_y, GJ and ρA,
-    at both ends, its length, four bending moments and the torque. In a plane bending about z takes
-    all, and moments add nothing.
 
     Raises MechanismError where the internal forces are not known.
     """
@@ -91,7 +87,6 @@ def add_weight(
     for edge in (*motion.tree.edges, *motion.tree.loops):
         weight.add_joint(edge)
     weight.add_springs()
-    return weight.inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +100,6 @@ class Weight:
     links: Mapping[str, LocalLink]
     nodes: NodeMotions
     statics: Statics
-    inside: list[list[Scalar]] = field(default_factory=list)  # of every element
 
     # --- motions
 
@@ -165,9 +159,6 @@ class Weight:
         if self.case.mechanism.joints[edge.joint].type in RIDING and rows[0]:
             work = self._strained(written.base, wrench)
             self.K.add_product(-1.0, list(work.items()), list(rows[0].items()))
-            passive = own[0] >= len(self.parameters.coordinates)
-            if passive:  # not held by a drive: no mesh bounds the curvature at a point
-                self.inside.append([1e6] * 2 + [1.0] * 9 + [0.0] * 5)
 
     def _strained(self, node: NodeName, wrench: Objects) -> MotionRow:
         """F · (u' − θ × e_x) + M · θ' at a node within a beam, the mean of both its sides."""
@@ -289,11 +280,6 @@ class Weight:
             along = multiply(turn, strand.points[k + 1] - strand.points[k])
             p = np.array([scaled(g, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
             forces, beyond = _through_element(beyond + acting[k + 1], turn, p, along[0])
-            keys = ("EI_z", "EI_z", "EI_z", "mass") if planar else ("EI_z", "EI_y", "GJ", "mass")
-            own = [[getattr(p, key) for p in strand.profiles[k]] for key in keys]
-            turns = [0.0] * 5 if planar else [*forces.moments[:, 1:].ravel(), forces.torque]
-            ends = [end for series in (forces.axial, *own) for end in _at_ends(series)]
-            self.inside.append([*ends, along[0], *turns])
             dofs = np.append(strand.slots[k], strand.slots[k + 1])
             for whole, matrix in stress_terms(forces, along[0], strand.shear[k], planar):
                 turned = R.T @ matrix @ R
@@ -348,12 +334,6 @@ def _summed(terms: Sequence[ElementTerm], R: Floats) -> Objects:
         for i, j in zip(*np.nonzero(turned), strict=True):
             out[i, j] = out[i, j] + coefficient * float(turned[i, j])
     return out
-
-
-def _at_ends(series: Sequence[Scalar]) -> list[Scalar]:
-    """A Legendre series at both ends of an element."""
-    signed = [value * (-1.0) ** k for k, value in enumerate(series)]
-    return [sum(signed, start=0.0), sum(series, start=0.0)]
 
 
 def _through_element(
