@@ -8,8 +8,9 @@ the stress, and the sag u₀. The second is φᵀ(∂K/∂x·u₀ − λ ∂M/�
 anew, for the third derivative of the potential is symmetric: the forces inside that u₀ meets while
 the mode moves are those that the mode meets while u₀ bends it. Both are linear in g.
 
-Where modes are near, weight mixes them: the small matrix C of a cluster takes the place of a
-number, and mode k changes by |C_kk| + Σ_j min(|C_kj|, g C_kj²/|λ_j − λ_k|) at most, g = 9.81 m/s².
+Weight mixes modes: with the small matrix C of all modes up to a few above those asked for, mode k
+changes by |C_kk| + Σ_j min(|C_kj|, g C_kj²/|λ_j − λ_k|) at most, g = 9.81 m/s²; of sag only modes
+count that are near.
 """
 
 from __future__ import annotations
@@ -22,12 +23,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes
-from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
+from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.exact.standing import buckling_share
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
 STANDARD_GRAVITY = 9.81  # m/s²
+NEIGHBOURS = 3  # modes above those asked for that weight may mix with them
+# of λ: stress mixes all modes, which is of second order where they are far from each other; of sag,
+# which is stated to first order, that of near ones counts alone
+FAR = (np.inf, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +56,8 @@ def weight_changes(model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int
 
 def _changes(model: Model, pose: LoadedPose, theta: Floats, modes: Sequence[int]) -> Floats:
     """Stress and sag (2, n_modes, n_axes) at one pose."""
-    found, groups = whole_clusters(model.pencil, theta, modes, CLUSTER_GAP)
-    members = [mode for group in groups for mode in group]
-    part = np.array(members) - 1
-    lam, phi = found.lam[0, part], found.phi[0][:, part]
+    found = lowest_modes(model.pencil, theta, max(modes), NEIGHBOURS)
+    lam, phi = found.lam[0], found.phi[0]
     weight = pose.weight()
     pull = np.hstack([weight, lam * np.asarray(pose.B @ phi)])
     n, axes = model.under_load.n_u, weight.shape[1]
@@ -64,18 +67,19 @@ def _changes(model: Model, pose: LoadedPose, theta: Floats, modes: Sequence[int]
     stress = works[:axes, axes:, axes:]
     mixed = works[axes:, :axes, axes:].transpose(1, 0, 2)
     by_axis = np.array([stress, mixed + mixed.transpose(0, 2, 1)])  # (2, axes, r, r)
-    out = np.zeros((2, len(modes), axes))
-    for k, mode in enumerate(modes):
-        (group,) = (g for g in groups if mode in g)
-        own = [members.index(each) for each in group]
-        out[:, k] = _of_mode(by_axis[..., own][..., own, :], lam[own], group.index(mode))
-    return out
+    return np.array(
+        [
+            [_of_mode(C, lam, mode - 1, far) for mode in modes]
+            for C, far in zip(by_axis, FAR, strict=True)
+        ]
+    )
 
 
-def _of_mode(C: Floats, lam: Floats, k: int) -> Floats:
-    """∂λ/λ of mode k of a cluster: C_kk, and what its neighbours can add to it by mixing."""
-    others = np.arange(len(lam)) != k
-    apart, c = np.abs(lam - lam[k])[others] / STANDARD_GRAVITY, np.abs(C[..., k, others])
+def _of_mode(C: Floats, lam: Floats, k: int, far: float) -> Floats:
+    """∂λ/λ of mode k: C_kk, and what others less than ``far`` λ_k away can add by mixing."""
+    apart = np.abs(lam - lam[k])
+    others = (np.arange(len(lam)) != k) & (apart <= far * lam[k])
+    apart, c = apart[others] / STANDARD_GRAVITY, np.abs(C[..., k, others])
     mixed = c * np.divide(c, np.maximum(c, apart), out=np.zeros_like(c), where=c > 0.0)
     return np.asarray((C[..., k, k] + np.copysign(mixed.sum(axis=-1), C[..., k, k])) / lam[k])
 

@@ -20,6 +20,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import KroghInterpolator
 
 from eigassign.brief import Brief, cut
 from eigassign.case.schema.trajectory import (
@@ -446,6 +447,9 @@ class Rates:
     acceleration: Floats
 
 
+AT_ENDS = 6  # samples through which a polynomial is exact for every timing law
+
+
 def rates(trajectory: Trajectory, everywhere: bool = False) -> Rates:
     """Rates by differences within each smooth part; of a part with one sample nothing is known.
 
@@ -462,8 +466,14 @@ def rates(trajectory: Trajectory, everywhere: bool = False) -> Rates:
     for part in parts:  # of two samples their difference, and no acceleration
         order: Literal[1, 2] = 2 if len(part) > 2 else 1
         rate = np.gradient(q[part], time_s[part], axis=0, edge_order=order)
+        push = np.gradient(rate, time_s[part], axis=0, edge_order=order)
+        if len(part) >= AT_ENDS:  # differences to one side err most where a motion sets off
+            for some, at in ((part[:AT_ENDS], [0, 1]), (part[-AT_ENDS:], [-2, -1])):
+                near = KroghInterpolator(time_s[some], q[some])
+                rate[at] = near.derivative(time_s[part[at]], 1)
+                push[at] = near.derivative(time_s[part[at]], 2)
         first.append(rate)
-        second.append(np.gradient(rate, time_s[part], axis=0, edge_order=order))
+        second.append(push)
     still, samples = np.zeros((len(alone), q.shape[1])), np.append(samples, alone)
     rate, acceleration = np.concatenate([*first, still]), np.concatenate([*second, still])
     resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
