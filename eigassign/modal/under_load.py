@@ -87,15 +87,15 @@ def _of_mode(C: Floats, lam: Floats, k: int, far: float) -> Floats:
 def sag_of_nodes(
     model: Model, q: ArrayLike, y: ArrayLike, g: ArrayLike
 ) -> tuple[tuple[str, ...], Floats]:
-    """Names link.node, and by how much the weight displaces them, (n_samples, n_nodes, 3) in m.
+    """Names link.node, and by how much the weight moves and turns them, (n_samples, n_nodes, 6).
 
-    In ground axes, all coordinates held; ``g`` (n_axes,) in m/s² is the gravity.
+    In ground axes, in m and rad, all coordinates held; ``g`` (n_axes,) in m/s² is the gravity.
     """
     x, weight = model.x(q, y), np.asarray(g, dtype=np.float64)[:, None]
     u = np.array([p.displaced(p.weight() @ weight) for p in model.under_load.at(x)])
     found = [one.nodes for one in shapes(model.poses, x, u)]
     named = [node for node in found[0] if not node[1].startswith("@")]
-    moved = [[nodes[node].motion[0, :3] for node in named] for nodes in found]
+    moved = [[nodes[node].motion[0] for node in named] for nodes in found]
     return tuple(".".join(node) for node in named), np.array(moved)
 
 

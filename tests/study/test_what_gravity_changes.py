@@ -126,9 +126,32 @@ def test_the_sag_of_a_straight_boom_changes_nothing_but_is_there(tmp_path: Path)
 def test_beyond_a_fifth_of_buckling_a_warning_has_the_factor(tmp_path: Path) -> None:
     found = solved(tmp_path, "[0, -9.81]", target="{mode: 1, at_most: 5 Hz}")
     assert 0.3 < found.weight.buckling < 0.35
-    (warning,) = found.warnings
+    bent, warning = found.warnings
+    assert re.match(r"the links turn by up to [\d.]+° under the weight", bent)
     assert re.match(r"the weight is 3\d\.\d % of that which buckles", warning)
     assert found.assignment.verdict == "reached"
+
+
+def test_links_that_bend_far_make_an_answer_unusable(tmp_path: Path) -> None:
+    found = solved(tmp_path, "[9.81, 0]", load=800.0, length=70, target="{mode: 1, at_most: 5 Hz}")
+    assert found.weight.turn > 0.23
+    assert found.assignment.verdict == "do_not_use"
+    assert "second order" in found.assignment.reason
+
+
+def test_drives_are_not_limited_without_what_they_carry(tmp_path: Path) -> None:
+    file = boom(tmp_path, **STOUT)
+    torque = "design: {torque: {luff: {max: 1e9 N m}}, "
+    limited = file.read_text(encoding="utf-8").replace("design: {", torque)
+    file.write_text(limited, encoding="utf-8")
+    row = ea.assign(ea.load_case(file)).results.assignment
+    assert row.verdict == "do_not_use"
+    assert "drives are limited, and the case does not state gravity" in row.reason
+
+
+def test_gravity_that_pulls_nowhere_is_none(tmp_path: Path) -> None:
+    with pytest.raises(ea.CaseError, match="pulls nowhere: write none"):
+        ea.load_case(boom(tmp_path, "[0, 0]"))
 
 
 @pytest.mark.parametrize(("accepted", "verdict"), [("5 %", "reached"), ("1 %", "do_not_use")])

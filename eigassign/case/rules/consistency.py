@@ -43,9 +43,17 @@ def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
         yield ("design", "torque"), message
 
 
+def gravity_pulls(tree: Tree) -> Iterator[Finding]:
+    """No gravity at all is `none`: said on purpose."""
+    given = at(tree, "mechanism", "gravity")
+    if isinstance(given, tuple) and given and not any(given):
+        yield ("mechanism", "gravity"), "pulls nowhere: write none to leave it out on purpose"
+
+
 RULES: tuple[Rule, ...] = (
     keys_have_values,
     reserved_names_are_not_used,
+    gravity_pulls,
     links.beams_have_known_materials,
     links.beams_have_known_sections,
     links.materials_have_a_shear_modulus_where_beams_need_it,
