@@ -133,6 +133,7 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
     positions: list[Objects] = [vector([0.0])]
     bent: list[tuple[Shear, Shear]] = []
     profiles: list[Profile] = []
+    lengths: list[Scalar] = []
     for start, span, n in pieces:
         h, first = span * (1.0 / n), len(positions) - 1
         shares = (0.0, 1.0) if not riders else (start / total, (start + span) / total)
@@ -143,9 +144,10 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
             each = each_element(profile, count)
             profiles += each
             bent += [shear(own, h) for own in each]
+        lengths += [h] * n
         positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
     named = {"start": 0, "end": len(positions) - 1} | {f"@{r}": pieces[0][2] for r in riders}
-    strand = Strand(list(beams.slots), positions, turn, bent, profiles)
+    strand = Strand(list(beams.slots), positions, turn, bent, profiles, lengths)
     return beams.mesh(case, parameters, name, positions, named, (strand,))
 
 
@@ -183,7 +185,8 @@ def _frame(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
         profile = [beam_values(case, parameters, beam, beam.section)]
         beams.add(profile, h, turn, nodes)
         row, bent = [vector(points[k].tolist()) for k in nodes], [shear(profile, h)] * n
-        strands.append(Strand(list(beams.slots[nodes]), row, turn, bent, [profile] * n))
+        more = bent, [profile] * n, [h] * n
+        strands.append(Strand(list(beams.slots[nodes]), row, turn, *more))
     positions = [vector(p.tolist()) for p in points]
     return beams.mesh(case, parameters, name, positions, named, strands)
 

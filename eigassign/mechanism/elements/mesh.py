@@ -46,6 +46,7 @@ class Strand(NamedTuple):
     axes: Floats | None  # rows: x, y, z of the elements in the link's axes; None where no matter
     shear: Sequence[tuple[Shear, Shear]]  # per element, of bending in its x-y and x-z plane
     profiles: Sequence[Profile] = ()  # per element its values
+    lengths: Sequence[Scalar] = ()  # per element, m: equal ones to the last digit
 
 
 def element_motion(motion: Floats, axes: Floats) -> Floats:

@@ -277,11 +277,11 @@ class Weight:
         R, beyond = _of_element(turn), np.zeros(6, dtype=object)  # about the last node
         g = multiply(turn, np.array([one_atom(v) for v in self.statics.g[name]]))
         for k in range(len(strand.profiles) - 1, -1, -1):
-            along = multiply(turn, strand.points[k + 1] - strand.points[k])
+            h = strand.lengths[k]
             p = np.array([scaled(g, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
-            forces, beyond = _through_element(beyond + acting[k + 1], turn, p, along[0])
+            forces, beyond = _through_element(beyond + acting[k + 1], turn, p, h)
             dofs = np.append(strand.slots[k], strand.slots[k + 1])
-            for whole, matrix in stress_terms(forces, along[0], strand.shear[k], planar):
+            for whole, matrix in stress_terms(forces, h, strand.shear[k], planar):
                 turned = R.T @ matrix @ R
                 i, j = np.nonzero(np.abs(turned) > 1e-14 * np.abs(turned).max())
                 kept = (dofs[i] >= 0) & (dofs[j] >= 0)
