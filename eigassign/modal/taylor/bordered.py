@@ -47,7 +47,7 @@ def factor_dense(A: Floats, border: Floats) -> Solve:
     Raises AccuracyError where the system is singular: the border misses a mode with the same λ.
     """
     r, n = border.shape
-    scale = float(np.abs(A).max() / np.abs(border).max())
+    scale = float((np.abs(A).max() or 1.0) / np.abs(border).max())  # A = 0 of a model of one mode
     full = np.zeros((n + r, n + r))
     full[:n, :n] = A
     full[n:, :n] = border

@@ -84,3 +84,9 @@ def test_a_double_mode_with_half_its_border_is_refused() -> None:
     except AccuracyError:
         return
     assert np.abs(half).max() > 1e10
+
+
+def test_of_a_model_of_one_mode_nothing_is_left_but_the_border() -> None:
+    solve = factor_dense(np.zeros((1, 1)), np.array([[2.0]]))
+    x, multiplier = solve(np.array([[3.0]]))
+    np.testing.assert_allclose([x[0, 0], multiplier[0, 0]], [0.0, -1.5], atol=1e-15)
