@@ -43,7 +43,7 @@ Ints = NDArray[np.intp]
 BESIDE = 24  # modes above the highest one asked for; with 6, few elements in space err 0.3 % more
 # Under weight: modes above those asked for that may be the lowest at last
 CLOSE = 2
-# log λ loses at most as many times what one mesh and two of twice the elements take off it: 16/15
+# λ loses at most as many times what one mesh and two of twice the elements take off it: 16/15
 # where it converges with the fourth order, 2 and 4/3 with the first, as the curvature at a carriage
 LOST = {1: 2.0, 2: 1.5}
 SLOWEST = 0.6  # of the first step is the second; slower, nothing converges for certain
@@ -156,14 +156,13 @@ def _estimated(meshes: Sequence[Pencil], x: Floats, highest: int) -> Floats:
             return np.full(highest, np.inf)
     count = min(map(len, levels))
     rows = np.array([each[:count] for each in levels])
-    steps, change = np.abs(np.diff(rows, axis=0)), rows[-1] / rows[0]
-    power = np.full(count, LOST[len(steps)])
+    steps, change = np.abs(np.diff(rows, axis=0)), np.abs(rows[-1] - rows[0])
+    times = np.full(count, LOST[len(steps)])
     if len(steps) > 1:
-        power[steps[1] > SLOWEST * steps[0]] = GROWING
-    # to a tenth, which is refused, lest powers of it vanish
-    change = np.maximum(np.minimum(change, 1.0 / change), 0.1)
-    least = np.sort(rows[0] * change**power)[:highest]
-    error = np.sqrt(rows[0, :highest] / least) - 1.0
+        times[steps[1] > SLOWEST * steps[0]] = GROWING
+    least = np.sort(rows[0] - times * change)[:highest]  # below 0 a mesh fine enough buckles
+    left = np.maximum(least / rows[0, :highest], 1e-12)
+    error = 1.0 / np.sqrt(left) - 1.0
     return np.where(error < REFUSED, error, np.inf)
 
 

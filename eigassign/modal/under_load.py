@@ -41,6 +41,8 @@ class WeightChanges:
 
     stress: Floats  # by the forces inside
     sag: Floats  # by the geometry that bends
+    stress_mixing: Floats  # what other modes add to either at most, by mixing
+    sag_mixing: Floats
 
 
 def weight_changes(model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) -> WeightChanges:
@@ -50,12 +52,12 @@ def weight_changes(model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int
         _changes(model, pose, model.pencil.theta(own[None]), modes)
         for own, pose in zip(x, model.under_load.at(x), strict=True)
     ]
-    both = np.array(found).reshape(len(x), 2, len(modes), -1)
-    return WeightChanges(both[:, 0], both[:, 1])
+    each = np.array(found).reshape(len(x), 4, len(modes), -1)
+    return WeightChanges(*each.swapaxes(0, 1))
 
 
 def _changes(model: Model, pose: LoadedPose, theta: Floats, modes: Sequence[int]) -> Floats:
-    """Stress and sag (2, n_modes, n_axes) at one pose."""
+    """Stress, sag and what mixing adds to them, (4, n_modes, n_axes), at one pose."""
     found = lowest_modes(model.pencil, theta, max(modes), NEIGHBOURS)
     lam, phi = found.lam[0], found.phi[0]
     weight = pose.weight()
@@ -67,21 +69,19 @@ def _changes(model: Model, pose: LoadedPose, theta: Floats, modes: Sequence[int]
     stress = works[:axes, axes:, axes:]
     mixed = works[axes:, :axes, axes:].transpose(1, 0, 2)
     by_axis = np.array([stress, mixed + mixed.transpose(0, 2, 1)])  # (2, axes, r, r)
-    return np.array(
-        [
-            [_of_mode(C, lam, mode - 1, far) for mode in modes]
-            for C, far in zip(by_axis, FAR, strict=True)
-        ]
-    )
+    own = by_axis.diagonal(axis1=2, axis2=3).swapaxes(1, 2) / lam[:, None]  # (2, r, axes)
+    k = np.array(modes) - 1
+    mixing = [[_mixing(C, lam, one, far) for one in k] for C, far in zip(by_axis, FAR, strict=True)]
+    return np.concatenate([own[:, k], np.array(mixing)])
 
 
-def _of_mode(C: Floats, lam: Floats, k: int, far: float) -> Floats:
-    """∂λ/λ of mode k: C_kk, and what others less than ``far`` λ_k away can add by mixing."""
+def _mixing(C: Floats, lam: Floats, k: int, far: float) -> Floats:
+    """∂λ/λ that others less than ``far`` λ_k away can add to mode k at most."""
     apart = np.abs(lam - lam[k])
     others = (np.arange(len(lam)) != k) & (apart <= far * lam[k])
     apart, c = apart[others] / STANDARD_GRAVITY, np.abs(C[..., k, others])
     mixed = c * np.divide(c, np.maximum(c, apart), out=np.zeros_like(c), where=c > 0.0)
-    return np.asarray((C[..., k, k] + np.copysign(mixed.sum(axis=-1), C[..., k, k])) / lam[k])
+    return np.asarray(mixed.sum(axis=-1) / lam[k])
 
 
 def sag_of_nodes(

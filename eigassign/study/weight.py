@@ -73,9 +73,10 @@ def _row(
 ) -> WeightRow:
     found = weight_changes(model, q, y, modes)
     if g is None:
-        x = STANDARD_GRAVITY * np.linalg.norm(found.stress + found.sag, axis=2)
+        both = found.stress + found.sag, found.stress_mixing + found.sag_mixing
+        x = STANDARD_GRAVITY * sum(np.linalg.norm(each, axis=2) for each in both)
     else:
-        x = np.abs(found.sag @ g)
+        x = np.abs(found.sag @ g) + found.sag_mixing @ np.abs(g)
     x = x.max(axis=0)
     change = np.where(x < 1.0, 1.0 - np.sqrt(1.0 - np.minimum(x, 1.0)), np.inf)
     row = WeightRow(g, tuple(modes), tuple(change.tolist()), len(q), design)

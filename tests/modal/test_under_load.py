@@ -45,6 +45,38 @@ def test_a_boom_loses_as_much_as_it_loses_with_stated_gravity() -> None:
     assert abs(found.sag[0, 0] @ weight) < 1e-4  # a straight link is but shortened
 
 
+def test_modes_that_are_not_near_mix_under_weight_too() -> None:
+    """One rod up and one down, a spring between them: neither mode feels the weight by itself."""
+    rod = {"type": "rigid", "length": 1.0, "mass": 0.0}
+    ends = {"a": "q1", "b": "q2"}
+    tree = {
+        "title": "twins",
+        "mechanism": {
+            "space": "planar",
+            "links": dict.fromkeys(ends, rod),
+            "joints": {
+                name: {"type": "revolute", "base": "ground", "follower": f"{name}.start"}
+                for name in ends
+            },
+            "bodies": {name: {"at": f"{name}.end", "mass": 1.0} for name in ends},
+            "springs": {"s": {"between": ["a.start", "b.start"], "rotational": 1.0}},
+        },
+        "coordinates": {
+            q: {"joint": name, "drive": {"stiffness": 20.0}} for name, q in ends.items()
+        },
+    }
+    q = [np.pi / 2, -np.pi / 2]
+    model = ea.load_case(tree).model()
+    found = weight_changes(model, q, [], (1, 2))
+    np.testing.assert_allclose(found.stress, 0.0, atol=1e-12)
+    tree["mechanism"]["gravity"] = [0.0, -9.81]
+    plain, stated = (m.frequencies(q, [], 2)[0] for m in (model, ea.load_case(tree).model()))
+    most = 9.81 * np.linalg.norm(found.stress_mixing[0], axis=1)
+    true = np.abs((stated / plain) ** 2 - 1.0)
+    assert (true <= most * (1.0 + 1e-9)).all()
+    assert (most <= 1.3 * true).all()
+
+
 def test_buckling_is_eulers() -> None:
     EI = 2.1e11 * np.pi / 64 * (0.6**4 - 0.576**4)
     tree = boom(40.0, 8000.0, gravity=[0.0, -9.81])

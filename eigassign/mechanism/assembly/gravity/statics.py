@@ -148,8 +148,7 @@ class _Wrenches:
         """The wrench on the follower of a closing joint from that on its base node."""
         loop = next(one for one in self.motion.loops if one.edge == edge)
         F, M = wrench[:3], wrench[3:] - cross(loop.lever, wrench[:3])
-        turned = [multiply(loop.rotation.T, each) for each in (F, M)]
-        return np.concatenate(turned) * -1.0
+        return np.concatenate([multiply(loop.rotation.T, each) * -1.0 for each in (F, M)])
 
     def stretch(self, spring: SpringMotion, force: Objects) -> None:
         """A spring's force on the second of its nodes, and its opposite on the first."""
