@@ -10,6 +10,7 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, repeat
@@ -272,6 +273,9 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
     return {name: None if isinstance(n, str) else n for name, n in beams.items() if n is not None}
 
 
+TRIAL = 2  # elements of a link left to auto, in the model that choices are first judged on
+
+
 def settle_mesh(
     file: CaseFile,
     build: Callable[[Mapping[str, int]], Model],
@@ -293,6 +297,8 @@ def settle_mesh(
     )
     if len(y):
         every = every.joined(at_random(file, trajectory, q0, y, MESH_FEW))
+    trial = build({name: n or TRIAL for name, n in elements.items()})
+    seen, every = standing(seen, trial), standing(every, trial)
     return confirmed(
         lambda at, _: meshes(build, elements, at.x, accuracy, modes_at),
         lambda found: partial(_mesh_error, build(found.elements), modes_at),
@@ -471,6 +477,19 @@ class DesignSamples:
         """The same samples with the rows of another at the end."""
         x, samples = np.vstack([self.x, other.x]), np.append(self.samples, other.samples)
         return replace(self, x=x, samples=samples)
+
+
+def standing(samples: DesignSamples, model: Model) -> DesignSamples:
+    """Those that neither fall nor buckle under a stated weight; all where none is left."""
+    if model.pencil.weight is None:
+        return samples
+    n_q, kept = len(model.q_names), []
+    for k, x in enumerate(samples.x):
+        with suppress(MechanismError):
+            model.require_standing(x[:n_q], x[n_q:])
+            kept.append(k)
+    some = kept or slice(None)
+    return replace(samples, x=samples.x[some], samples=samples.samples[some])
 
 
 def at_corners(

@@ -25,17 +25,18 @@ from eigassign.modal.adaptive.mesh import MeshChoice
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories
 from eigassign.study.planning import (
+    TRIAL,
     at_corners,
     automatic_elements,
     automatic_reduction,
     modes_that_matter,
     settle_mesh,
+    standing,
     truncation_share,
     with_middle_loads,
 )
 
 Floats = NDArray[np.float64]
-TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
 
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
     path, q0 = _path(file, whole)
-    x = at_corners(file, path, q0, initial_design(file)).x
+    x = standing(at_corners(file, path, q0, initial_design(file)), whole).x
     modes_at = modes_that_matter(file, _bands_hz(file, path))
     return cheapest(reductions(names, whole, reduced, x, modes_at), truncation_share(file))
 

@@ -149,6 +149,17 @@ def test_drives_are_not_limited_without_what_they_carry(tmp_path: Path) -> None:
     assert "drives are limited, and the case does not state gravity" in row.reason
 
 
+def test_elements_are_chosen_where_some_designs_buckle(tmp_path: Path) -> None:
+    file = boom(tmp_path, "[0, -9.81]", high=60000.0)
+    auto = file.read_text(encoding="utf-8").replace("elements: 8", "elements: auto")
+    file.write_text(auto, encoding="utf-8")
+    model = ea.load_case(file).model()
+    hz = model.frequencies(np.radians([[80.0]]), [8000.0], 1)
+    assert hz[0, 0] == pytest.approx(0.1305, rel=1e-3)
+    with pytest.raises(ea.EigassignError, match="buckles under its weight"):
+        model.frequencies(np.radians([[80.0]]), [60000.0], 1)
+
+
 def test_gravity_that_pulls_nowhere_is_none(tmp_path: Path) -> None:
     with pytest.raises(ea.CaseError, match="pulls nowhere: write none"):
         ea.load_case(boom(tmp_path, "[0, 0]"))
