@@ -10,7 +10,6 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, repeat
@@ -39,6 +38,7 @@ from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.local_coordinates import local_space
+from eigassign.modal.under_load import buckling
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -273,6 +273,7 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
     return {name: None if isinstance(n, str) else n for name, n in beams.items() if n is not None}
 
 
+STANDS = 0.8  # of the load that buckles: nearer no mesh is fine enough
 TRIAL = 2  # elements of a link left to auto, in the model that choices are first judged on
 
 
@@ -310,8 +311,12 @@ def settle_mesh(
 
 def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
     """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
-    n_q, modes = len(model.q_names), modes_at(model, x)
-    return np.asarray(model.discretisation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1))
+    n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
+    if kept.any():
+        x, modes = x[kept], modes_at(model, x[kept])
+        found = model.discretisation_error(x[:, :n_q], x[:, n_q:], modes)
+        error[kept] = found.max(axis=1)
+    return error
 
 
 def confirmed(
@@ -480,16 +485,22 @@ class DesignSamples:
 
 
 def standing(samples: DesignSamples, model: Model) -> DesignSamples:
-    """Those that neither fall nor buckle under a stated weight; all where none is left."""
-    if model.pencil.weight is None:
-        return samples
-    n_q, kept = len(model.q_names), []
-    for k, x in enumerate(samples.x):
-        with suppress(MechanismError):
-            model.require_standing(x[:n_q], x[n_q:])
-            kept.append(k)
-    some = kept or slice(None)
+    """Those `far_from_buckling`; all where none is."""
+    kept = far_from_buckling(model, samples.x)
+    some = kept if kept.any() else slice(None)
     return replace(samples, x=samples.x[some], samples=samples.samples[some])
+
+
+def far_from_buckling(model: Model, x: Floats) -> NDArray[np.bool_]:
+    """Mask of samples x (n, n_x) with stated weight up to `STANDS` of what buckles or falls."""
+    n_q, kept = len(model.q_names), np.ones(len(x), dtype=bool)
+    for k, one in enumerate(x if model.pencil.weight is not None else ()):
+        try:
+            model.require_standing(one[:n_q], one[n_q:])
+            kept[k] = buckling(model, one[:n_q], one[n_q:])[0] <= STANDS
+        except MechanismError:
+            kept[k] = False
+    return kept
 
 
 def at_corners(
