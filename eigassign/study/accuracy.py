@@ -32,7 +32,7 @@ from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.modal.slow_motion import motion_effect, stiffening
-from eigassign.study.planning import poses_at, travelled
+from eigassign.study.planning import far_from_buckling, poses_at, travelled
 from eigassign.study.results import MeshError
 from eigassign.study.scene import Scene
 from eigassign.study.weight import WeightStudy, study_weight
@@ -197,7 +197,10 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
     if model.reduced is None:
         return []
     few, different = spread(q, SAMPLES), np.unique(designs, axis=0)
-    error = np.array([model.truncation_error(few, y, modes) for y in different]).max(axis=(0, 1))
+    x = np.array([np.hstack([q, y]) for y in different for q in few])
+    x = x[far_from_buckling(model, x)]
+    n_q = len(model.q_names)
+    error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0, initial=0.0)
     where = f"{len(few)} poses" + (f" and {len(different)} designs" if len(different) > 1 else "")
     for mode, worst in zip(modes, error, strict=True):
         if not np.isfinite(worst):
