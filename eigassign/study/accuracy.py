@@ -198,10 +198,13 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
         return []
     few, different = spread(q, SAMPLES), np.unique(designs, axis=0)
     x = np.array([np.hstack([q, y]) for y in different for q in few])
-    x = x[far_from_buckling(model, x)]
+    x = x[far_from_buckling(model, x, most=1.0)]  # bounds may lie beyond what stands
     n_q = len(model.q_names)
-    error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0, initial=0.0)
-    where = f"{len(few)} poses" + (f" and {len(different)} designs" if len(different) > 1 else "")
+    if not len(x):
+        raise AccuracyError("no design stands that the reduced links could be judged at")
+    error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0)
+    stood = len(np.unique(x[:, n_q:], axis=0))
+    where = f"{len(few)} poses" + (f" and {stood} designs" if stood > 1 else "")
     for mode, worst in zip(modes, error, strict=True):
         if not np.isfinite(worst):
             raise AccuracyError(
@@ -309,7 +312,10 @@ def _stiffening(scene: Scene, part: NamedTrajectory, y: Floats) -> float:
 
 
 def _motion_study(change: float, limit: float, along: str) -> MotionStudy:
-    text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
+    text = (
+        "the neglected velocity terms and forces of the motion change a frequency by about "
+        f"{100 * change:.2g} %"
+    )
     if change <= limit:
         return MotionStudy(change, f"speed of the motion: {text} along {along}", None)
     warning = (

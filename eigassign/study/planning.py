@@ -491,13 +491,13 @@ def standing(samples: DesignSamples, model: Model) -> DesignSamples:
     return replace(samples, x=samples.x[some], samples=samples.samples[some])
 
 
-def far_from_buckling(model: Model, x: Floats) -> NDArray[np.bool_]:
-    """Mask of samples x (n, n_x) with stated weight up to `STANDS` of what buckles or falls."""
+def far_from_buckling(model: Model, x: Floats, most: float = STANDS) -> NDArray[np.bool_]:
+    """Mask of samples x (n, n_x) with stated weight up to ``most`` of what buckles or falls."""
     n_q, kept = len(model.q_names), np.ones(len(x), dtype=bool)
     for k, one in enumerate(x if model.pencil.weight is not None else ()):
         try:
             model.require_standing(one[:n_q], one[n_q:])
-            kept[k] = buckling(model, one[:n_q], one[n_q:])[0] <= STANDS
+            kept[k] = buckling(model, one[:n_q], one[n_q:])[0] <= most
         except MechanismError:
             kept[k] = False
     return kept

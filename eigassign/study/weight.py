@@ -89,7 +89,8 @@ def _row(
     rows = [SagRow(name, along) for name, along in zip(names, far, strict=True)]
     rows.sort(key=lambda one: -one.most)
     share = float(buckling(model, q, y).max())
-    return replace(row, sag=tuple(rows), turn=turn, buckling=share)
+    known = share if np.isfinite(share) else None
+    return replace(row, sag=tuple(rows), turn=turn, buckling=known)
 
 
 def weight_doubt(
