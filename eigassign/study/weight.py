@@ -100,6 +100,8 @@ def weight_doubt(
     said, change = ("", 0.0) if row is None else _worst(row, asked)
     if change > accepted:
         yield f"{said}, and {100 * accepted:.3g} % are accepted{_advice(file)}"
+    if row is None and file.mechanism.gravity != "none":
+        yield "what gravity changes is not known"
     if row is not None and _bent(row) > accepted:
         yield f"{_large(row)}, and {100 * accepted:.3g} % are accepted"
     if file.design.torque and file.mechanism.gravity is None:
