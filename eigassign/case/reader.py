@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ from eigassign.errors import CaseError, Problem
 from eigassign.files import CASE, raised
 
 MAX_DEPTH = 50  # levels; a case has ten, and Python calls itself a thousand times
+_TOO_DEEP = f"nested more than {MAX_DEPTH} levels deep"
 ENTRIES = 200_000  # of all lists and mappings: some seconds and 400 MB, whatever is wrong with them
 KeyPath = tuple[str | int, ...]
 Tree = Mapping[str, object]
@@ -144,6 +146,10 @@ def _syntax_problem(error: Exception, text: str, file: str) -> Problem:
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     parts = (getattr(error, "context", None), getattr(error, "problem", None))
     reason = ", ".join(p for p in parts if p) or "the file cannot be read"
+    if "nesting depth" in reason:  # PyYAML's own limit, from 6.0.4 on
+        depths = accumulate((c in "[{") - (c in "]}") for c in text)
+        deep = next((i for i, depth in enumerate(depths) if depth > MAX_DEPTH), 0)
+        return Problem(file, *_position(text[:deep]), "", _TOO_DEEP)
     return Problem(file, line, column, "", f"not valid YAML: {reason}{_hint(reason, text, line)}")
 
 
@@ -202,7 +208,7 @@ class _Builder:
             message = f"more than {raised(ENTRIES):g} entries: put long tables into CSV files"
             raise CaseError((Problem(self.file, at.line, at.column, "", message),))
         if len(path) > MAX_DEPTH:
-            message = f"nested more than {MAX_DEPTH} levels deep"
+            message = _TOO_DEEP
             raise CaseError((Problem(self.file, at.line, at.column, "", message),))
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
             self._refuse(
@@ -290,7 +296,7 @@ def read_mapping(given: Mapping[Any, Any], name: str) -> Source:
 def _plain(value: Any, path: KeyPath, found: list[Finding]) -> tuple[Any, Mark]:
     """``value`` as the reader of files would give it; what cannot be in a file is ``found``."""
     if len(path) > MAX_DEPTH:
-        found.append((path, f"nested more than {MAX_DEPTH} levels deep"))
+        found.append((path, _TOO_DEEP))
         return None, Mark(0, 0)
     if hasattr(value, "tolist"):  # an array, or a number out of one
         value = value.tolist()
