@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 
 
 def main() -> int:
     """Run the command line; Ctrl-C while it is still being imported ends it as later."""
-    gc.set_threshold(50_000)  # of the usual 700, a run of two_link takes 7 % more processor time
     try:
+        import gc
+
+        gc.set_threshold(50_000)  # of 700, a run of two_link takes 7 % more processor time
         from eigassign.cli import main as run
 
         code = run()

@@ -268,6 +268,10 @@ class Progress:
         self._note(found.index, found.status)
         self._lock.release(found.index)
 
+    def sync(self) -> None:
+        """Wait until all that was written down is on disk."""
+        self._manifest.sync()
+
     def _note(self, index: int, status: str) -> None:
         """Take note of how a case ended; of "" that it is to do."""
         if index in self._indices:

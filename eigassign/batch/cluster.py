@@ -7,6 +7,7 @@ another one. Workers share the folders of the cases and of the results.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
 from eigassign.batch.workers import Workers
-from eigassign.errors import StorageError, UsageError
+from eigassign.errors import EigassignError, StorageError, UsageError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -37,8 +38,9 @@ def cluster(address: str) -> Iterator[Workers]:
         message = "--scheduler needs dask.distributed: pip install 'eigassign[cluster]'"
         raise UsageError(message) from None
     try:
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are told here
         client = Client(address, timeout=10.0)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # no TLS, no ucx
         raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
     with client:
         folder = os.getcwd()
@@ -67,10 +69,18 @@ def _seen(folder: str) -> tuple[str, bool]:
 
 @contextlib.contextmanager
 def _executor(client: Client, folder: str, _slots: int) -> Iterator[Executor]:
-    """One that runs every task in ``folder``; on an error inside, what is in flight is given up."""
+    """One that runs every task in ``folder``; on an error inside, what is in flight is given up.
+
+    Raises StorageError where the scheduler is gone.
+    """
     pool = client.get_executor(pure=False)
     try:
         yield _There(pool, folder)
+    except Exception as error:  # a task that is cancelled, a stream that is closed
+        if isinstance(error, EigassignError) or client.status == "running":
+            raise
+        kept = "what is done is kept, and the same command goes on from there"
+        raise StorageError(f"--scheduler: the scheduler was lost: {kept}") from error
     finally:
         pool.shutdown(wait=False)  # and what is in flight is cancelled
 

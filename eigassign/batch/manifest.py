@@ -1,8 +1,9 @@
 """The index of a batch: batch.json says which plan it is of, manifest.jsonl how each case ended.
 
 A line is written as its case ends, in one piece, behind all others; so whoever is killed, and when,
-nothing before is lost. It ends with a hash of itself and of the plan: what was cut or edited, and
-what is of another batch, is no line. Of several lines of one case the last one counts.
+nothing before is lost; it is on disk within a second, which is what a power cut may cost. It ends
+with a hash of itself and of the plan: what was cut or edited, and what is of another batch, is no
+line. Of several lines of one case the last one counts.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import io
 import json
 import re
 import sys
+import threading
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -26,10 +28,11 @@ from eigassign.case.schema.sweep import MOST
 from eigassign.errors import StorageError, UsageError
 from eigassign.files import CASE, TABLE, json_value, name_of, opened, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of, to_line
-from eigassign.output.store.atomic import replace_synced
+from eigassign.output.store.atomic import replace_synced, sync_path
 
 HEADER, LINES = "batch.json", "manifest.jsonl"
 FORMAT = 1  # of batch.json: others are refused
+_SYNC_S = 1.0  # a sync takes some ms of a disk, a case of columns 25 ms
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,8 @@ class Manifest:
         """``appending``: entered while a line is written, where several processes write."""
         self.path = folder / LINES
         self._plan, self._appending = plan, appending
+        self._syncing: threading.Timer | None = None  # of the first line that may not be on disk
+        self._failed: OSError | None = None  # why it could not be
         self._read = 0  # bytes that were read
 
     def news(self) -> Iterator[Line]:
@@ -186,8 +191,33 @@ class Manifest:
                 if file.write(line) != len(line):
                     file.truncate(end)
                     raise StorageError(f"{self.path}: no space for another line")
+            if self._syncing is None:
+                self._syncing = threading.Timer(_SYNC_S, self._sync)
+                self._syncing.daemon = True
+                self._syncing.start()
+            if self._failed is not None:
+                raise self._failed
         except OSError as error:
             raise StorageError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+    def sync(self) -> None:
+        """Wait until all lines are on disk; raises StorageError where they cannot be."""
+        if self._syncing is not None:
+            self._syncing.cancel()
+        self._sync()
+        if self._failed is not None:
+            why = self._failed.strerror
+            raise StorageError(f"{self.path}: cannot be written: {why}") from self._failed
+
+    def _sync(self) -> None:
+        """Wait until all lines are on disk; `_failed` says why they are not."""
+        self._syncing = None  # before: a line that comes meanwhile may not be on disk
+        try:
+            sync_path(self.path)
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            self._failed = error
 
 
 def _cut(file: io.FileIO) -> int:

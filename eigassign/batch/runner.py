@@ -14,13 +14,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NoReturn
 
 from eigassign.batch.cases import Batch, Progress, summarise, take_up
 from eigassign.batch.lock import folder_lock
 from eigassign.batch.manifest import InOrder, read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.work import check_cases, outcome_of, run_cases
-from eigassign.batch.workers import Workers, run_tasks, this_machine
+from eigassign.batch.workers import Workers, run_all, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.store.run_record import MARKER
@@ -62,6 +63,7 @@ def run(
         try:
             _run(batch, progress, workers, on_outcome)
         finally:
+            progress.sync()
             rows = summarise(folder, batch.header, alone=lock.summaries)
     return rows
 
@@ -79,8 +81,7 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
     wrong: dict[int, tuple[Problem, ...]] = {}
     check = partial(check_cases, options=batch.options)
     where = workers if len(starts) > 1 else this_machine(1)
-    if run_tasks(where, tasks, check, lambda _task, found: wrong.update(found)):
-        raise StorageError("a process was killed while it checked variants: perhaps no memory")
+    run_all(where, tasks, check, lambda _task, found: wrong.update(found), _lost_in_check)
     if wrong:
         found = [(index, problem) for index in sorted(wrong) for problem in wrong[index]]
         problems = [variant_problem(plan, *each) for each in found[:10]]
@@ -88,14 +89,15 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
         raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
 
 
+def _lost_in_check(variant: Variant) -> NoReturn:
+    what = "the process that checked it was killed, perhaps for want of memory"
+    raise StorageError(f"{variant.path}: {variant.name}: {what}")
+
+
 def _run(
     batch: Batch, progress: Progress, workers: Workers, on_outcome: Callable[[CaseOutcome], None]
 ) -> None:
-    """Run cases until all are done, here or elsewhere.
-
-    When a worker dies, those of the cases in flight are run again, each alone: so the one at fault
-    shows, and the others lose nothing.
-    """
+    """Run cases until all are done, here or elsewhere."""
     cases, seconds = 0, 0.0
 
     def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
@@ -109,15 +111,15 @@ def _run(
         """Cases of a task: one until a case is done."""
         return int(max(1.0, workers.task_s * cases / max(seconds, 1e-9)))
 
-    why = "memory or time" if batch.options.seconds else "memory"
-    killed = f"the process that ran it was killed, perhaps for want of {why}"
+    def lose(variant: Variant) -> None:
+        why = "memory or time" if batch.options.seconds else "memory"
+        message = f"the process that ran it was killed, perhaps for want of {why}"
+        keep([variant], [outcome_of(variant, "error", message=message)])
+
     work = partial(run_cases, options=batch.options)
     while progress.done < progress.total:
         done = progress.done
-        suspects = run_tasks(workers, progress.tasks(size), work, keep)
-        for task in ([variant] for suspect in suspects for variant in suspect):
-            if run_tasks(workers, iter([task]), work, keep, slots=1):
-                keep(task, [outcome_of(task[0], "error", message=killed)])
+        run_all(workers, progress.tasks(size), work, keep, lose)
         if progress.done == done:
             time.sleep(0.5)  # other processes have the rest in flight
             progress.refresh()

@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -186,3 +186,26 @@ def run_tasks(
         except BrokenExecutor:
             pass
     return [*lost, *running.values()]
+
+
+def run_all(
+    workers: Workers,
+    tasks: Iterator[Sequence[T]],
+    work: Callable[[Sequence[T]], R],
+    keep: Callable[[Sequence[T], R], None],
+    lose: Callable[[T], None],
+) -> None:
+    """Work on all tasks; ``lose`` hears of the parts of which their process dies.
+
+    What was in flight when a process died is run again, each task alone, then each half of it: so
+    the part at fault shows, and the others lose nothing.
+    """
+    while suspects := run_tasks(workers, tasks, work, keep):
+        while suspects:
+            task = suspects.pop(0)
+            if run_tasks(workers, iter([task]), work, keep, slots=1):
+                half = len(task) // 2
+                if half:
+                    suspects[:0] = [task[:half], task[half:]]
+                else:
+                    lose(task[0])
