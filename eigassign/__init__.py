@@ -35,12 +35,12 @@ one function, `eigassign.pipeline.run.solve_case`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from eigassign._version import __version__
-from eigassign.errors import CaseError, EigassignError
 
+TYPE_CHECKING = False  # `typing` and `errors` take 30 ms in which `__main__` catches no Ctrl-C yet
 if TYPE_CHECKING:
+    from typing import Any
+
     from eigassign.api import (
         Box,
         Case,
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
         update,
         urdf_mapping,
     )
+    from eigassign.errors import CaseError, EigassignError
 
 __all__ = [
     "Box",
@@ -80,9 +81,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import the Python face on first use, so that ``eigassign --help`` is instant."""
     if name in __all__:
-        from eigassign import api
+        from eigassign import api, errors
 
-        return getattr(api, name)
+        return getattr(errors if name in vars(errors) else api, name)
     raise AttributeError(f"module 'eigassign' has no attribute {name!r}")
 
 

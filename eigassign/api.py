@@ -28,7 +28,8 @@ from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
 from eigassign.series.multi_index import LowerSet
-from eigassign.study import built_case, drawing
+from eigassign.study import built_case
+from eigassign.study.pictures import drawing
 from eigassign.study.results import ModePictures
 
 if TYPE_CHECKING:

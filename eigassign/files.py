@@ -28,6 +28,7 @@ VARIABLE = "EIGASSIGN_LIMITS"
 CASE = 10_000_000  # bytes of a case file
 TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
 MATRIX = 1_000_000_000  # of a matrix of a superelement
+MESH = 200_000_000  # of a mesh of a solid: 10⁵ elements take some 20 MB
 STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
 _PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
 _KINDS = {

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,12 @@ class Section:
 def keys() -> str:
     """The page of all keys."""
     found = list(sections("", "Top level", [("", SCHEMA)], 2, set()))
-    headings = [s.heading for s in found]
+    headings: list[str] = []
+    for k, section in enumerate(found):  # alike below two kinds: told apart by what they need
+        if section.heading in headings:
+            needed = section.node.get("required", ["other keys"])[0]
+            found[k] = replace(section, heading=f"{section.heading}, with {needed}")
+        headings.append(found[k].heading)
     assert len(headings) == len(set(headings)), "two headings are alike"
     anchors = {title: anchor(s.heading) for s in reversed(found) for title in s.kinds}
     parts = [KEYS.format(units=units()), *(shown(section, anchors) for section in found)]
@@ -107,11 +112,13 @@ def sections(
         own = {k: v for k, v in node["properties"].items() if k not in others}
         if isinstance(entries := node.get("additionalProperties"), dict):
             own = {"<name>": entries, **own}
-        yield from below(path, own, level + several + 1 if path else 2, seen)
+        yield from below(path, own, level + several + 1 if path else 2, seen, title)
 
 
-def below(path: str, properties: Node, level: int, seen: set[str]) -> Iterator[Section]:
-    """The sections of what stands below some keys."""
+def below(
+    path: str, properties: Node, level: int, seen: set[str], kind: str = ""
+) -> Iterator[Section]:
+    """The sections of what stands below some keys; a heading that is taken says of which kind."""
     for key, node in properties.items():
         names = [name for name in dict.fromkeys(references(node)) if name not in seen]
         seen |= set(names)
@@ -119,6 +126,8 @@ def below(path: str, properties: Node, level: int, seen: set[str]) -> Iterator[S
             named = ".<name>" if "additionalProperties" in node else ""
             whole = f"{path}.{key}{'[]' if node.get('type') == 'array' else named}".strip(".")
             heading = f"entries of {path}" if key == "<name>" else key
+            heading = f"{heading}, {kind}" if f"# {heading}" in seen else heading
+            seen.add(f"# {heading}")
             yield from sections(whole, heading, list(told_apart(names)), level, seen)
 
 
@@ -139,7 +148,10 @@ def told_apart(names: list[str]) -> Iterator[tuple[str, Node]]:
     for node in nodes:
         others = {k for other in nodes if other is not node for k in other.get("required", ())}
         words = [f"{k}: {v['const']}" for k, v in node["properties"].items() if "const" in v]
-        words += [f"with {k}" for k in node.get("required", ()) if k not in others]
+        required = node.get("required", ())
+        words += [f"with {k}" for k in required if k not in others] or [
+            f"with {k}" for k in required
+        ]
         yield next(iter(words), ""), node
 
 

@@ -27,7 +27,6 @@ OWNERS = {
     "click": {"cli"},
     "sklearn": {"chart"},
     "distributed": {"batch"},
-    "yourdfpy": {"pipeline"},
 }
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import eigassign as ea
 from eigassign.output import thumbnail
-from eigassign.study.drawing import draw_modes
+from eigassign.study.pictures.drawing import draw_modes
 from eigassign.study.planning import with_middle_loads
 
 HERE = Path(__file__).parent

@@ -12,16 +12,22 @@ from typing import Any
 from eigassign.brief import cut, named
 from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
-from eigassign.case.rules.properties import property_at, value_at
-from eigassign.case.schema.design import Design
+from eigassign.case.rules.properties import (
+    is_place,
+    least_and_largest,
+    properties_of,
+    property_at,
+    value_at,
+)
+from eigassign.case.schema.design import Design, Parameter
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
-from eigassign.case.schema.targets import TargetForm
-from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
+from eigassign.case.schema.targets import AnyTarget, TargetForm
+from eigassign.case.schema.trajectory import Added, TrajectoryForm, named_trajectories
 from eigassign.errors import CaseError, Problem
 
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
@@ -29,8 +35,12 @@ _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
 
 @dataclass(frozen=True)
 class Load:
-    """A property that trajectories set, in SI: as the file writes it, and along each of them."""
+    """A property that trajectories set, in SI: as the file writes it, and along each of them.
 
+    Of what is a design parameter it is what they add: 0 as the file writes it.
+    """
+
+    path: str
     written: float
     along: tuple[float, ...]  # one for each trajectory, in the order of the file
     unit: str
@@ -76,6 +86,18 @@ class CaseFile:
             f"<CaseFile {str(self.path)!r}: {cut(self.title, 80)}; q = {q}, y = {y}, {targets}>"
         )
 
+    @property
+    def asked(self) -> tuple[tuple[str, AnyTarget], ...]:
+        """What is asked of modes, each with its key path: the mode to be highest, the targets."""
+        objective = self.assignment.objective
+        aim = () if isinstance(objective, str) else (("assignment.objective", objective.target),)
+        return (*aim, *((f"targets[{k}]", target) for k, target in enumerate(self.targets)))
+
+    @property
+    def has_question(self) -> bool:
+        """True where a design is asked for: by targets, or an objective that needs none."""
+        return bool(self.asked) or self.assignment.objective == "lightest"
+
     def problem(self, key_path: str, message: str) -> Problem:
         """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,
         ``targets[0].mode``), or of the nearest key above it that the file has.
@@ -114,9 +136,10 @@ class CaseFile:
     @cached_property
     def design_quantities(self) -> tuple[Quantity, ...]:
         """Dimension and limits of each design parameter, in the order of y."""
-        return self._quantities([p.parameter for p in self.design.parameters.values()])
+        return self.quantities([p.parameter for p in self.design.parameters.values()])
 
-    def _quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
+    def quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
+        """Dimension and limits of the property at each path."""
         tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
         found = (property_at(tree, path) for path in paths)
         return tuple(each or Quantity() for each in found)
@@ -128,23 +151,27 @@ class CaseFile:
 
     @cached_property
     def loads(self) -> Mapping[str, Load]:
-        """Properties that trajectories `set`, by path: what q holds beside the coordinates."""
-        forms = [form for *_, form in self.trajectories]
-        paths = tuple(dict.fromkeys(path for form in forms for path in form.set))
-        if not paths:
-            return {}
-        written = {path: self.value_at(path) for path in paths}
-        return {
-            path: Load(own, tuple(form.set.get(path, own) for form in forms), unit)
-            for (path, own), unit in zip(
-                written.items(), _units(self._quantities(paths)), strict=True
-            )
-        }
+        """What trajectories `set`, by path: what q holds beside the coordinates.
+
+        What they add to a design parameter is `<path>.add`.
+        """
+        sets = [form.set for *_, form in self.trajectories]
+        paths = tuple(dict.fromkeys(path for own in sets for path in own))
+        of_design = {path for p in self.design.parameters.values() for path in p.factors}
+        found = {}
+        for path, unit in zip(paths, _units(self.quantities(paths)), strict=True):
+            own = 0.0 if path in of_design else self.value_at(path)
+            values = (each.get(path, own) for each in sets)
+            along = tuple(own + v.add if isinstance(v, Added) else float(v) for v in values)
+            found[f"{path}.add" if path in of_design else path] = Load(path, own, along, unit)
+        return found
 
     @property
     def load_quantities(self) -> tuple[Quantity, ...]:
-        """Dimension and limits of each of the loads, in their order."""
-        return self._quantities(self.loads)
+        """Dimension and limits of each of the loads, in their order; an amount added has none."""
+        found = self.quantities(load.path for load in self.loads.values())
+        pairs = zip(self.loads.items(), found, strict=True)
+        return tuple(q if name == load.path else Quantity(q.dimension) for (name, load), q in pairs)
 
     @property
     def q_units(self) -> tuple[str, ...]:
@@ -152,10 +179,28 @@ class CaseFile:
         return (*self.coordinate_units, *(load.unit for load in self.loads.values()))
 
     @property
+    def design_paths(self) -> frozenset[str]:
+        """The paths of the properties that the design sets."""
+        return frozenset(self.design.varied)
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """Least and largest value of each load, then of each design parameter."""
+        of_design = ((p.min, p.max) for p in self.design.parameters.values())
+        return (*(load.range for load in self.loads.values()), *of_design)
+
+    @cached_property
+    def varied(self) -> Mapping[str, tuple[tuple[int, float], ...]]:
+        """Each property that varies, by path, as Σ factor · entry of the loads and the design."""
+        found = {load.path: ((k, 1.0),) for k, load in enumerate(self.loads.values())}
+        for path, ((k, factor),) in self.design.varied.items():
+            found[path] = (*found.get(path, ()), (len(self.loads) + k, factor))
+        return found
+
+    @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Least and largest value of each property that varies: loads, then design parameters."""
-        of_design = {p.parameter: (p.min, p.max) for p in self.design.parameters.values()}
-        return {path: load.range for path, load in self.loads.items()} | of_design
+        """Least and largest value of each property that varies, by path."""
+        return {path: least_and_largest(terms, self.box) for path, terms in self.varied.items()}
 
     def value_at(self, path: str) -> float:
         """The number that the file gives to the property at ``path``, in SI."""
@@ -171,12 +216,29 @@ class CaseFile:
         """The case with these values (SI) of its design parameters written into the mechanism."""
         mechanism, coordinates = self.mechanism, self.coordinates
         for column, value in zip(self.design.parameters.values(), y, strict=True):
-            head, *rest = column.parameter.split(".")
-            if head == "coordinates":
-                coordinates = _with_value(coordinates, rest, float(value))
-            else:
-                mechanism = _with_value(mechanism, [head, *rest], float(value))
+            for path, factor in column.factors.items():
+                head, *rest = path.split(".")
+                if head == "coordinates":
+                    coordinates = _with_value(coordinates, rest, factor * float(value))
+                else:
+                    mechanism = _with_value(mechanism, [head, *rest], factor * float(value))
         return replace(self, mechanism=mechanism, coordinates=coordinates)
+
+    def with_every_property(self, places: bool = True) -> CaseFile:
+        """The case with all numbers that may vary, and are not 0, as parameters at their values.
+
+        Without those that trajectories set, without limits, and where asked without ``places``:
+        lengths, places and angles.
+        """
+        tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
+        entries = {
+            path: Parameter(parameter=path, min=value, max=value)
+            for path in properties_of(tree)
+            if path not in self.loads
+            and (places or not is_place(path) or f"{path}.add" in self.loads)
+            if (value := self.value_at(path))
+        }
+        return replace(self, design=Design.model_construct(entries=FrozenDict(entries)))
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
@@ -190,6 +252,9 @@ def _with_value(part: Any, path: Sequence[str], value: float) -> Any:
     key, *rest = path
     if isinstance(part, Mapping):
         return FrozenDict({**part, key: _with_value(part[key], rest, value)})
+    if isinstance(part, tuple):
+        k = int(key)
+        return (*part[:k], _with_value(part[k], rest, value), *part[k + 1 :])
     return part.model_copy(update={key: _with_value(getattr(part, key), rest, value)})
 
 

@@ -23,10 +23,12 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import Source, read_mapping, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
 from eigassign.case.rules.files import NamedFile, named_files, not_allowed, unreadable
+from eigassign.case.rules.listed import with_listed_choices
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
-    bounds_hold_no_impossible_section,
-    load_cases_have_possible_sections,
+    bounds_hold_nothing_impossible,
+    load_cases_set_nothing_impossible,
+    parameters_agree_with_the_file,
     starts_outside,
 )
 from eigassign.case.rules.values import completed
@@ -131,15 +133,20 @@ def checked(
         source = replace(source, tree=with_values(source.tree, values))
     if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
         raise CaseError(tuple(crowded))
-    document, schema_findings = validated(completed(source.tree, path.parent))
-    findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *schema_findings]
     named = named_files(source.tree, path.parent)
-    forbidden = [] if allow_outside else [*not_allowed(named, path.parent)]
-    findings += forbidden or unreadable([each for each in named if not each.spare])
+    bad = [] if allow_outside else [*not_allowed(named, path.parent)]
+    bad = bad or [*unreadable([each for each in named if not each.spare])]
+    unread = {place for place, _ in bad}
+    tree, more = with_listed_choices(source.tree, [n for n in named if n.path not in unread])
+    source, unread = replace(source, tree=tree), unread | {place for place, _ in more}
+    document, schema_findings = validated(completed(source.tree, path.parent))
+    findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *bad, *more]
+    findings += [(place, why) for place, why in schema_findings if place not in unread]
     if document is not None:
-        parts, motions = (document.mechanism, document.design), document.trajectory
-        findings += bounds_hold_no_impossible_section(*parts)
-        findings += load_cases_have_possible_sections(*parts, named_trajectories(motions))
+        tree, motions = source.tree, named_trajectories(document.trajectory)
+        findings += parameters_agree_with_the_file(tree, document)
+        findings += bounds_hold_nothing_impossible(tree, document)
+        findings += load_cases_set_nothing_impossible(tree, document, motions)
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(_first(list(dict.fromkeys(problems))))

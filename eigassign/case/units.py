@@ -1,14 +1,15 @@
 """Quantities as people write them (`30 mm`, `69 GPa`, `104.1 deg`) → SI numbers, dimension-checked.
 
 A bare number is SI already. Angles and cycles are dimensions of their own, so that nothing converts
-between rad/s, 1/s and Hz silently: 5 rpm is neither 5 Hz nor 0.52 Hz here, it is an error.
+between rad/s, 1/s and Hz silently. 5 rpm is 1/12 Hz where a speed of rotation is meant, as by an
+edge of a band; elsewhere it is neither that nor 0.52 rad/s, it is an error.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -92,9 +93,11 @@ _DIMENSIONS = (
     Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2", 1e-6, 1e24),
     Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad", 1e-12, 1e6),
     Dimension(
-        "rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/deg", 1e-24, 1e24
+        "rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/arcmin", 1e-24, 1e24
     ),
     Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm", 1e-24, 1e24),
+    Dimension("compliance", (-1, 0, 2, 0, 0), "m/N", "mm/N, um/N", 1e-24, 1e24),
+    Dimension("transmission", (0, -1, 0, 1, 0), "rad/m", "rad/mm, deg/mm", 1e-12, 1e12),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
     Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz", 1e-12, 1e15),
     Dimension("acceleration", (0, 1, -2, 0, 0), "m/s2", "mm/s2", 1e-12, 1e9),
@@ -108,6 +111,7 @@ _DIMENSIONS = (
     Dimension("mass per length", (1, -1, 0, 0, 0), "kg/m", "g/mm"),
 )
 DIMENSIONS = {d.name: d for d in _DIMENSIONS}
+SPEED = replace(DIMENSIONS["frequency"], name="frequency or speed of rotation", examples="kHz, rpm")
 PLAIN = DIMENSIONS["fraction"]
 _BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
 
@@ -118,6 +122,7 @@ _HANDY = {  # units that people read, the largest first
     "m4": {"m4": 1.0, "cm4": 1e-8, "mm4": 1e-12},
     "Pa": {"GPa": 1e9, "MPa": 1e6, "Pa": 1.0},
     "N/m": {"MN/m": 1e6, "kN/m": 1e3, "N/m": 1.0},
+    "m/N": {"mm/N": 1e-3, "um/N": 1e-6, "nm/N": 1e-9},
     "N m/rad": {"MN m/rad": 1e6, "kN m/rad": 1e3, "N m/rad": 1.0},
     "kg m2": {"kg m2": 1.0, "kg cm2": 1e-4},
 }
@@ -160,8 +165,11 @@ UNITS: dict[str, Unit] = {
     "h": Unit(Fraction(3600), (0, 0, 1, 0, 0)),
     "deg": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
     "°": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
+    "arcmin": Unit(Fraction(1, 10_800), (0, 0, 0, 1, 0), pi=1),
+    "kgf": Unit(Fraction(980_665, 10**5), (1, 1, -2, 0, 0)),
     "%": Unit(Fraction(1, 100), _PLAIN),
 }
+_RPM = Unit(Fraction(1, 60), SPEED.exponents)
 for _unit, _prefixes, _exponents in _PREFIXED:
     UNITS[_unit] = Unit(Fraction(1), _exponents)
     for _p in _prefixes.split():
@@ -274,7 +282,7 @@ def _checked(text: str, unit_text: str, dimension: Dimension | None) -> Unit:
     spelt = " ".join(f"{n}^{e}" for n, e in names if e) or "1"
     name = found.name if found else f"of dimension {spelt}"
     hint = ""
-    if dimension.name == "frequency" and name == "angular rate":
+    if dimension.exponents == SPEED.exponents and name == "angular rate":
         hint = "; an angular rate is never converted silently: divide by 2π and write Hz"
     raise QuantityError(f"{_expected(dimension)}, got {shown(text)}, which is {name}{hint}")
 
@@ -299,12 +307,16 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
 def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
     match = _FACTOR.fullmatch(factor)
     symbol = match.group(1) if match else factor
+    if symbol == "rpm" and dimension in (SPEED, None):
+        return _RPM
     if match is None or symbol not in UNITS:
         raise QuantityError(_unknown(symbol, text, dimension))
     return UNITS[symbol].power(int(match.group(2) or 1))
 
 
 def _unknown(symbol: str, text: str, dimension: Dimension | None) -> str:
+    if symbol.lower() == "rpm" and dimension == SPEED:
+        return f"unknown unit {shown(symbol)}; did you mean 'rpm'?"
     if symbol.lower() in {"rpm", "rev", "turn", "turns"}:
         return _TURNS
     splits = ((symbol[:i], symbol[i:]) for i in range(1, len(symbol)))

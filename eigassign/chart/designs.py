@@ -24,8 +24,8 @@ from eigassign.chart.results import DesignRun, excess_over
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.study.design.one_shot import assign_design
-from eigassign.study.design.optimum import find_optimum
-from eigassign.study.design.variants import Task, variant_of
+from eigassign.study.design.search.optimum import find_optimum
+from eigassign.study.design.search.variants import Task, variant_of
 from eigassign.study.planning import SEED
 from eigassign.study.scene import Expansions, Scene
 
@@ -53,7 +53,8 @@ def chart_designs(
     wanted, design = scene.file.targets, scene.file.design
     plain = (t.is_goal and not (t.followed or t.during) for t in wanted)
     limited = bool(design.catalogues or design.mass or design.torque)
-    limited = limited or scene.file.assignment.objective != "least_squares"
+    keys = scene.file.assignment
+    limited = limited or keys.objective != "least_squares" or keys.robust
     if not (wanted and all(plain) and len(lower) and np.isfinite(upper - lower).all()) or limited:
         return (), ()
     if scene.path.follows_design:
@@ -138,7 +139,8 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
         if value < best[0] and np.all(missed <= 1e-8 * (1.0 + np.abs(row))):  # rounding
             best = value, inside
             trace.append((time.process_time() - begun, value))
-        slopes = 2.0 * (seen.residual @ seen.slopes)[box.free] * box.width + box.prices
+        slopes = 2.0 * (seen.residual @ seen.slopes)[box.free] * box.width
+        slopes += problem.cost_slopes(y)[box.free] * box.width
         return (value, slopes) if "jac" in how else value
 
     limits = (LinearConstraint(box.rows, box.row_lower, box.row_upper),) if len(box.rows) else ()

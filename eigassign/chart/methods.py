@@ -33,7 +33,7 @@ from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.surrogate import Surrogate
 from eigassign.series.multi_index import total_degree
 from eigassign.series.power_series import monomials
-from eigassign.study.drawing import spread_samples
+from eigassign.study.pictures.drawing import spread_samples
 from eigassign.study.planning import choose_order
 
 Floats = NDArray[np.float64]

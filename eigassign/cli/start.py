@@ -24,6 +24,7 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
     "four_bar": "a closed loop",
     "gantry": "a carriage that travels along a girder",
     "imported_part": "matrices from another finite-element program",
+    "casting": "a part by its mesh, from gmsh, Abaqus or Nastran",
 }
 
 
@@ -35,32 +36,51 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
     )
 )
 @click.argument(
-    "template", type=click.Choice(list(TEMPLATES)), default="planar_arm", metavar="[TEMPLATE]"
+    "template", type=click.Choice(list(TEMPLATES)), required=False, metavar="[TEMPLATE]"
+)
+@click.option(
+    "--urdf", type=arguments.PATH, help="Write the case of this robot (default: none, a template)."
 )
 @click.option(
     "--out", type=arguments.PATH, help="Case file, or its folder (default: <template>.yaml)."
 )
-def init(template: str, out: Path | None) -> int:
+def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
     """Write a commented case file that runs as it is, to start from.
 
-    TEMPLATE is planar_arm unless another is named. Files that exist are never overwritten.
+    TEMPLATE is planar_arm unless another is named. With --urdf the case is a robot from a URDF
+    file, and what URDF does not know is listed with its lines. Files that exist are never
+    overwritten.
     """
-    case = Path(template) if out is None else out / template if out.is_dir() else out
+    if template is not None and urdf is not None:
+        raise UsageError(f"name a template or --urdf, not both: {template} is a robot of its own")
+    name = template or "planar_arm" if urdf is None else urdf.stem
+    case = Path(name) if out is None else out / name if out.is_dir() else out
     case = case if case.suffix else case.with_name(f"{case.name}.yaml")
-    files = {case: STARTERS / f"{template}.yaml"}
-    beside = sorted(path for path in STARTERS.glob(f"{template}/*"))
-    files |= {case.parent / template / path.name: path for path in beside}
-    for path in files:
+    if urdf is None:
+        beside = sorted(path for path in STARTERS.glob(f"{name}/*"))
+        files = {case: STARTERS / f"{name}.yaml"}
+        files |= {case.parent / name / path.name: path for path in beside}
+        texts = {
+            path: source.read_text(encoding="utf-8").replace(f" {name}.yaml", f" {quoted(case)}")
+            for path, source in files.items()
+        }
+        others = ", ".join(each for each in TEMPLATES if each != name)
+        after = [f"other templates: {others}"]
+    else:
+        from eigassign.pipeline.urdf import urdf_case
+
+        texts, after = {}, []
+        texts[case], asked = urdf_case(urdf, str(case))
+        after = ["to fill in:", *asked]
+    for path in texts:
         if path.exists() or path.is_symlink():
             raise StorageError(f"{path} exists and is left alone: choose another name with --out")
-    for path, source in files.items():
+    for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = source.read_text(encoding="utf-8").replace(f" {template}.yaml", f" {quoted(case)}")
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
         show(f"{path} written")
-    others = ", ".join(name for name in TEMPLATES if name != template)
-    show(f"next: eigassign check {quoted(case)} --draw", f"other templates: {others}")
+    show(f"next: eigassign check {quoted(case)} --draw", *after)
     return 0
 
 

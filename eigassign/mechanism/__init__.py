@@ -2,11 +2,14 @@
 
 Read in this order; each imports only from those above it:
 
+    imports             parts from other programs: matrices, nodes, units
+    solids              meshes of solid parts: files, elements, surfaces
     kinematics          the rigid links: tree, joints, twists T(q, y), closed loops
     elements            each link as a finite-element mesh in its own frame: k(y), m(y), N(y)
     assembly            K = Bᵀ k B and M = Bᵀ m B with B = [Q, N T], affine in scalar functions
     inverse_kinematics  the coordinates q along a path of the tip
     trajectory          q(t) from samples, files, points or tip paths
+    forces              forces at nodes, and the weight, on the unknowns of the pencil
     drives              torques and forces that the drives exert along trajectories
 """
 
@@ -26,10 +29,12 @@ __all__, __getattr__, __dir__ = face(
         "assembly.dynamics.velocity_terms": "velocity_terms",
         "drives": "DriveForces drive_forces",
         "elements.beam": "bending_mass bending_shapes fields",
-        "elements.matrix_file": "read_matrix",
+        "elements.free_part": "free_part_lines part_lines",
         "elements.mesh": "total",
         "elements.sections": "section_values",
-        "elements.sparse_factor": "factorise kept_factor",
+        "elements.sparse_factor": "factorise kept_factor largest_beside",
+        "imports.parts": "imported_part",
+        "imports.reading": "read_matrix",
         "inverse_kinematics.chain": "TipChain TipEvaluation reduced tip_chain",
         "inverse_kinematics.follow": "follow",
         "inverse_kinematics.tip_path": ("Course planar_attitude spatial_attitude spline straight"),
@@ -40,6 +45,9 @@ __all__, __getattr__, __dir__ = face(
         "kinematics.parameters": "node_position parameters",
         "kinematics.topology": "JointEdge",
         "kinematics.travel_limits": "resting_pose",
+        "solids.mesh_file": "read_mesh",
+        "solids.part": "solid_part",
+        "solids.surfaces": "Coupling joined",
         "trajectory.csv": "read_samples",
         "trajectory.timing": "timing_law",
         "trajectory.trajectory": ("NamedTrajectory Trajectories Trajectory build_trajectory rates"),

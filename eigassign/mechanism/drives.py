@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.mechanism.assembly.build import gravity, rigid_links
+from eigassign.mechanism.assembly.build import drive_value, gravity, rigid_links
 from eigassign.mechanism.assembly.congruence import inertia
 from eigassign.mechanism.assembly.dynamics.velocity_terms import IMAGINARY
 from eigassign.mechanism.kinematics.forward import Kinematics
@@ -151,10 +151,8 @@ def drive_forces(case: CaseFile, parameters: ModelParameters, motion: Kinematics
             pull[:3, 0] = multiply(placement.world_rotation.T, g)
         parts.append(np.concatenate([placement.twist, pull, J], axis=1))
     drives = np.zeros(len(case.coordinates), dtype=object)
-    for i, (name, coordinate) in enumerate(case.coordinates.items()):
-        given = getattr(coordinate.drive, "inertia", None)
-        if given is not None:
-            drives[i] = parameters.number(f"coordinates.{name}.drive.inertia", given)
+    for i, name in enumerate(case.coordinates):
+        drives[i] = drive_value(case, parameters, name, "inertia") or 0.0
     shape = (-1, 6, len(drives) + 7)
     known = parameters.with_passive(moving.passive)
     return DriveForces(known.compiled(np.array(parts, dtype=object).reshape(shape), drives), known)

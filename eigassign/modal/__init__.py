@@ -15,6 +15,7 @@ In reading order:
     discretisation  what a mesh leaves out, bounded
     model        the model of a case, as notebooks meet it
     under_load   what the weight changes by its forces, and by bending the links
+    statics      what gives way under forces at nodes and the weight, with slopes
     slow_motion  how much the neglected motion would move the frequencies
     adaptive     the least mesh, order and reduction that meet an accuracy
     fit          polynomials through exact frequencies, with an error estimate
@@ -54,6 +55,7 @@ __all__, __getattr__, __dir__ = face(
         "reduced.residual": "half_solve residual_gram residual_terms",
         "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes stiffening theta_in_time",
+        "statics": "Flexibility compliances sags",
         "storage": (
             "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
         ),

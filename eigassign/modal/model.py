@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.build import build_pencil, refined, with_reduction
+from eigassign.mechanism.assembly.build import build_pencil, has_tapers, refined, with_reduction
 from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
-from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks
+from eigassign.mechanism.assembly.energies import EnergyForms, energy_forms
+from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks, SolidLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.total_mass import TotalMass
@@ -26,7 +27,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
-from eigassign.modal.discretisation import discretisation_error
+from eigassign.modal.discretisation import discretisation_error, solid_error
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing
 from eigassign.modal.exact.tracking import Tracked, track
@@ -68,6 +69,7 @@ class Model:
     y_names: tuple[str, ...]
     reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
     meshed: MeshedLinks | None = None  # the links that consist of beams
+    solids: SolidLinks | None = None
 
     def __repr__(self) -> str:
         return (
@@ -79,6 +81,16 @@ class Model:
     def n_rigid(self) -> int:
         """Number of rigid-body modes: the free coordinates."""
         return len(self.pencil.rigid)
+
+    @property
+    def is_exact(self) -> bool:
+        """True where links are rigid or superelements as they are: neither mesh nor reduction."""
+        return self.meshed is None and self.solids is None and self.reduced is None
+
+    @property
+    def has_bounds(self) -> bool:
+        """True where errors of the mesh are bounds; under gravity, and of solids, estimates."""
+        return self.pencil.weight is None and self.solids is None
 
     @property
     def n_dof(self) -> int:
@@ -101,6 +113,18 @@ class Model:
         factors = (2.0,) if self.pencil.rails is None else (2.0, 4.0)
         finer = [self._rebuilt(refined(self._unreduced, factor)[0]) for factor in factors]
         return (self.whole, *finer)
+
+    @cached_property
+    def finer(self) -> tuple[CaseFile, Pencil] | None:
+        """The case, K and M with twice the elements and no link reduced.
+
+        None where that gives way alike: beams of one section are exact under forces at their ends.
+        """
+        case = self.poses.case
+        if self.pencil.weight is None and self.reduced is None and not has_tapers(case):
+            return None
+        finer = refined(self._unreduced, 2.0)[0]
+        return finer, self.refinements[1] if self.refinements else self._rebuilt(finer)
 
     @property
     def _unreduced(self) -> CaseFile:
@@ -174,6 +198,11 @@ class Model:
         return self.total_mass(self._design(y))[1]
 
     @cached_property
+    def energies(self) -> EnergyForms:
+        """The energies of modes by links, drives, springs and bodies, `EnergyForms`."""
+        return energy_forms(self.poses.case, self.poses.parameters, self.motion)
+
+    @cached_property
     def drives(self) -> DriveForces:
         """What the drives exert along trajectories, `DriveForces`."""
         return drive_forces(self.poses.case, self.poses.parameters, self.motion)
@@ -202,9 +231,16 @@ class Model:
     ) -> Floats:
         """By how much the mesh raises frequencies at most, relative, (n_samples, n_modes).
 
-        Zero without beams; infinite where the mesh is so coarse that nothing can be said. Under
-        gravity an estimate from finer meshes.
+        Zero without beams and solids; infinite where the mesh is so coarse that nothing can be
+        said. Under gravity an estimate from finer meshes; with solids one from recovered stresses.
         """
+        error = self.beam_error(q, y, modes)
+        if self.solids is None:
+            return error
+        return (1.0 + error) * (1.0 + solid_error(self.solids, self.x(q, y), modes)) - 1.0
+
+    def beam_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
+        """The part of the beams in `discretisation_error`."""
         x = self.x(q, y)
         if self.meshed is None:
             return np.zeros((len(x), len(modes)))

@@ -62,6 +62,16 @@ def mode_slopes(
     there = found.lam.shape[1]
     pairs = [(k, k) for k in range(there)]
     pairs += [(k, k + 1) for k in range(there - 1) if mixed]
+    i, j = map(list, zip(*pairs, strict=True))
+    lam = 0.5 * (found.lam[:, i] + found.lam[:, j])
+    result = works_changed(pencil, x, found.phi[..., i], found.phi[..., j], lam, wanted)
+    return result[:, :there], result[:, there:]
+
+
+def works_changed(
+    pencil: Pencil, x: Floats, left: Floats, right: Floats, lam: Floats, wanted: ArrayLike
+) -> Floats:
+    """lᵀ (∂K/∂x − λ ∂M/∂x) r (n, m, n_x) of vectors l and r (n, n_dof, m) at x, with λ (n, m)."""
     along = np.flatnonzero(wanted)
     rates = pencil.theta_slopes(x, along)
     moving = np.flatnonzero(np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0)
@@ -69,16 +79,14 @@ def mode_slopes(
     entries = np.flatnonzero(np.diff(stiffness.indptr) + np.diff(mass.indptr))
     stiffness, mass = stiffness[entries], mass[entries]
     rows, columns = pencil.rows[entries], pencil.columns[entries]
-    result = np.zeros((len(x), len(pairs), x.shape[1]))
+    result = np.zeros((*lam.shape, x.shape[1]))
     for part in chunks(np.arange(len(x)), max(len(entries), 1)):
         own = rates[:, moving][:, :, part]
-        for k, (i, j) in enumerate(pairs):
-            left, right = found.phi[part, :, i], found.phi[part, :, j]
-            products = left[:, rows] * right[:, columns]
-            lam = 0.5 * (found.lam[part, i] + found.lam[part, j])[:, None]
-            forms = products @ stiffness - lam * (products @ mass)
+        for k in range(lam.shape[1]):
+            products = left[part, :, k][:, rows] * right[part, :, k][:, columns]
+            forms = products @ stiffness - lam[part, k, None] * (products @ mass)
             result[part[:, None], k, along] = np.einsum("nt,jtn->nj", forms, own)
-    return result[:, :there], result[:, there:]
+    return result
 
 
 def in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:

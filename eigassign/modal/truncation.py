@@ -34,6 +34,7 @@ from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.assembly.inside_links import ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import largest_left_out
+from eigassign.mechanism.elements.mesh import total
 from eigassign.mechanism.elements.sparse_factor import factorise, kept_factor
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes
 from eigassign.modal.exact.sparse import principal
@@ -89,6 +90,7 @@ class LeftOut:
     def __init__(self, parts: ReducedLinks) -> None:
         self.parts, self.design = parts, np.full(1, np.nan)
         self.interiors: list[_LinkInterior] = []
+        self.known: dict[int, tuple[bytes, _LinkInterior]] = {}
 
     def at(self, x: Floats, z: Floats, mu: Floats) -> tuple[Floats, float]:
         """G (count, count) of modes z, ‖z‖_K = 1, at x (n_x,), and β."""
@@ -96,7 +98,7 @@ class LeftOut:
         if not np.array_equal(x[pencil.n_joints :], self.design):
             self.design = x[pencil.n_joints :]
             every = range(len(self.parts.links))
-            self.interiors = [_interior(self.parts, link, values) for link in every]
+            self.interiors = [self._interior(link, values) for link in every]
         gram, pull = np.zeros((len(mu), len(mu))), np.zeros_like(z)
         for k, one in enumerate(self.interiors):
             B = self.parts.motion(k, values)
@@ -112,8 +114,20 @@ class LeftOut:
             gram += SAFETY * (g.T @ factorise(K).solve(g))  # gᵀ S⁻¹ g
         return 0.5 * (gram + gram.T), max(one.beta for one in self.interiors)
 
+    def _interior(self, k: int, values: Sequence[Floats]) -> _LinkInterior:
+        """That of link k, from the last one of it where both are in proportion."""
+        kappa, mu = self.parts.coefficients(k, values)
+        stiff, heavy = (next(iter(each[each != 0.0]), 1.0) for each in (kappa, mu))
+        key = np.concatenate([kappa / stiff, mu / heavy]).tobytes()
+        if self.known.get(k, (b"",))[0] != key:
+            self.known[k] = key, _interior(self.parts, k, kappa / stiff, mu / heavy)
+        own = self.known[k][1]
+        scale = np.repeat([heavy, stiff], own.gram.shape[0] // 2)  # X = [M T, K T] in its interior
+        gram = own.gram * np.outer(scale, scale) / stiff
+        return _LinkInterior(gram, own.drawn * scale, own.beta * heavy / stiff)
 
-def _interior(parts: ReducedLinks, k: int, values: Sequence[Floats]) -> _LinkInterior:
+
+def _interior(parts: ReducedLinks, k: int, kappa: Floats, mu: Floats) -> _LinkInterior:
     """The factor of K_ii serves the Gram matrix, the constraint modes and β alike."""
     reduction = parts.links[k].reduction
     assert reduction is not None
@@ -121,7 +135,7 @@ def _interior(parts: ReducedLinks, k: int, values: Sequence[Floats]) -> _LinkInt
     b = np.setdiff1d(np.arange(len(T)), i)
     place = np.abs(T[b]).argmax(axis=1)  # reduced local dof of each interface dof
     n_b = len(b)
-    K, M = parts.matrices(k, values)
+    K, M = total(reduction.mesh.stiffness, kappa), total(reduction.mesh.mass, mu)
     K_ii, M_ii = (sparse.csc_array(A[i][:, i]) for A in (K, M))
     factor = kept_factor(K_ii)
     if factor is None:

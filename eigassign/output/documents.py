@@ -26,6 +26,7 @@ from eigassign.study.results import (
     FollowedRow,
     MassRow,
     MeshError,
+    ModeAnatomy,
     ModeStudy,
     OtherModes,
     RangeRow,
@@ -33,6 +34,7 @@ from eigassign.study.results import (
     RunResults,
     SensitivityRow,
     SolverRow,
+    StaticRow,
     TargetStudy,
     ToleranceRows,
     TradeOff,
@@ -175,6 +177,7 @@ class RunDocument(OriginDocument):
     design: Annotated[Mapping[str, DesignRow], Fact("by parameter, in the order of the case")]
     mass: MassRow | None
     drives: Annotated[Mapping[str, DriveRow], Fact("what each exerts, by coordinate")]
+    statics: Annotated[Mapping[str, StaticRow], Fact("of static targets, by what they ask")]
     price: Annotated[float | None, Fact("of the change of the design")]
     error: Annotated[ErrorSummary | None, Fact("of all wanted frequencies, else of all limits")]
     frequencies: Annotated[CurvesDocument | LimitDocument | None, Fact("of the first target")]
@@ -182,6 +185,7 @@ class RunDocument(OriginDocument):
     assignment: Annotated[AssignmentRow | None, Fact("the verdict, and how the answer was found")]
     sensitivity: Annotated[Mapping[str, SensitivityDocument], Fact("by parameter")]
     relaxed: Annotated[Sequence[RelaxedRow], Fact("what more room at limits gains")]
+    anatomies: Annotated[Sequence[ModeAnatomy], Fact("modes that are missed: what they are")]
     reach: Annotated[Sequence[RangeRow], Fact("over all designs within the bounds")]
     unreachable: Annotated[Sequence[str], Fact("what is out of reach, in words")]
     tolerance: Annotated[ToleranceRows | None, Fact("what deviations do to the targets")]
@@ -220,6 +224,7 @@ def run_document(results: RunResults) -> RunDocument:
         results,
         design={row.name: row for row in results.design},
         drives={row.name: row for row in results.drives},
+        statics={row.name: row for row in results.statics},
         frequencies=targets[0].frequencies if targets else None,
         targets=targets,
         sensitivity={
@@ -229,6 +234,7 @@ def run_document(results: RunResults) -> RunDocument:
         relaxed=meaning.relaxed,
         reach=meaning.reach,
         unreachable=meaning.unreachable,
+        anatomies=meaning.anatomies,
         tolerance=meaning.tolerance,
         trade_off=meaning.trade_off,
         other_modes=_modes(results.others),
@@ -274,7 +280,8 @@ def _target(results: RunResults, target: TargetStudy) -> TargetDocument:
         TargetDocument,
         target,
         asked,
-        mode=asked.mode if target.followed is None else None,
+        mode=None if target.followed else asked.mode,
+        followed=next(iter(target.followed), None),
         worst=target.error.exact.max_relative,
         frequencies=curves,
         near=None if target.near is None else _modes(target.near),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from eigassign.case.schema.targets import TARGETS
+from eigassign.case.schema.targets import TARGETS, HighestTarget
 from eigassign.errors import UsageError
 from eigassign.facts import Fact
 from eigassign.files import STORED, json_value, read_bytes
@@ -173,7 +173,7 @@ def _run(document: Any, kind: Kind) -> Known:
         curves = []
         for t in targets:
             name = t["followed"]["name"] if t.get("followed") else f"mode {t['mode']}"
-            name = TARGETS[t["kind"]].curve_of(name)
+            name = TARGETS.get(t["kind"], HighestTarget).curve_of(name)
             curves.append((name, t.get("trajectory"), t["frequencies"]["exact_hz"]))
         return Known(case, ranges(curves), (document["assignment"] or {}).get("verdict", ""))
     samples = {row["name"]: row["samples"] for row in document["trajectories"]}
@@ -182,7 +182,8 @@ def _run(document: Any, kind: Kind) -> Known:
         hz, name = target["frequencies"]["initial_hz"], target.get("trajectory")
         where = TRAJECTORY if len(samples) == 1 else f"{TRAJECTORY} {name!r}"
         whole = next(iter(samples.values())) if len(samples) == 1 else samples.get(name)
-        wanted = TARGETS[target["kind"]].is_goal and target["mode"] is not None
+        form = TARGETS.get(target["kind"], HighestTarget)
+        wanted = form.is_goal and target["mode"] is not None
         if wanted and len(hz) == whole:
             place = _place(target["mode"], where)
             found[place] = ranges([(place, None, hz)])[0]

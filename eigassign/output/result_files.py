@@ -35,6 +35,8 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
     files["frequencies.csv"] = _number_text(frequency_columns(results))
     if results.drives:
         files["drives.csv"] = _number_text([*_samples(results), *_exerted(results)])
+    if results.statics:
+        files["statics.csv"] = _number_text([*_samples(results), *_given(results)])
     return files
 
 
@@ -68,6 +70,13 @@ def _exerted(results: RunResults) -> Iterator[Column]:
     for row in results.drives:
         for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
             yield f"{row.name} {row.quantity} {when} [{row.unit}]", curve.tolist()
+
+
+def _given(results: RunResults) -> Iterator[Column]:
+    """Stiffnesses, compliances and sags before and after."""
+    for row in results.statics:
+        for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
+            yield f"{row.name} {when} [{row.unit}]", curve.tolist()
 
 
 def _motion(results: RunResults, rows: slice) -> Iterator[Column]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +14,11 @@ from eigassign.case.units import is_bare
 from eigassign.facts import OF_ROW, Fact, capital, fact, number, percent, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
+    SEEN,
     Comparison,
     DesignRow,
     ErrorSummary,
+    ModeAnatomy,
     RunResults,
     TargetStudy,
     ValidationRow,
@@ -24,6 +26,7 @@ from eigassign.study.results import (
 )
 
 Floats = NDArray[np.float64]
+MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 STAGES = {  # of a run, as they are named in results.json
     "model": "assembly of K and M",
@@ -91,8 +94,9 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
     Those that there is something to show in.
     """
     kinds = (
-        design, errors, required, drives, weight, clearances, combinations, optima, sensitivity,
-        limits, reach, tolerance, trade_off, approximation, solver, timing,
+        design, objective, errors, required, drives, weight, clearances, combinations, optima,
+        sensitivity, limits, anatomy, helps, reach, tolerance, robust, trade_off, approximation,
+        solver, timing,
     )  # fmt: skip
     return tuple(table for table in (kind(results) for kind in kinds) if table.rows)
 
@@ -100,13 +104,13 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
 def headline(results: RunResults) -> str | None:
     """The verdict with its reason, and the worst distance before and after, in a sentence or two.
 
-    Without targets None.
+    Without targets None, or the verdict alone.
     """
     error, row = results.error, results.assignment
     if error is None:
-        return None
+        return None if row is None else f"{capital(row.verdict.replace('_', ' '))}: {row.reason}."
     limits = [target.error for target in results.targets if not target.asked.is_goal]
-    alone = len(limits) == len(results.targets)
+    alone = len(limits) == len(results.targets)  # no frequency is wanted
     what = "Worst violation of a limit" if alone else "Worst distance to the target"
     said = _violation if alone else percent
     beside = ""
@@ -131,11 +135,9 @@ def design(results: RunResults) -> Table:
     chosen = any(row.chosen for row in results.design)
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
     priced = results.price is not None
-    more = [
-        name
-        for name, shown in (("lies on", on), ("choice", chosen), ("change costs", priced))
-        if shown
-    ]
+    listed = any(row.choice_price is not None for row in results.design)
+    cost = "costs" if listed else "change costs"
+    more = [name for name, shown in (("lies on", on), ("choice", chosen), (cost, priced)) if shown]
     rows = []
     for row in results.design:
         unit, size = row.handy
@@ -148,12 +150,26 @@ def design(results: RunResults) -> Table:
     if (mass := results.mass) is not None:
         edges = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
         both = (number(mass.initial), number(mass.optimal))
-        rows.append(("mass", "of all links and bodies", "kg", *both, *edges, *("" for _ in more)))
+        cells = ["" for _ in more]
+        if mass.price is not None:
+            cells[-1] = number(mass.cost)
+        rows.append(("mass", "of all links and bodies", "kg", *both, *edges, *cells))
     constraints = [limit.name for limit in active if limit.kind == "constraint"]
     caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
     if results.price is not None:
-        caption = f"The change costs {number(results.price)} in all. {caption}".strip()
+        what = "It" if listed else "The change"
+        caption = f"{what} costs {number(results.price)} in all. {caption}".strip()
     return Table("Design", (*columns, *more), tuple(rows), caption)
+
+
+def objective(results: RunResults) -> Table:
+    """What is to be light, high or wide, before and after."""
+    row = results.assignment
+    caption = f"Along {results.along}, at the samples and between those that are far apart."
+    if row is not None and row.robust is not None and row.objective != "lightest":
+        caption += " The least of the deviations that were searched, too."
+    rows = () if row is None or row.aim is None else (row.aim,)
+    return facts_table("Objective", rows, "label before after", caption)
 
 
 def _by_name(results: RunResults, y: Floats) -> Iterator[str]:
@@ -198,15 +214,15 @@ def required(results: RunResults) -> Table:
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
     for target in results.targets:
-        if not target.asked.is_goal:
+        if not target.asked.is_goal and not target.asked.is_aim:
             cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
             said = ("" if e is None else violated(e.max_relative) for e in cells)
             rows.append((target.label, *said, _met(target.satisfied)))
     for row in () if results.assignment is None else results.assignment.limits:
         amounts = {"initial": row.initial, "exact": row.optimal}
-        cells = (f"{number(amounts[k])} {row.unit}" if k in amounts else "" for k in kinds)
-        rows.append((row.words, *map(str.rstrip, cells), _met(row.satisfied)))
-    caption = f"Relative to the limit, along {results.along}."
+        cells = (row.said(amounts[k]) if k in amounts else "" for k in kinds)
+        rows.append((row.words, *cells, _met(row.satisfied)))
+    caption = f"Violations are relative to the limit, along {results.along}."
     return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
 
 
@@ -224,6 +240,25 @@ def drives(results: RunResults) -> Table:
     return facts_table(
         "What the drives carry", rows, f"{names} limit", caption, name="coordinate", **headings
     )
+
+
+def anatomy(results: RunResults) -> Table:
+    """The parts that modes of missed targets have their energies in."""
+    each = (row for one in results.meaning.anatomies for row in one.parts)
+    rows = [row for row in each if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
+    names = "mode part strain strain_largest strain_at kinetic kinetic_largest kinetic_at"
+    caption = "Shares of the energies of modes that are missed, with the answer: means over samples"
+    caption += ", and the largest. Of strain the weight has a negative share where it softens."
+    return facts_table("What the missed modes are", rows, names, caption)
+
+
+def helps(results: RunResults) -> Table:
+    """What properties that are no parameters do to the modes of missed targets."""
+    rows = [row for one in results.meaning.anatomies for row in one.properties[:MOST_HELPS]]
+    names = "mode property percent_per_percent percent_per_percent_largest at"
+    caption = "By how many per cent a frequency rises for a per cent more of what is no parameter, "
+    caption += "the coordinates as they are: the most effective, by exact slopes."
+    return facts_table("What would help", rows, names, caption)
 
 
 def _met(satisfied: bool) -> str:
@@ -256,15 +291,23 @@ def combinations(results: RunResults) -> Table:
     if row is None or row.catalogue is None:
         return Table("Combinations", (), ())
     wanted = any(target.asked.is_goal for target in results.targets)
-    by_price = results.price is not None and not wanted
-    best, price = row.catalogue.best, "price" if by_price else "objective"
+    best = row.catalogue.best
     own = {each.name: each for each in results.design}
+    facts: dict[str, tuple[str, Callable[[float], str]]] = {
+        "worst error": ("error", percent),
+        "mass [kg]": ("mass", number),
+        "price": ("price", number),
+        "objective": ("objective", number),
+    }
+    if row.objective == "lightest" or (results.price is not None and not wanted and not row.aim):
+        del facts["objective"]  # which is the mass, or the price
+    shown = {name: fact for name, fact in facts.items() if getattr(best[0], fact[0]) is not None}
     rows = tuple(
         (str(k), *(_choice(own.get(name), choice) for name, choice in one.choices.items()),
-         number(one.objective), violated(one.violation))
+         *(said(getattr(one, fact)) for fact, said in shown.values()), violated(one.violation))
         for k, one in enumerate(best, 1)
     )  # fmt: skip
-    columns = ("combination", *best[0].choices, price, "limits")
+    columns = ("combination", *best[0].choices, *shown, "limits")
     return Table("Combinations", columns, rows, f"{capital(row.optimality.words)}.")
 
 
@@ -347,6 +390,20 @@ def tolerance(results: RunResults) -> Table:
     return facts_table("Tolerance", rows, names, caption, error="worst error")
 
 
+def robust(results: RunResults) -> Table:
+    """What deviations do to the robust design and to the optimum without them; the cost."""
+    row = None if results.assignment is None else results.assignment.robust
+    if row is None:
+        return Table("Robust", (), ())
+    caption = (
+        f"Missed at the worst deviation within the tolerances that a search found, and of "
+        f"{row.draws} random ones; alone is the optimum without deviations. Robust instead of "
+        f"alone: {row.words}."
+    )
+    names = "label unit nominal robust nominal_worst worst drawn"
+    return facts_table("Robust", row.targets, names, caption)
+
+
 def trade_off(results: RunResults) -> Table:
     """Error against mass or price."""
     found = results.meaning.trade_off
@@ -421,21 +478,23 @@ def modes_table(
     where: str,
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
+    estimated: bool = False,
     weight: WeightRow | None = None,
+    anatomies: Sequence[ModeAnatomy] = (),
     note: str = "",
 ) -> Table:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
-    mesh and reduced links raise each frequency at most, relative; ``weight`` is what gravity
-    changes; ``note`` is said below.
+    mesh and reduced links raise each frequency at most, relative, the former ``estimated`` or not;
+    ``weight`` is what gravity changes; ``anatomies`` are what the modes are; ``note`` is below.
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
         "frequency [Hz]": [f"{hz:.10g}" for hz in frequencies_hz],
     }
     weighed = weight is not None and weight.gravity is not None
-    of_mesh = ("mesh", discretisation, "about" if weighed else "at most")
+    of_mesh = ("mesh", discretisation, "about" if weighed or estimated else "at most")
     for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
         if errors is not None:
             columns[f"{cause}: too high by {about}"] = [
@@ -445,6 +504,10 @@ def modes_table(
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [
             f"{100 * e:.2g} %" if math.isfinite(e) else "may buckle or fall" for e in weight.change
         ]
+    if anatomies:
+        for kind, name in (("strain", "strain"), ("kinetic", "motion")):
+            columns[f"{name} most in"] = [one.most(kind, 1) for one in anatomies]
+        columns["1 % more of"] = [one.helped(1) for one in anatomies]
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
     caption += f" {capital(note)}." if note else ""
     rows = tuple(zip(*columns.values(), strict=True))

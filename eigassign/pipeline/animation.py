@@ -9,8 +9,8 @@ from eigassign.errors import StorageError, UsageError
 from eigassign.output.figures import motion
 from eigassign.output.store.atomic import replace_synced
 from eigassign.pipeline.queries import pose_and_design
-from eigassign.study import drawing
 from eigassign.study.built_case import BuiltCase
+from eigassign.study.pictures import drawing
 
 
 def animate(

@@ -16,7 +16,7 @@ from eigassign.output.exchange.files import ENDINGS
 from eigassign.output.exchange.reduced_file import save_reduced
 from eigassign.pipeline.queries import pose_and_design
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.drawing import spread_samples
+from eigassign.study.pictures.drawing import spread_samples
 
 Floats = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from eigassign.output.reports.page import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.drawing import draw_poses, rest_pose
+from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.planning import Plan
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ def outlook(case: BuiltCase, plan: Plan, trajectory: Trajectories | None) -> Out
     the shipped cases.
     """
     size, asked = expansion_size(case.model(), plan), case.file.assignment
-    if trajectory is None or not case.file.targets:
+    if trajectory is None or not case.file.has_question:
         return Outlook(plan.modes, size, None)
     q, y = trajectory.q[trajectory.spread(8)], case.initial_design
     solve_s = min(repeat(lambda: case.model().frequencies(q, y, 1), number=1, repeat=2)) / len(q)
@@ -59,7 +59,7 @@ def next_step(case: CaseFile) -> str:
     name = quoted(case.path)
     if case.measurements is not None:
         return f"eigassign update {name}"
-    given = (case.trajectory, case.design.parameters, case.targets)
+    given = (case.trajectory, case.design.parameters, case.has_question)
     keys = ("trajectory", "design", "targets")
     missing = [key for key, value in zip(keys, given, strict=True) if not value]
     if not missing:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,25 +12,30 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.requirements.sampling import requirements_of, with_instants
+from eigassign.assignment.requirements.sampling import (
+    design_limits,
+    requirements_of,
+    with_instants,
+)
 from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
-from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
-from eigassign.mechanism.elements.superelement import weights
+from eigassign.mechanism.elements.free_part import part_lines
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.output.reports import page as report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import new_run_folder
-from eigassign.study import drawing
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
+from eigassign.study.meaning.levers import anatomies
+from eigassign.study.pictures import drawing
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
-from eigassign.study.results import WeightRow
+from eigassign.study.results import ModeAnatomy, WeightRow
 from eigassign.study.updating.measured import read_measurements
 from eigassign.study.weight import GIVEN, study_weight
 
@@ -53,7 +59,9 @@ class ModesAnswer:
     round_off: Annotated[Share, Fact("at most; infinite: not known", may_lack=True)] = 0.0
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
+    estimated: Annotated[bool, Fact("no bounds: discretisation_error is an estimate")] = False
     weight: Annotated[WeightRow | None, Fact("what gravity changes", optional=True)] = None
+    anatomies: Annotated[tuple[ModeAnatomy, ...], Fact("what each mode is, and would help it")] = ()
     notes: Words = ()  # of gravity
     warnings: Words = ()
 
@@ -163,8 +171,12 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
     every = tuple(range(1, len(hz) + 1))
     lost = model.truncation_error(q, y, every)[0] if model.reduced else None
-    coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
+    coarse = model.discretisation_error(q, y, every)[0] if model.meshed or model.solids else None
     weight = study_weight(file, model, every, q[None], y, GIVEN)
+    numbers = {f"mode {mode}": np.array([mode]) for mode in every}
+    found: tuple[ModeAnatomy, ...] = ()
+    with suppress(EigassignError):  # the frequencies stand without
+        found = tuple(anatomies(model, q[None], y, numbers, lambda _: ""))
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),
@@ -174,7 +186,8 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
-        *(weight.row, weight.notes, weight.warnings),
+        not model.has_bounds,
+        *(weight.row, found, weight.notes, weight.warnings),
     )
 
 
@@ -205,14 +218,16 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
 def _checked(case: BuiltCase) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
-    notes = weights(file)
+    notes = part_lines(file)
     notes += () if case.mesh is None else case.mesh.reasons
     notes += () if case.reduction is None else case.reduction.reasons
     notes += () if trajectory is None else trajectory.notes
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
-        requirements_of(file, with_instants(file, trajectory))
+        path = with_instants(file, trajectory)
+        requirements_of(file, path)
+        design_limits(file, model, path)
     notes += read_measurements(case)[1]
     plan, warnings = None, file.warnings
     if trajectory is not None or file.expansion.q != "auto":
@@ -275,9 +290,8 @@ def coordinates(case: CaseFile, text: str) -> list[float]:
 def design(case: CaseFile, text: str) -> list[float]:
     """y in SI units, one value per design parameter of the case; raises UsageError."""
     values = _read(text, "--y", list(case.design.parameters), case.design_quantities)
-    paths = [p.parameter for p in case.design.parameters.values()]
-    point = {path: (value, value) for path, value in zip(paths, values, strict=True)}
-    for *_, message in impossible(case.mechanism.sections, point):
+    point = [(value, value) for value in values]
+    for _, message in impossible(case.mechanism.sections, case.design.varied, point):
         raise UsageError(f"--y: {message}")
     return values
 

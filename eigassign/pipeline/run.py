@@ -44,9 +44,9 @@ from eigassign.study.comparison import (
 )
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.followed import followers, solve_design
-from eigassign.study.design.judgement import SolvedDesigns, study_targets
+from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
-from eigassign.study.moving import moving_modes
+from eigassign.study.pictures.moving import moving_modes
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
@@ -71,11 +71,12 @@ class Options:
 
 @dataclass(frozen=True, repr=False)
 class Result(Pictured):
-    """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode.
+    """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target on modes, if any.
 
-    At all samples, or those of the trajectory that the first target names; ``results`` has the
-    rest: ``.results.targets``, ``.design``, ``.error``, ``.shortcoming`` (None if this is an answer
-    to build on) and more. ``plot()`` draws it, ``to_dict()`` gives its columns to pandas.
+    Of mode 1 without targets. At all samples, or those of the trajectory that the first target
+    names; ``results`` has the rest: ``.results.targets``, ``.design``, ``.error``, ``.shortcoming``
+    (None if this is an answer to build on) and more. ``plot()`` draws it, ``to_dict()`` gives its
+    columns to pandas.
     """
 
     design: Mapping[str, float]  # the optimum, SI
@@ -146,8 +147,7 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, solved.initial.hz)
-            more = {mode for target in targets for mode in target.judged}
-            accuracy = study_accuracy(scene, answer.y, more)
+            accuracy = study_accuracy(scene, answer.y, judged_modes(file, targets))
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
             meaning = study_meaning(scene, answer, wanted, solved.exact, accepted, asked)
@@ -191,7 +191,7 @@ def _moving(
     else:
         asked, row = target.asked, target.followed
         name = asked.curve_name
-        numbers[asked.rows] = asked.mode if row is None else row.exact_numbers
+        numbers[asked.rows] = row[0].exact_numbers if row else asked.mode
     return moving_modes(scene.file, scene.model, scene.path, y, name, numbers)
 
 
@@ -234,23 +234,39 @@ def prepare(
 def _result(
     results: RunResults, expansions: Expansions | None, assignment: Assignment | None
 ) -> Result:
-    first, full, linear = results.targets[0], None, None
+    full, linear = None, None
+    time_s, target_hz, initial_hz, predicted_hz, exact_hz = _first_curve(results)
     if expansions is not None:
         several = len(expansions.fulls.parts) > 1
         full = expansions.fulls if several else expansions.full
         linear = expansions.linears if several else expansions.linear
     return Result(
         design={row.name: row.optimal for row in results.design},
-        time_s=results.time_s[first.asked.rows],
-        target_hz=first.target_hz,
-        initial_hz=first.initial_hz,
-        predicted_hz=first.predicted_hz,
-        exact_hz=first.exact_hz,
+        time_s=time_s,
+        target_hz=target_hz,
+        initial_hz=initial_hz,
+        predicted_hz=predicted_hz,
+        exact_hz=exact_hz,
         results=results,
         expansion=full,
         linearised=linear,
         assignment=assignment,
     )
+
+
+def _first_curve(results: RunResults) -> tuple[Floats, Floats, Floats, Floats | None, Floats]:
+    """Times, and the first target's frequencies: wanted, initial, predicted and exact.
+
+    Without a target those of the lowest mode, with none wanted.
+    """
+    if results.targets:
+        first = results.targets[0]
+        times = results.time_s[first.asked.rows]
+        return times, first.target_hz, first.initial_hz, first.predicted_hz, first.exact_hz
+    shown = results.spectrum
+    assert shown is not None
+    before, after = shown.initial_hz[:, 0], shown.optimal_hz[:, 0]
+    return results.time_s, np.full_like(before, np.nan), before, None, after
 
 
 def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:

@@ -7,24 +7,26 @@ with the mass, centre and inertia of its ``inertial``, or a beam to the next joi
 
 from __future__ import annotations
 
-import io
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from eigassign.case.canonical import to_yaml
 from eigassign.errors import StorageError, UsageError
 from eigassign.files import CASE, read_bytes
 
 Floats = NDArray[np.float64]
 Number = float | str
 _MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
+_TAKEN = {"ground", "start", "end"}
 _LEVEL = 1e-9  # m: a joint this near to another one is at its place
 
 
@@ -50,15 +52,14 @@ def urdf_mapping(
     has of every link that is one its ``material``, ``section`` and ``elements``, named in
     ``materials`` and ``sections`` as in a case; it runs to the one joint that it carries, and its
     section gives its mass in place of the URDF's. Everything else is rigid; the root of the tree
-    stands on the ground. Raises UsageError for what is no such robot, and without yourdfpy (the
-    extra ``urdf``), StorageError for a file that cannot be read.
+    stands on the ground. Raises UsageError for what is no such robot, StorageError for a file that
+    cannot be read.
     """
-    robot, beams = _parsed(Path(path)), dict(beams or {})
-    links, joints = {link.name: link for link in robot.links}, robot.joints
-    _require_tree(links, joints, path)
+    (title, links, joints), beams = _parsed(Path(path)), dict(beams or {})
     if unknown := sorted(set(beams) - set(links)):
         raise UsageError(f"{path}: no link {', '.join(unknown)}; there are {', '.join(links)}")
-    names = _identifiers([*links, *(joint.name for joint in joints)], path)
+    names = _identifiers(links, path)
+    own = _identifiers([joint.name for joint in joints], path)
     carried = {name: [j for j in joints if j.parent == name] for name in links}
     frames = {n: _beam_frame(n, carried[n], path) if n in beams else _RIGID for n in links}
     (root,) = set(links) - {joint.child for joint in joints}
@@ -69,17 +70,17 @@ def urdf_mapping(
             **beams[name],
         }
         if name in beams
-        else _rigid(link, carried[name], names, path)
+        else _rigid(link, carried[name], own)
         for name, link in links.items()
     }
     mounting: dict[str, Any] = {"type": "fixed", "base": "ground"}
     mounting |= {"follower": f"{names[root]}.start", "position": [0.0, 0.0, 0.0]}
     mounting["orientation"] = _angles(frames[root].turn)
-    ways = {names[j.name]: _joint(j, frames, names) for j in joints}
-    moving = {names[j.name]: _drive(j, stiffness, path) for j in joints if j.type in _MOVING}
+    ways = {own[j.name]: _joint(j, frames, names, own) for j in joints}
+    moving = {own[j.name]: _drive(j, stiffness, path) for j in joints if j.type in _MOVING}
     named = {"sections": dict(sections or {}), "materials": dict(materials or {})}
     return {
-        "title": str(robot.name or Path(path).stem),
+        "title": title,
         "mechanism": {
             "space": "spatial",
             **{key: value for key, value in named.items() if value},
@@ -91,50 +92,222 @@ def urdf_mapping(
 
 
 _RIGID = _Frame(np.eye(3))
+STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
+OUTLOOK = """
+# A link that gives is a beam in place of `type: rigid`, see "eigassign docs own-arm". What may
+# change, and what is wanted:
+# design:
+#   gear: {{parameter: coordinates.{joint}.drive.stiffness, min: {low}, max: {high}}}
+# targets:
+#   - {{mode: 1, at_least: 10 Hz}}
+"""
 
 
-def _parsed(path: Path) -> Any:
-    """The robot of a file without its meshes; raises UsageError, StorageError."""
-    try:
-        from yourdfpy import URDF
-    except ImportError:
-        raise UsageError("URDF needs the package yourdfpy: pip install 'eigassign[urdf]'") from None
+def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
+    """The text of a case file ``name`` for the robot, and what is to be filled in, by its line.
+
+    What URDF does not know has a value that stands for it, and a comment: stiffnesses of drives,
+    the trajectory. A joint that moves no mass is locked. Raises as `urdf_mapping`.
+    """
+    _, links, joints = _parsed(path)
+    moving = {joint.name: joint for joint in joints if joint.type in _MOVING}
+    content = urdf_mapping(path, {key: STANDING[joint.type] for key, joint in moving.items()})
+    if not moving:
+        raise UsageError(f"{path}: no joint moves: a robot of fixed joints has no coordinate")
+    notes: dict[int, str] = {}
+    steps = []
+    for k, joint in enumerate(moving.values()):
+        carried = [links[each].inertial for each in _beyond(joint.child, joints=joints)]
+        if all(each is None or each[0] == 0.0 == np.abs(each[2]).max() for each in carried):
+            [*content["coordinates"].values()][k]["drive"] = "locked"
+            notes[k] = f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked"
+            steps.append((0.0, 0.0))
+            continue
+        stands = STANDING[joint.type]
+        notes[k] = f"stiffness of the drive of {joint.name}: URDF has none; {stands} stands there"
+        lower, upper = joint.limits
+        start = float(np.clip(0.0, lower, upper))
+        step = 0.1 if joint.type == "prismatic" else 0.5
+        room = upper - start if upper - start >= start - lower else lower - start
+        steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
+    for joint in content["mechanism"]["joints"].values():
+        if not any(joint["orientation"]):
+            del joint["orientation"]
+    points = [[round(at, 6) for at in pose] for pose in zip(*steps, strict=True)]
+    content["trajectory"] = {"points": points, "duration": "2 s"}
+    first = f"# From {path.name}: masses, places and axes. What URDF does not know: # fill in\n"
+    lines = (first + to_yaml(content)).splitlines()
+    below, asked = lines.index("coordinates:"), []
+    places = [n for n in range(below, len(lines)) if re.search(r"\bdrive: [{l]", lines[n])]
+    motion = next(n for n, line in enumerate(lines) if line.startswith("trajectory:"))
+    wanted = [*zip(places, notes.values(), strict=True)]
+    wanted.append(
+        (motion, "trajectory: poses between which the joints move; small steps stand there")
+    )
+    for n, note in wanted:
+        lines[n] += "  # fill in"
+        asked.append(f"{name}:{n + 1}: {note}")
+    name, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
+    low, high = (
+        ("5 MN/m", "50 MN/m") if joint.type == "prismatic" else ("5 kN m/rad", "50 kN m/rad")
+    )
+    outlook = OUTLOOK.format(joint=name, low=low, high=high)
+    return "\n".join(lines) + "\n" + outlook, asked
+
+
+class _Joint(NamedTuple):
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: Floats  # (4, 4)
+    axis: Floats  # (3,)
+    limits: Floats  # lower and upper, infinite where there is none
+
+
+class _Link(NamedTuple):
+    """Mass, centre of mass and inertia about it in the link's axes; None without ``inertial``."""
+
+    inertial: tuple[float, Floats, Floats] | None
+
+
+class _Tree(ElementTree.TreeBuilder):
+    """Elements as they stand; a document type, which may have entities, is refused."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Raises ValueError."""
+        raise ValueError("a URDF file has no document type and no entities")
+
+
+def _parsed(path: Path) -> tuple[str, dict[str, _Link], list[_Joint]]:
+    """Name, links and joints of a file without its meshes; raises UsageError, StorageError."""
     try:
         data = read_bytes(path, CASE)
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: cannot be read: {error}") from error
-    if re.search(rb"<!(DOCTYPE|ENTITY)", data):
-        raise UsageError(f"{path}: a URDF file has no document type and no entities")
-    meshless = {"build_scene_graph": False, "load_meshes": False}
+    parser = ElementTree.XMLParser(target=_Tree())
+    expand = f"xacro is a language that writes URDF: xacro {path} > robot.urdf expands it"
     try:
-        ElementTree.fromstring(data)  # the parser would read what it can of a damaged file
-        return URDF.load(io.BytesIO(data), **meshless).robot
-    except Exception as error:  # the parser has no errors of its own
-        raise UsageError(f"{path}: not a URDF file: {error}") from error
+        parser.feed(data)
+        robot = parser.close()
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        hint = f"; {expand}" if b"xacro:" in data else ""
+        raise UsageError(f"{path}: not a URDF file: {error}{hint}") from error
+    if any("xacro}" in e.tag or "${" in str(e.attrib) for e in robot.iter()):
+        raise UsageError(f"{path}: not a URDF file: {expand}")
+    if robot.tag != "robot":
+        raise UsageError(f"{path}: not a URDF file: it begins with <{robot.tag}>, not <robot>")
+    try:
+        links = {_text(e, "name"): _link(e) for e in robot.findall("link")}
+        joints = [_read_joint(e) for e in robot.findall("joint")]
+        _require_tree(links, joints, len(robot.findall("link")))
+    except ValueError as error:
+        raise UsageError(f"{path}: {error}") from error
+    return str(robot.get("name") or path.stem), links, joints
 
 
-def _require_tree(links: Mapping[str, Any], joints: list[Any], path: str | Path) -> None:
-    """Raises UsageError for what is not one tree of joints that a case can have."""
-    children = [joint.child for joint in joints]
-    missing = {n for j in joints for n in (j.parent, j.child)} - set(links)
-    if missing or len(set(children)) != len(children) or len(children) != len(links) - 1:
-        raise UsageError(f"{path}: the joints do not connect all links to one tree")
-    for joint in joints:
-        if joint.type not in (*_MOVING, "fixed"):
-            raise UsageError(f"{path}: joint {joint.name}: type {joint.type} is not supported")
-        if joint.mimic is not None:
-            raise UsageError(f"{path}: joint {joint.name}: mimic is not supported")
+def _text(element: ElementTree.Element, *keys: str) -> str:
+    """The attribute that the last key names, of the child that the first names if there are two."""
+    found = element.find(keys[0]) if keys[1:] else element
+    if found is None or not found.get(keys[-1]):
+        what = " ".join(filter(None, (element.tag, element.get("name"))))
+        raise ValueError(f"not a URDF file: {what} has no {keys[0]}")
+    return str(found.get(keys[-1]))
 
 
-def _identifiers(names: list[str], path: str | Path) -> dict[str, str]:
-    """Names without what key paths cannot hold; `ground` is taken."""
-    found = {name: re.sub(r"\W", "_", name) for name in names}
-    if len(set(found.values())) != len(found) or "ground" in found.values():
-        raise UsageError(f"{path}: two names of links or joints are alike, or one is ground")
+def _numbers(element: ElementTree.Element | None, key: str, default: Sequence[float]) -> Floats:
+    """The numbers of an attribute, as many as there are in ``default``; raises ValueError."""
+    given = None if element is None else element.get(key)
+    try:
+        found = np.array(default if given is None else [float(word) for word in given.split()])
+    except ValueError:
+        found = np.zeros(0)
+    if len(found) != len(default) or np.isnan(found).any():
+        many = "a number" if len(default) == 1 else f"{len(default)} numbers"
+        raise ValueError(f'<{element.tag} {key}="{given}">: expected {many}')  # type: ignore[union-attr]
     return found
 
 
-def _beam_frame(name: str, carried: list[Any], path: str | Path) -> _Frame:
+def _origin(element: ElementTree.Element) -> Floats:
+    T, origin = np.eye(4), element.find("origin")
+    T[:3, 3] = _numbers(origin, "xyz", [0.0] * 3)
+    turn = Rotation.from_euler("xyz", _numbers(origin, "rpy", [0.0] * 3))
+    T[:3, :3] = turn.as_matrix()
+    return T
+
+
+def _link(element: ElementTree.Element) -> _Link:
+    inertial = element.find("inertial")
+    if inertial is None:
+        return _Link(None)
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or inertia is None:
+        raise ValueError(f"link {element.get('name')}: inertial needs mass and inertia")
+    xx, xy, xz, yy, yz, zz = (
+        float(_numbers(inertia, f"i{key}", [0.0])[0])
+        for key in ("xx", "xy", "xz", "yy", "yz", "zz")
+    )
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    T = _origin(inertial)
+    of_link = T[:3, :3] @ own @ T[:3, :3].T
+    return _Link((float(_numbers(mass, "value", [0.0])[0]), T[:3, 3], of_link))
+
+
+def _read_joint(element: ElementTree.Element) -> _Joint:
+    name, kind = _text(element, "name"), _text(element, "type")
+    if kind not in (*_MOVING, "fixed"):
+        raise ValueError(
+            f'joint {name}: type {kind} is not supported; type="fixed" if it does not move, else '
+            "a chain of revolute and prismatic joints"
+        )
+    if element.find("mimic") is not None:
+        raise ValueError(
+            f"joint {name}: mimic is not supported; without <mimic> it is a coordinate of its own, "
+            'with type="fixed" it is held'
+        )
+    axis = _numbers(element.find("axis"), "xyz", [1.0, 0.0, 0.0])
+    if kind != "fixed" and not axis.any():
+        raise ValueError(f"joint {name}: its axis has no direction")
+    limit = element.find("limit") if kind != "continuous" else None
+    lower, upper = (
+        _numbers(limit, key, [far])[0] for key, far in (("lower", -np.inf), ("upper", np.inf))
+    )
+    parent, child = (_text(element, key, "link") for key in ("parent", "child"))
+    return _Joint(name, kind, parent, child, _origin(element), axis, np.array([lower, upper]))
+
+
+def _require_tree(links: Mapping[str, _Link], joints: Sequence[_Joint], count: int) -> None:
+    """Raises ValueError for what is not one tree of joints that a case can have."""
+    if len(links) != count or len({joint.name for joint in joints}) != len(joints):
+        raise ValueError("two links or two joints have one name")
+    children = [joint.child for joint in joints]
+    missing = {n for j in joints for n in (j.parent, j.child)} - set(links)
+    once = len(set(children)) == len(children) == len(links) - 1
+    if missing or not once or len(_beyond(*set(links) - set(children), joints=joints)) != count:
+        loose = [n for n in links if n not in children][1:] or sorted(missing)
+        which = f": see {', '.join(loose)}" if loose else ""
+        raise ValueError(f"the joints do not connect all links to one tree{which}")
+
+
+def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:
+    """These links and all that they carry."""
+    found = list(links)
+    for name in found:  # which grows
+        found += [joint.child for joint in joints if joint.parent == name and joint.child != name]
+    return found
+
+
+def _identifiers(names: Iterable[str], path: str | Path) -> dict[str, str]:
+    """Names without what key paths cannot hold; those of nodes and of the ground are taken."""
+    found = {name: re.sub(r"^(?=\d)", "_", re.sub(r"\W", "_", name)) for name in names}
+    if len(set(found.values())) != len(found) or _TAKEN & set(found.values()):
+        raise UsageError(
+            f"{path}: two names of links or joints are alike, or one is ground, start or end"
+        )
+    return found
+
+
+def _beam_frame(name: str, carried: list[_Joint], path: str | Path) -> _Frame:
     """Its x axis points at the one joint that the link carries; raises UsageError."""
     if len(carried) != 1 or np.linalg.norm(_place(carried[0])) < _LEVEL:
         raise UsageError(
@@ -146,29 +319,25 @@ def _beam_frame(name: str, carried: list[Any], path: str | Path) -> _Frame:
     return _Frame(np.column_stack([x, np.cross(z, x), z]), carried[0].name)
 
 
-def _rigid(
-    link: Any, carried: list[Any], names: Mapping[str, str], path: str | Path
-) -> dict[str, Any]:
+def _rigid(link: _Link, carried: list[_Joint], joints: Mapping[str, str]) -> dict[str, Any]:
     """A rigid link with a node for every joint that it carries."""
-    nodes = {names[joint.name]: _place(joint).tolist() for joint in carried}
+    nodes = {joints[joint.name]: _place(joint).tolist() for joint in carried}
     found: dict[str, Any] = {"type": "rigid", "nodes": {"start": [0.0, 0.0, 0.0], **nodes}}
     if link.inertial is None:
         return found
-    if link.inertial.mass is None or link.inertial.inertia is None:
-        raise UsageError(f"{path}: link {link.name}: inertial needs mass and inertia")
-    origin = _origin(link.inertial)
-    I = origin[:3, :3] @ link.inertial.inertia @ origin[:3, :3].T  # noqa: E741
+    mass, center, I = link.inertial  # noqa: E741
     tensor = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
-    found["mass"] = float(link.inertial.mass)
-    found["center"] = origin[:3, 3].tolist()
-    return {**found, "inertia": [float(value) for value in tensor]}
+    inertia = [float(value) for value in tensor]
+    return {**found, "mass": mass, "center": center.tolist(), "inertia": inertia}
 
 
-def _joint(joint: Any, frames: Mapping[str, _Frame], names: Mapping[str, str]) -> dict[str, Any]:
+def _joint(
+    joint: _Joint, frames: Mapping[str, _Frame], names: Mapping[str, str], own: Mapping[str, str]
+) -> dict[str, Any]:
     """A joint between the frames that the case gives both links."""
     base, follower = frames[joint.parent], frames[joint.child]
-    node = "end" if base.end is not None else names[joint.name]
-    turn = base.turn.T @ _origin(joint)[:3, :3] @ follower.turn
+    node = "end" if base.end is not None else own[joint.name]
+    turn = base.turn.T @ joint.origin[:3, :3] @ follower.turn
     found = {
         "type": _MOVING.get(joint.type, "fixed"),
         "base": f"{names[joint.parent]}.{node}",
@@ -176,12 +345,11 @@ def _joint(joint: Any, frames: Mapping[str, _Frame], names: Mapping[str, str]) -
         "orientation": _angles(turn),
     }
     if joint.type in _MOVING:
-        axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=float)
-        found["axis"] = (follower.turn.T @ axis).tolist()
+        found["axis"] = (follower.turn.T @ joint.axis).tolist()
     return found
 
 
-def _drive(joint: Any, stiffness: Number | Mapping[str, Number | None], path: str | Path) -> Any:
+def _drive(joint: _Joint, stiffness: Number | Mapping[str, Number | None], path: str | Path) -> Any:
     if not isinstance(stiffness, Mapping):
         return {"stiffness": stiffness}
     if joint.name not in stiffness:
@@ -190,18 +358,12 @@ def _drive(joint: Any, stiffness: Number | Mapping[str, Number | None], path: st
     return "free" if given is None else {"stiffness": given}
 
 
-def _origin(part: Any) -> Floats:
-    return np.eye(4) if part.origin is None else np.asarray(part.origin, dtype=np.float64)
-
-
-def _place(joint: Any) -> Floats:
-    return _origin(joint)[:3, 3]
+def _place(joint: _Joint) -> Floats:
+    return joint.origin[:3, 3]
 
 
 def _angles(turn: Floats) -> list[float]:
     """[rx, ry, rz] in rad of Rz Ry Rx."""
-    from scipy.spatial.transform import Rotation
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of upright axes, whose angles are not unique
         return [float(a) for a in Rotation.from_matrix(turn).as_euler("xyz")]

@@ -14,8 +14,7 @@ Reading order:
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
-    drawing     the mechanism as lines and symbols: in poses, and in its modes
-    moving      one mode along the trajectory, for a picture that moves
+    pictures    what is drawn of a mechanism, as plain lines and numbers
     updating    parameters from measured frequencies
     collect     all of it put together as the results of a run
 """
@@ -36,11 +35,12 @@ __all__, __getattr__, __dir__ = face(
         "design.clearance": "check_clear",
         "design.followed": "followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings",
-        "design.optimum": "Found find_optimum",
-        "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
-        "design.variants": "Task variant_of",
+        "design.search.optimum": "Found find_optimum",
+        "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
+        "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
-        "drawing": "AMPLITUDE draw_modes draw_poses moving_poses rest_pose spread_samples",
+        "pictures.drawing": "AMPLITUDE draw_modes draw_poses moving_poses rest_pose spread_samples",
+        "meaning.levers": "anatomies",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",
@@ -51,7 +51,7 @@ __all__, __getattr__, __dir__ = face(
             "with_middle_loads with_worse_designs"
         ),
         "results": (
-            "ActiveRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
+            "ActiveRow AimRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
             "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "

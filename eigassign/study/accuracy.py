@@ -49,7 +49,7 @@ SAMPLES = 20  # at which the expansion's own estimate is evaluated
 class Accuracy:
     """The errors of a run's numbers: of the mesh, and of all in lines of text."""
 
-    mesh: MeshError | None  # None without beams
+    mesh: MeshError | None  # None without beams or solids
     weight: WeightStudy
     notes: tuple[str, ...]
 
@@ -128,9 +128,9 @@ def judged_mesh(
 ) -> MeshError | None:
     """What the mesh leaves out at poses of the trajectory, or at q0, for one design y (n_y,).
 
-    ``design`` is what it is called. None without beams.
+    ``design`` is what it is called. None without beams or solids.
     """
-    if model.meshed is None:
+    if model.meshed is None and model.solids is None:
         return None
     q = _judged_at(model, trajectory, q0, y)
     error = model.discretisation_error(q, y, modes).max(axis=0)
@@ -148,17 +148,18 @@ def judged_poses(model: Model, q: Floats) -> Floats:
 
 
 def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
-    """`judged_mesh` in words, one line a mode; under gravity it is no bound."""
+    """`judged_mesh` in words, one line a mode; of solids, and under gravity, no bound."""
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
-    about = "at most" if model.pencil.weight is None else "estimated at"
+    about = "at most" if model.has_bounds else "estimated at"
+    finer = ", and solids a finer mesh" * (model.solids is not None)
     return [
         f"mode {mode}: discretisation error {about} {100 * error:.2g} % (too high), {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
         else f"mode {mode}: discretisation error not known, {where} of the {found.design} design: "
-        "give the links more elements, or auto"
+        f"give the links more elements, or auto{finer}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
 

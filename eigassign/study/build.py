@@ -26,7 +26,7 @@ from eigassign.mechanism.assembly.build import (
     local_links,
     whole_links,
 )
-from eigassign.mechanism.assembly.inside_links import meshed_links, reduced_links
+from eigassign.mechanism.assembly.inside_links import meshed_links, reduced_links, solid_links
 from eigassign.mechanism.assembly.total_mass import total_mass
 from eigassign.mechanism.elements.craig_bampton import used_nodes
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
@@ -94,9 +94,11 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
             for p, link in zip(motion.placements, local[0], strict=True)
         ]
         meshed = meshed_links(parameters, placed, file.mechanism.space, pencil)
+        solids = solid_links(parameters, [each[:3] for each in placed], pencil)
         mass = total_mass(file, parameters, links.meshes.values())
     q_names = (*parameters.coordinates, *parameters.loads)
-    return Model(pencil, poses, motion, mass, q_names, parameters.design, reduced, meshed)
+    given = pencil, poses, motion, mass, q_names, parameters.design
+    return Model(*given, reduced, meshed, solids)
 
 
 def build_trajectories(file: CaseFile, model: Model) -> Trajectories:

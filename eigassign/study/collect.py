@@ -19,7 +19,7 @@ from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
-from eigassign.study.drawing import draw_poses, rest_pose
+from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
     AssignmentRow,
@@ -31,6 +31,7 @@ from eigassign.study.results import (
     MovingMode,
     OtherModes,
     RunResults,
+    StaticRow,
     TargetStudy,
     TrajectoryRow,
 )
@@ -120,13 +121,14 @@ def _with_answer(
         meaning=meaning,
         mass=_mass(scene, answer.y),
         drives=_drives(scene, answer.y),
+        statics=tuple(_statics(scene, answer.y)),
     )
 
 
 def _mass(scene: Scene, y: Floats) -> MassRow:
     limits, mass = scene.file.design.mass, scene.model.mass
-    low, high = (None, None) if limits is None else (limits.min, limits.max)
-    return MassRow(mass(scene.initial), mass(y), low, high)
+    asked = () if limits is None else (limits.min, limits.max, limits.price)
+    return MassRow(mass(scene.initial), mass(y), *(asked or (None, None)))
 
 
 def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
@@ -158,6 +160,14 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
             file.coordinates, file.drive_units, *(c.T for c in curves), strict=True
         )
     )
+
+
+def _statics(scene: Scene, y: Floats) -> Iterator[StaticRow]:
+    for one in scene.statics:
+        curves = np.full((2, len(scene.path.time_s)), np.nan)
+        curves[:, one.rows] = [one.curve_of(each) for each in (scene.initial, y)]
+        limit = next(edge for edge in one.allowed if np.isfinite(edge))
+        yield StaticRow(one.label, one.unit, limit, *curves)
 
 
 def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tuple[str, ...]:
@@ -210,7 +220,9 @@ def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
-    modes = tuple(sorted({mode for target in assigned.targets for mode in target.asked.modes}))
+    modes = tuple(
+        sorted({mode for target in assigned.targets for mode in target.asked.modes if mode > 0})
+    )
     for solved, design in (
         (assigned.solved.initial, "initial"),
         (assigned.solved.exact, "optimal"),

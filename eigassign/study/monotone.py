@@ -11,12 +11,21 @@ the weight does along that way is in K (see `apart_from_rigid`).
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 
 Floats = NDArray[np.float64]
+MOMENTS = (
+    "inertia",
+    "motor_inertia",
+    "ratio",
+)  # what gives a body or a rotor its moment of inertia
+MOST_SIDES = 6  # of a box with at most 64 corners, as many as a tolerance study draws
 
 
 def effects(file: CaseFile) -> Floats:
@@ -24,17 +33,25 @@ def effects(file: CaseFile) -> Floats:
     weighs = isinstance(file.mechanism.gravity, tuple)
     loose = weighs and any(c.moves == "free" for c in file.coordinates.values())
     columns = file.design.parameters.values()
-    return np.array([_effect(column.parameter, weighs, loose) for column in columns])
+    return np.array([_common(column.factors, weighs, loose) for column in columns])
+
+
+def _common(factors: Mapping[str, float], weighs: bool, loose: bool) -> float:
+    """The effect of all properties of a parameter, where it is the same; else unknown."""
+    found = {np.sign(f) * _effect(path, weighs, loose) for path, f in factors.items()}
+    return found.pop() if len(found) == 1 else 0.0
 
 
 def _effect(path: str, weighs: bool, loose: bool) -> float:
     group, _, *rest = path.split(".")
     if weighs and (group == "springs" or rest == ["mass"]):  # loads and their shares change, too
         return 0.0
-    if loose and rest[-1] == "inertia":
+    if loose and rest[-1] in MOMENTS:
         return 0.0
     match group, ".".join(rest):
-        case ("bodies", "mass" | "inertia") | ("coordinates", "drive.inertia"):
+        case "bodies", "mass":
+            return -1.0
+        case "bodies" | "coordinates", _ if rest[-1] in MOMENTS:
             return -1.0
         case ("springs", "translational" | "rotational") | ("coordinates", "drive.stiffness"):
             return 1.0
@@ -50,3 +67,10 @@ def corners(file: CaseFile, y: Floats, lower: Floats, upper: Floats) -> tuple[Fl
     softest = np.where(effect > 0.0, lower, np.where(effect < 0.0, upper, y))
     stiffest = np.where(effect > 0.0, upper, np.where(effect < 0.0, lower, y))
     return softest, stiffest
+
+
+def box_corners(n: int) -> Floats:
+    """The corners of a box of n sides 0 to 1; of more than six those along a face or an edge."""
+    if n <= MOST_SIDES:
+        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
+    return np.concatenate([np.tri(n), 1.0 - np.tri(n), np.eye(n), 1.0 - np.eye(n)])

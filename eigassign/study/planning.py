@@ -189,7 +189,9 @@ def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, .
 def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
     available = model.n_dof - model.n_rigid
     places = {
-        m: f"targets[{k}].mode" for k, each in enumerate(file.targets) for m in sum(each.named, ())
+        m: place if place.startswith("assignment") else f"{place}.mode"
+        for place, each in file.asked
+        for m in each.numbers
     }
     for mode in modes:
         if mode > available:
@@ -242,7 +244,7 @@ def asked_accuracy(file: CaseFile) -> float:
 
 def target_modes(file: CaseFile) -> set[int]:
     """The modes that a target names."""
-    return {mode for target in file.targets for modes in target.named for mode in modes}
+    return {mode for _, target in file.asked for mode in target.numbers}
 
 
 def wanted_modes(file: CaseFile) -> tuple[int, ...]:
@@ -314,7 +316,7 @@ def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
     n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
     if kept.any():
         x, modes = x[kept], modes_at(model, x[kept])
-        found = model.discretisation_error(x[:, :n_q], x[:, n_q:], modes)
+        found = model.beam_error(x[:, :n_q], x[:, n_q:], modes)
         error[kept] = found.max(axis=1)
     return error
 
@@ -412,7 +414,7 @@ LOOKS = 10_000
 
 def expansion_needed(file: CaseFile) -> bool:
     """True where all that is asked rests on the expansion; a sequential search does without."""
-    return file.assignment.method == "one_shot" or not file.targets
+    return file.assignment.method == "one_shot" or not file.has_question
 
 
 def choose_order(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from decimal import ROUND_DOWN, Context
 from operator import itemgetter
 from typing import Annotated, TypeVar
 
@@ -27,13 +28,16 @@ from eigassign.facts import (
     Key,
     Residual,
     Share,
+    number,
     positive_percent,
 )
 
+_DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=".6g")]
+SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
@@ -147,6 +151,7 @@ class DesignRow:
     upper: InUnit
     choice: Annotated[str | None, Fact("name or value chosen of its catalogue")] = None
     price: Annotated[float | None, Fact("of one SI unit")] = None
+    choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
@@ -160,8 +165,14 @@ class DesignRow:
 
     @property
     def cost(self) -> float:
-        """Price of the change; 0 without a price."""
-        return (self.price or 0.0) * (self.optimal - self.initial)
+        """Price of the change, or of the choice; 0 without a price."""
+        change = (self.price or 0.0) * (self.optimal - self.initial)
+        return change + (self.choice_price or 0.0)
+
+    @property
+    def is_priced(self) -> bool:
+        """True where it has a price, or what was chosen has one."""
+        return self.price is not None or self.choice_price is not None
 
 
 @dataclass(frozen=True)
@@ -172,6 +183,12 @@ class MassRow:
     optimal: Kilograms
     lower: Kilograms | None
     upper: Kilograms | None
+    price: Annotated[float | None, Fact("of one kg")] = None
+
+    @property
+    def cost(self) -> float:
+        """Price of the change; 0 without a price."""
+        return (self.price or 0.0) * (self.optimal - self.initial)
 
 
 @dataclass(frozen=True)
@@ -214,6 +231,20 @@ class DriveRow(Brief):
     def quantity(self) -> str:
         """Torque or force."""
         return "force" if self.unit == "N" else "torque"
+
+
+@dataclass(frozen=True, repr=False)
+class StaticRow(Brief):
+    """A stiffness, compliance or sag that a target limits, before and after; (n_t,) curves.
+
+    Where the target does not hold, and where nothing gives way, a curve has no number.
+    """
+
+    name: Key
+    unit: str
+    limit: InUnit
+    initial_curve: Annotated[Floats, Fact("before", unit=OF_ROW, may_lack=True)]
+    optimal_curve: Annotated[Floats, Fact("with the answer", unit=OF_ROW, may_lack=True)]
 
 
 @dataclass(frozen=True)
@@ -281,7 +312,7 @@ class TargetStudy(Brief):
     satisfied: bool
     weight_s: float
     along: tuple[TargetAlong, ...]
-    followed: FollowedRow | None = None
+    followed: tuple[FollowedRow, ...] = ()
     near: OtherModes | None = None
 
     @property
@@ -296,9 +327,9 @@ class TargetStudy(Brief):
 
     @property
     def numbers(self) -> set[int]:
-        """The modes that it names, or that a followed one is with the answer."""
-        row = self.followed
-        return set(self.asked.modes if row is None else row.exact_numbers.tolist())
+        """The modes that it names, and those that followed ones are with the answer."""
+        followed = (row.exact_numbers.tolist() for row in self.followed)
+        return {mode for mode in self.asked.modes if mode > 0}.union(*followed)
 
     @property
     def judged(self) -> set[int]:
@@ -381,6 +412,12 @@ class LimitRow:
     extreme: Annotated[InUnit | None, Fact("of the most extreme design, where none keeps it")]
     stated: Annotated[str, Fact("the limit with the amount of the answer, in words")]
 
+    def said(self, amount: float) -> str:
+        """An amount with the unit that the limit is said in: masses are in kg."""
+        edges = [edge for edge in (self.lower, self.upper) if edge is not None]
+        unit, size = ("kg", 1.0) if self.unit == "kg" else handy_unit(self.unit, *edges)
+        return f"{number(amount / size)} {unit}".rstrip()
+
 
 @dataclass(frozen=True)
 class ClearanceRow:
@@ -401,12 +438,19 @@ class ClearanceRow:
 
 @dataclass(frozen=True)
 class CombinationRow:
-    """One choice of every catalogue: ``choices`` by the catalogues' names; objective as above."""
+    """One choice of every catalogue: ``choices`` by the catalogues' names; objective as above.
+
+    ``error`` is the largest of wanted frequencies, null where none is wanted; ``price`` that of
+    the choices that have one and of the change of what has a price for one unit.
+    """
 
     choices: Mapping[str, str]
     design: Floats
     objective: float
     violation: Violation
+    error: Share | None = None
+    mass: Kilograms | None = None
+    price: float | None = None
 
 
 @dataclass(frozen=True)
@@ -418,16 +462,99 @@ class CatalogueRow:
     best: Annotated[tuple[CombinationRow, ...], Fact("the best few, the best first")]
 
 
+@dataclass(frozen=True)
+class AimRow:
+    """What the objective makes light, high or wide, before and after, between the samples too."""
+
+    label: Annotated[str, Fact("what is wanted", "objective")]
+    initial: InUnit
+    optimal: InUnit
+    unit: Annotated[str, Fact("kg or Hz; empty for a share")]
+    words: Annotated[str, Fact("what was reached, in words")] = ""
+
+    @property
+    def before(self) -> Annotated[str, Fact(heading="initial")]:
+        """The initial one with its unit."""
+        return self._said(self.initial)
+
+    @property
+    def after(self) -> Annotated[str, Fact(heading="optimal")]:
+        """The optimal one with its unit."""
+        return self._said(self.optimal)
+
+    def _said(self, value: float) -> str:
+        """A mass rounded to four digits; frequencies and room, which are at least that, down."""
+        if self.unit == "kg":
+            return f"{value:.4g} kg"
+        down = float(_DOWN.create_decimal(value))
+        if self.unit:
+            return f"{down:g} {self.unit}"
+        return f"{100.0 * down:.4g} %" if value > 0.0 else "none"
+
+
+@dataclass(frozen=True)
+class RobustTarget:
+    """What the deviations do to one thing that is asked: errors, or relative violations.
+
+    ``nominal`` and ``robust`` are what is asked for, in ``unit``, at the sample that is worst, of
+    the optimum without deviations and of the robust design, neither deviating.
+    """
+
+    label: Annotated[str, Fact("in words", "target")]
+    unit: str
+    is_goal: Annotated[bool, Fact("a wanted frequency")]
+    nominal: Annotated[float, Fact("of the optimum without deviations", "alone", digits=number)]
+    robust: Annotated[float, Fact(digits=number)]
+    nominal_worst: Annotated[Share, Fact("of the optimum without deviations", "deviated alone")]
+    worst: Annotated[Share, Fact("found by a search", "deviated")]
+    drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
+
+    @property
+    def most(self) -> float:
+        """The worst of all that were looked at."""
+        return max(self.worst, self.drawn or 0.0)
+
+
+@dataclass(frozen=True, repr=False)
+class RobustRow(Brief):
+    """What deviations within the tolerances do to the robust design, and what it costs.
+
+    ``nominal`` is the optimum without deviations, as are the amounts with that name.
+    """
+
+    scenarios: Annotated[int, Fact("deviations in which the search holds what is asked")]
+    draws: Annotated[int, Fact("random deviations, at the samples of least room")]
+    error: Annotated[Share, Fact("of their frequencies")]
+    nominal: Floats
+    objective_nominal: float
+    objective: float
+    mass_nominal: Kilograms
+    mass: Kilograms
+    price_nominal: float | None
+    price: float | None
+    targets: tuple[RobustTarget, ...]
+
+    @property
+    def words(self) -> str:
+        """What it costs to be robust, in words."""
+        pairs = [(f"objective {self.objective_nominal:.4g}", f"{self.objective:.4g}")]
+        pairs += [(f"mass {self.mass_nominal:.6g}", f"{self.mass:.6g} kg")]
+        if self.price is not None and self.price_nominal is not None:
+            pairs += [(f"price {self.price_nominal:.6g}", f"{self.price:.6g}")]
+        return ", ".join(" → ".join(pair) for pair in pairs)
+
+
 @dataclass(frozen=True, repr=False)
 class AssignmentRow(Brief):
     """How the answer was found and what it is worth.
 
     Objectives are those of the exact problem: the weighted mean square relative error in Hz, of the
-    worst case the largest weighted error; prices included.
+    worst case the largest weighted error; the mass in kg; less the least frequency in Hz, or the
+    least room; prices included.
     """
 
     method: Annotated[str, Fact("sequential or one_shot")]
-    objective: Annotated[str, Fact("least_squares or worst_case")]
+    objective: Annotated[str, Fact("least_squares, worst_case, lightest, highest or widest")]
     objective_initial: float
     objective_optimal: float
     optimality: OptimalityRow
@@ -449,6 +576,8 @@ class AssignmentRow(Brief):
     catalogue: CatalogueRow | None = None
     limits: Annotated[tuple[LimitRow, ...], Fact("of quantities that need no frequency")] = ()
     shortcoming: Annotated[str | None, Fact("why this is no answer to build on")] = None
+    aim: Annotated[AimRow | None, Fact("of an objective that is no error")] = None
+    robust: RobustRow | None = None
 
 
 # --- What the answer means
@@ -472,6 +601,64 @@ class SensitivityRow:
 
 
 @dataclass(frozen=True)
+class PartRow:
+    """The share of a mode's energies that a part has, by its key path: means over the samples.
+
+    ``_largest`` are the ones of largest magnitude, at the samples ``_at``. That of the weight in
+    what strains is negative where it softens.
+    """
+
+    mode: Key
+    part: str
+    strain: Annotated[Share, Fact("of what drives, springs, links and the weight hold")]
+    strain_largest: Share
+    strain_at: str
+    kinetic: Annotated[Share, Fact("of what links, bodies and drives move with")]
+    kinetic_largest: Share
+    kinetic_at: str
+
+
+@dataclass(frozen=True)
+class EffectRow:
+    """The per cents by which a frequency rises for a per cent more of a property, (p/f) ∂f/∂p."""
+
+    mode: Key
+    property: str
+    percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
+    percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]
+    at: Annotated[str, Fact("the sample of the largest")]
+
+
+@dataclass(frozen=True)
+class ModeAnatomy:
+    """What a mode is and what would help it: parts, and properties that are no parameters."""
+
+    mode: str
+    parts: tuple[PartRow, ...]
+    properties: Annotated[tuple[EffectRow, ...], Fact("the most effective first")]
+
+    def most(self, kind: str, few: int) -> str:
+        """The parts with most of an energy, ``coordinates.q1.drive 62 %, links.arm 21 %``."""
+        rows = sorted(self.parts, key=lambda one: -abs(getattr(one, kind)))[:few]
+        shares = ((one.part, 100.0 * getattr(one, kind)) for one in rows)
+        return ", ".join(f"{part} {share:.3g} %" for part, share in shares if abs(share) > SEEN)
+
+    def helped(self, few: int) -> str:
+        """What a per cent more of the most effective properties does to the frequency."""
+        rows = ((one.property, one.percent_per_percent) for one in self.properties[:few])
+        return ", ".join(f"{path} {change:+.2g} %" for path, change in rows if change)
+
+    @property
+    def words(self) -> str:
+        """The same in a sentence."""
+        said = f"{self.mode}: strain is in {self.most('strain', 3)}; motion in "
+        said += self.most("kinetic", 3)
+        helped = self.helped(3)
+        more = f"; 1 % more of what is no parameter changes it by: {helped}" if helped else ""
+        return (said + more).replace(" -", " −")
+
+
+@dataclass(frozen=True)
 class RelaxedRow:
     """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order."""
 
@@ -480,7 +667,9 @@ class RelaxedRow:
     side: Annotated[str, Fact("lower or upper", "side")]
     amount: Annotated[InUnit, Fact("of a target the share of its limit")]
     unit: str
-    quantity: Annotated[str, Fact("rms error, worst error (fractions), price or objective")]
+    quantity: Annotated[
+        str, Fact("rms or worst error, room (fractions), frequency, mass, price or objective")
+    ]
     before: float
     after: float
     words: Annotated[str, Fact("all of it in words", "relaxed, to first order")]
@@ -549,6 +738,7 @@ class Meaning(Brief):
     tolerance: ToleranceRows | None = None
     trade_off: TradeOff | None = None
     unreachable: tuple[str, ...] = ()  # in words, with numbers
+    anatomies: tuple[ModeAnatomy, ...] = ()  # of the modes of targets that are missed
     notes: tuple[str, ...] = ()
 
 
@@ -735,6 +925,7 @@ class RunResults(Brief):
     spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for
     moving: tuple[MovingMode, ...] = ()  # of every trajectory, where a report shows it
     drives: tuple[DriveRow, ...] = ()  # of every coordinate, where anything loads them
+    statics: tuple[StaticRow, ...] = ()  # of every static target
 
     @property
     def along(self) -> str:
@@ -771,23 +962,25 @@ class RunResults(Brief):
     def error(self) -> ErrorSummary | None:
         """Over all wanted frequencies: the largest maximum and the root of the mean square.
 
-        Where none is wanted, over the violations of all limits; None without targets.
+        Where none is wanted, over the violations of all limits; None without either.
         """
-        if not self.targets:
+        if not self.counted:
             return None
         return over_all([(target.error, target.weight_s) for target in self.counted])
 
     @property
     def price(self) -> float | None:
-        """The cost of the change of the design; None where nothing has a price."""
-        priced = [row.cost for row in self.design if row.price is not None]
+        """The cost of the choices and of the change; None where nothing has a price."""
+        priced = [row.cost for row in self.design if row.is_priced]
+        if self.mass is not None and self.mass.price is not None:
+            priced.append(self.mass.cost)
         return sum(priced) if priced else None
 
     @property
     def counted(self) -> tuple[TargetStudy, ...]:
-        """The targets that ``error`` is of: wanted frequencies, or all where there are none."""
+        """The targets that ``error`` is of: wanted frequencies, or else all that may be missed."""
         wanted = tuple(target for target in self.targets if target.asked.is_goal)
-        return wanted or self.targets
+        return wanted or tuple(target for target in self.targets if not target.asked.is_aim)
 
     def error_along(self, name: str) -> ErrorSummary | None:
         """The same along one trajectory; None where no target holds on it."""
@@ -846,6 +1039,7 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         others=_part(results.others, rows),
         spectrum=_part(results.spectrum, rows),
         drives=tuple(_part(drive, rows) for drive in results.drives),
+        statics=tuple(_part(static, rows) for static in results.statics),
     )
 
 
@@ -868,7 +1062,7 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
         _part(target, rows),
         asked=replace(asked, rows=slice(first, first + length)),
         error=along.error,
-        followed=_part(target.followed, rows),
+        followed=tuple(_part(row, rows) for row in target.followed),
         along=(replace(along, rows=slice(0, length)),),
         near=_part(target.near, rows),
     )

@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.scenarios import Tolerances
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.sampling import design_limits
+from eigassign.assignment.requirements.static_limit import StaticLimit
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, MissingMassError
@@ -126,9 +128,25 @@ class Scene:
         return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
     @cached_property
+    def tolerances(self) -> Tolerances:
+        """How far the parameters may deviate from what they are made to be."""
+        each = [column.tolerance for column in self.file.design.parameters.values()]
+        share, amount = (
+            np.array([one.amount if one and one.relative == of else 0.0 for one in each])
+            for of in (True, False)
+        )
+        quantities = self.file.design_quantities
+        return Tolerances(share, amount, np.array([0 in (q.at_least, q.above) for q in quantities]))
+
+    @cached_property
     def limits(self) -> tuple[LimitedQuantity, ...]:
         """The limits of quantities of the design, at all samples of the trajectories."""
         return design_limits(self.file, self.model, self.trajectory)
+
+    @property
+    def statics(self) -> tuple[StaticLimit, ...]:
+        """Those of static targets."""
+        return tuple(one for one in self.limits if isinstance(one, StaticLimit))
 
     @property
     def constraints(self) -> tuple[LinearConstraint, ...]:

@@ -96,11 +96,16 @@ def _row(
 def weight_doubt(
     file: CaseFile, row: WeightRow | None, asked: Collection[int], accepted: float
 ) -> Iterator[str]:
-    """Say why no number can be vouched for: gravity changes a mode ``asked`` for by too much."""
+    """Say why no number can be vouched for: gravity changes a mode ``asked`` for by too much.
+
+    Where none is, nothing that is asked rests on a frequency or on how far links bend.
+    """
+    asks = bool(asked or file.targets)  # of modes or statics
+    row = row if asks else None
     said, change = ("", 0.0) if row is None else _worst(row, asked)
     if change > accepted:
         yield f"{said}, and {100 * accepted:.3g} % are accepted{_advice(file)}"
-    if row is None and file.mechanism.gravity != "none":
+    if asks and row is None and file.mechanism.gravity != "none":
         yield "what gravity changes is not known"
     if row is not None and _bent(row) > accepted:
         yield f"{_large(row)}, and {100 * accepted:.3g} % are accepted"

@@ -163,7 +163,7 @@ def test_a_band_is_missed_by_the_best_number_of_modes_below_it(wanted: Read) -> 
     for low, high, error in ((205.0, 230.0, 210.0 / 205.0 - 1.0), (180.0, 208.0, 1.0 - 200 / 208)):
         (one,) = wanted(f"{{keep_out: [{low}, {high}]}}")
         assert one.errors(solved(hz)).max() == pytest.approx(error, rel=1e-12)
-        assert one.below(hz).tolist() == [
+        assert one.below(solved(hz)).tolist() == [
             [1 + (f < edge) for f in hz[:, 1]] for edge in (low, high)
         ]
 
@@ -231,7 +231,7 @@ def test_a_followed_mode_is_named_at_a_pose_and_design(
         found = named_pose(file, followed, some, named)
         np.testing.assert_allclose(found, q, rtol=1e-14)
     (one,) = requirements_of(file, path)
-    assert (one.followed, one.modes, one.terms) == (followed, (), ((-1, 1.0),))
+    assert (one.followed, one.modes, one.terms) == ((followed,), (), ((-1, 1.0),))
 
 
 def test_a_difference_that_is_round_off_is_none(wanted: Read) -> None:
@@ -248,3 +248,22 @@ def test_a_difference_that_is_round_off_is_none(wanted: Read) -> None:
     assert not asked.appraise(beside, found).residual.any()
     assert not asked.appraise(beside, found).excess.any()
     assert asked.appraise(apart, found).residual.all()
+
+
+def test_speeds_of_rotation_are_read_where_a_band_is_meant(folder: Path, wanted: Read) -> None:
+    (folder / "n.csv").write_text("frequency [rpm],time\n3000,0\n6000,3\n")
+    (edges,) = wanted("{keep_out: [3000 rpm, 60 Hz]}")
+    assert (edges.lower[0], edges.upper[0]) == (50.0, 60.0)
+    for of, last in (
+        ("3000 rpm", 50.0),
+        ("{time: [0, 3], frequency: [3000 rpm, 100 Hz]}", 100.0),
+        ("{file: n.csv}", 100.0),
+    ):
+        (one,) = wanted(f"{{keep_out: {{harmonic: 2, of: {of}, margin: 10 %}}}}")
+        assert one.lower[0] == pytest.approx(90.0, rel=1e-12)
+        assert one.upper[-1] == pytest.approx(2.2 * last, rel=1e-12)
+    with pytest.raises(CaseError, match="rpm and turns are not converted"):
+        wanted("{mode: 1, at_least: 3000 rpm}")
+    (folder / "f.csv").write_text("frequency [rpm],time\n3000,0\n6000,3\n")
+    with pytest.raises(CaseError, match="rpm and turns are not converted"):
+        wanted("{mode: 1, frequency: {file: f.csv}}")

@@ -46,6 +46,8 @@ from eigassign.case import DIMENSIONS, QuantityError, read_quantity
         ("12 Nm/rad", "rotational stiffness", 12.0),
         ("1 N m/deg", "rotational stiffness", 180 / math.pi),
         ("3 kN m/rad", "rotational stiffness", 3000.0),
+        ("1 N m/arcmin", "rotational stiffness", 60 * 180 / math.pi),
+        ("2 kgf m/arcmin", "rotational stiffness", 2 * 9.80665 * 60 * 180 / math.pi),
         ("200 ms", "time", 0.2),
         ("2 min", "time", 120.0),
         ("1.5 h", "time", 5400.0),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import random
 import re
 import signal
 import subprocess
@@ -222,13 +223,32 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize("name", ["click", "eigassign.cli.runs", "pydantic", "numpy"])
+@pytest.mark.parametrize(
+    "name", ["gc", "typing", "dataclasses", "click", "eigassign.cli.runs", "pydantic", "numpy"]
+)
 def test_ctrl_c_while_packages_are_imported_ends_with_130(name: str) -> None:
     code = INTERRUPTED_IMPORT.format(name=name)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 130
     assert done.stderr == "eigassign: interrupted\n"
     assert done.stdout == ""
+
+
+@pytest.mark.slow
+def test_ctrl_c_at_any_moment_of_the_start_shows_no_import_of_ours() -> None:
+    """Before that it is Python that is interrupted."""
+    draw, codes = random.Random(1), []
+    for _ in range(60):
+        command = [sys.executable, "-m", "eigassign", "check", "good.yaml"]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen(command, **pipes, env=environment())
+        time.sleep(draw.uniform(0.0, 0.12))
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=SECONDS)
+        assert "eigassign/" not in err, err
+        codes.append(process.returncode)
+        assert codes[-1] != 130 or err == "eigassign: interrupted\n"
+    assert codes.count(130) > len(codes) / 4
 
 
 @pytest.mark.parametrize("out", ["good.yaml/run", "good.yaml", "/dev/null/run"])

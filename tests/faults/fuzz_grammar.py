@@ -17,6 +17,7 @@ SHAPES = {
     "circle": ("diameter",),
     "tube": ("outer_diameter", "thickness"),
     "rectangle": ("width", "height"),
+    "box": ("height", "width", "thickness"),
     "i_profile": ("height", "width", "flange_thickness", "web_thickness"),
 }
 FREEDOMS = {

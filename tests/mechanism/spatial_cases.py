@@ -91,5 +91,5 @@ def changed(tree: Tree, path: str, value: Any) -> Tree:
     *keys, last = path.split(".")
     for key in keys:
         at = at[key]
-    at[last] = value
+    at[int(last) if isinstance(at, list) else last] = value
     return out

@@ -68,6 +68,10 @@ def section(data: Mapping[str, Any]) -> tuple[float, float]:
         return data["area"], data["bending_inertia"]
     if shape == "rectangle":
         return data["width"] * data["height"], data["width"] * data["height"] ** 3 / 12
+    if shape == "box":
+        b, h = data["width"], data["height"]
+        p, q = (side - 2 * data["thickness"] for side in (b, h))
+        return b * h - p * q, (b * h**3 - p * q**3) / 12
     outer = data["diameter"] if shape == "circle" else data["outer_diameter"]
     inner = 0.0
     if shape == "tube":

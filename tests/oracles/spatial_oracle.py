@@ -286,8 +286,8 @@ def dimensions(mechanism: Tree, section: Any, share: float) -> Tree:
     return {k: v if isinstance(v, str) else v * (1 - share) + b[k] * share for k, v in a.items()}
 
 
-def section(s: Tree) -> tuple[float, float, float, float, float, float]:
-    """A, I_z, I_y, J, I_p, κ."""
+def section(s: Tree) -> tuple[Any, ...]:
+    """A, I_z, I_y, J, I_p, κ; the κ of a box are two, with I_z and I_y."""
     shape = s.get("shape", "bare")
     kappa = s.get("shear_coefficient", KAPPA.get(shape, 5 / 6))
     if shape in ("circle", "tube"):
@@ -304,6 +304,16 @@ def section(s: Tree) -> tuple[float, float, float, float, float, float]:
         J = max(b, h) * min(b, h) ** 3 / 3 - 64 / np.pi**5 * min(b, h) ** 4 * waves.sum()
         I_z, I_y = b * h**3 / 12, h * b**3 / 12
         return b * h, I_z, I_y, J, I_z + I_y, kappa
+    if shape == "box":
+        b, h, t = s["width"], s["height"], s["thickness"]
+        a, c = b / 2 - t, h / 2 - t  # of the hole
+        A, I_z, I_y = b * h - 4 * a * c, (b * h**3 - 16 * a * c**3) / 12, 0.0
+        I_y = (h * b**3 - 16 * c * a**3) / 12
+        stream = 4 * a * c + 2 * (a + c) * t + 4 * 0.144834 * t**2
+        J = 4 * stream**2 / (4 * (a + c) / t + 4 * 0.558729)
+        J += 4 * (a + c) * t**3 / 3 + 4 * 0.405824 * t**4
+        both = [I**2 / A / box_energy(*half, t) for I, half in ((I_z, (a, c)), (I_y, (c, a)))]  # noqa: E741
+        return A, I_z, I_y, J, I_z + I_y, np.array(both)
     if shape == "i_profile":
         parts = [(s["width"], s["flange_thickness"], (s["height"] - s["flange_thickness"]) / 2)] * 2
         parts += [(s["web_thickness"], s["height"] - 2 * s["flange_thickness"], 0.0)]
@@ -322,6 +332,17 @@ def section(s: Tree) -> tuple[float, float, float, float, float, float]:
         s.get("polar_inertia", I_z + I_y),
         kappa,
     )
+
+
+def box_energy(a: float, c: float, t: float) -> float:
+    """∫ (Q/t)² dA of the shear flow in a box with the hole 2a × 2c."""
+    flow = t * (c + t / 2)  # first moment of a flange per unit of its length
+    entry, more = flow * a, flow * t
+    points, weights = np.polynomial.legendre.leggauss(4)
+    y = c * (points + 1) / 2
+    web = (c / 2 * weights * (entry + more + t * (c**2 - y**2) / 2) ** 2).sum() / t
+    corner = 0.558729 * entry**2 + 0.616 * entry * more + 0.459 * more**2
+    return float(4 * (flow**2 * a**3 / 3 / t + corner + web))
 
 
 def bending(s: float, h: float) -> list[tuple[list[int], Array, Array, Array]]:
@@ -371,14 +392,15 @@ def shaped_element(
             n[[dof, dof + 6]], dn[[dof, dof + 6]] = [1 - s, s], [-1 / h, 1 / h]
             k += w * stiff * np.outer(dn, dn)
             m += w * mass * np.outer(n, n)
-        for I, (dofs, v, slope, bend) in zip((I_z, I_y), bending(s, h), strict=True):  # noqa: E741
+        each = zip((I_z, I_y), np.broadcast_to(kappa, 2), bending(s, h), strict=True)
+        for I, k_s, (dofs, v, slope, bend) in each:  # noqa: E741
             strain = np.zeros(14)
             strain[dofs[-1]] = 1
             theta = slope - strain
             k += w * E * I * np.outer(bend, bend)
             m += w * rho * A * np.outer(v, v)
             if sheared:
-                k += w * kappa * G * A * np.outer(strain, strain)
+                k += w * k_s * G * A * np.outer(strain, strain)
                 m += w * rho * I * np.outer(theta, theta)
     T = np.eye(14)[:, :12]
     if sheared:

@@ -34,7 +34,7 @@ def searched() -> RunResults:
     limit = as_limit(target, "at_most", np.full(152, -np.inf), np.full(152, 205.0))
     y = np.full(2, 0.1)
     best = tuple(
-        CombinationRow({"rod": rod, "hub": "20"}, y, cost, missed)
+        CombinationRow({"rod": rod, "hub": "20"}, y, cost, missed, price=cost)
         for rod, cost, missed in (("light", 3.5, 0.0), ("heavy", 4.0, 0.02))
     )
     assert results.assignment is not None

@@ -66,8 +66,7 @@ def test_the_optimum_is_that_of_each_half_though_their_modes_cross(found: RunRes
 
 
 def test_swaps_are_reported_with_sample_and_numbers(found: RunResults) -> None:
-    rail = found.targets[0].followed
-    assert rail is not None
+    (rail,) = found.targets[0].followed
     assert (rail.initial_numbers == 1).all()
     swap = int(np.flatnonzero(np.diff(rail.exact_numbers))[0]) + 1
     note = (
@@ -125,7 +124,9 @@ def test_limits_hold_for_the_shape_on_every_trajectory_with_its_load() -> None:
     optimum = [row.optimal for row in run.design]
     assert optimum[1] == pytest.approx(lamp_for(26.0), rel=1e-6)
     assert rail.exact_hz.min() == pytest.approx(25.0, rel=1e-7)
-    assert len(set(rail.followed.exact_numbers)) == 2  # with the full carriage it is the lower one
+    assert (
+        len(set(rail.followed[0].exact_numbers)) == 2
+    )  # with the full carriage it is the lower one
 
 
 def test_a_mode_that_is_lost_at_the_initial_design_is_refused() -> None:

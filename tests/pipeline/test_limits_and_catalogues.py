@@ -190,6 +190,38 @@ def test_catalogues_are_searched_for_every_number_of_modes_below_a_band(
     assert [(one.below, one.clear) for one in row.clearances] == [(below, True)]
 
 
+@pytest.mark.parametrize("band", [(185, 420), (380, 500), (380, 520)])
+def test_where_no_combination_is_clear_of_a_band_the_nearest_is_the_answer(
+    band: tuple[int, int],
+) -> None:
+    """By the number of modes that the first sample has below it another may seem so."""
+    masses = (0.0, 0.12, 0.25)
+    design = "".join(
+        f"  {name}: {{parameter: bodies.{body}.mass, values: [0, 120 g, 250 g]}}\n"
+        for name, body in (("m1", "elbow_mass"), ("m2", "tool_mass"))
+    )
+    target = f"  - {{keep_out: [{band[0]} Hz, {band[1]} Hz]}}\n"
+    text = f"{HEAD}design:\n{design}{TAIL}{target}"
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
+    result, row = solved(f"design:\n{design}", target)
+    model, q = case.model(), case.trajectory.q
+    pairs = itertools.product(masses, repeat=2)
+    missed = {y: _inside(model.frequencies(q, y, 4), band) for y in pairs}
+    assert min(missed.values()) > 0.0
+    assert row.verdict in ("infeasible", "unreachable")
+    found = tuple(float(v) for v in result.design.values())
+    assert missed[found] == pytest.approx(min(missed.values()), abs=1e-9)
+
+
+def _inside(hz: np.ndarray, band: tuple[int, int]) -> float:
+    """How far modes are in a band, relative to its edges, with the best number of modes below."""
+    n, (lower, upper) = hz.shape[1], band
+    below = np.hstack([np.zeros((len(hz), 1)), hz])
+    above = np.hstack([hz, np.full((len(hz), 1), np.inf)])
+    each = np.maximum(below / lower - 1.0, 1.0 - above / upper).max(axis=0)
+    return float(each[:n].min())
+
+
 def test_of_compromises_that_miss_alike_the_one_with_the_least_objective_is_the_answer() -> None:
     limits = (
         "  constraints:\n"

@@ -15,10 +15,10 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 import eigassign as ea
+from eigassign.cli import main
 from eigassign.errors import CaseError, StorageError, UsageError
 
 Floats = NDArray[np.float64]
-pytest.importorskip("yourdfpy", reason="yourdfpy, the extra urdf, is not installed")
 
 ROBOT = """<?xml version="1.0"?>
 <robot name="crane">
@@ -217,3 +217,75 @@ def test_wrong_arguments_are_refused(crane: Path) -> None:
         ea.urdf_mapping(crane.with_name("none.urdf"), 1e4)
     with pytest.raises(CaseError, match=r"case: coordinates\.yaw\.drive\.stiffness"):
         ea.load_case(ea.urdf_mapping(crane, "4 kg"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-16-be"])
+def test_entities_are_refused_in_every_encoding(crane: Path, encoding: str) -> None:
+    declared = f'<?xml version="1.0" encoding="{encoding[:6]}"?>'
+    text = ROBOT.replace('<?xml version="1.0"?>', declared)
+    if encoding != "utf-16-be":  # which the parser knows by its mark alone
+        crane.write_bytes(text.encode(encoding))
+        assert len(ea.urdf_mapping(crane, 1e4)["coordinates"]) == 3
+    crane.write_bytes(
+        text.replace("<robot", "<!DOCTYPE x [<!ENTITY a 'b'>]><robot").encode(encoding)
+    )
+    with pytest.raises(UsageError, match=r"no document type and no entities|not a URDF file"):
+        ea.urdf_mapping(crane, 1e4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<mass value="5"/>', '<mass value="five"/>', "expected a number"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0.6"', "expected 3 numbers"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0 0"', "joint pitch: its axis has no direction"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0 ${a}"', r"xacro .*crane.urdf > robot.urdf expands it"),
+        ("<robot", '<xacro:x xmlns:xacro="http://ros.org/wiki/xacro"/><robot', "xacro"),
+        ("robot", "sdf", "it begins with <sdf>, not <robot>"),
+        ('name="pitch"', 'name="yaw"', "two links or two joints have one name"),
+    ],
+)
+def test_what_is_wrong_in_a_robot_is_named(crane: Path, old: str, new: str, said: str) -> None:
+    crane.write_text(ROBOT.replace(old, new), encoding="utf-8")
+    with pytest.raises(UsageError, match=said):
+        ea.urdf_mapping(crane, 1e4)
+
+
+def test_init_writes_a_case_that_runs_and_lists_what_is_to_be_filled_in(
+    crane: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(crane.parent)
+    assert main(["init", "--urdf", "crane.urdf"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    asked = [line for line in out if line.startswith("crane.yaml:")]
+    lines = (crane.parent / "crane.yaml").read_text(encoding="utf-8").splitlines()
+    marked = [n for n, line in enumerate(lines, 1) if line.endswith("# fill in") and n > 1]
+    assert [int(line.split(":")[1]) for line in asked] == marked
+    assert len(asked) == 4
+    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[2]
+    case = ea.load_case(crane.parent / "crane.yaml")
+    drives = {"yaw": "20 kN m/rad", "pitch": "20 kN m/rad", "lift": "20 MN/m"}
+    same = ea.load_case(ea.urdf_mapping(crane, drives))
+    found, expected = (each.model().frequencies(POSE, [], 3) for each in (case, same))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert main(["check", "crane.yaml"]) == 0
+    assert main(["init", "--urdf", "crane.urdf"]) == 3  # it exists
+    assert main(["init", "gantry", "--urdf", "crane.urdf"]) == 2
+    assert "name a template or --urdf, not both" in capsys.readouterr().err
+
+
+def test_a_joint_that_moves_no_mass_is_locked_and_said(
+    crane: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(crane.parent)
+    start = ROBOT.index("<inertial>", ROBOT.index('name="tool"'))
+    end = ROBOT.index("</inertial>", start) + len("</inertial>")
+    bare = (ROBOT[:start] + ROBOT[end:]).replace(
+        '"flange" type="fixed"', '"flange" type="revolute"'
+    )
+    crane.write_text(bare, encoding="utf-8")
+    assert main(["init", "--urdf", "crane.urdf"]) == 0
+    assert (
+        "drive of flange: nothing beyond it has mass in the URDF; locked" in capsys.readouterr().out
+    )
+    assert ea.load_case(crane.parent / "crane.yaml").model().frequencies([*POSE, 0.0], [], 3).all()

@@ -41,12 +41,16 @@ KEEP, SECONDS = 5, 60.0  # the combinations that are told of, and the time to fi
 
 @dataclass(frozen=True)
 class ListedValues:
-    """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns)."""
+    """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns).
+
+    ``prices`` (n_rows,): what a whole row costs, of F; none where its columns have prices, if any.
+    """
 
     name: str
     columns: tuple[int, ...]
     rows: Floats
     labels: tuple[str, ...] = ()
+    prices: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         what = f"catalogue {self.name!r}"
@@ -56,6 +60,28 @@ class ListedValues:
         same_length(f"{what}, values", self.rows.shape[1], len(self.columns), "parameters it sets")
         if self.labels:
             same_length(f"{what}, labels", len(self.labels), self.rows.shape[0], "rows")
+
+    def price(self, y: Floats) -> float:
+        """The price of the row nearest to a design (n_y,), in shares of the columns' ranges."""
+        if not self.prices:
+            return 0.0
+        width = np.ptp(self.rows, axis=0)
+        away = (self.rows - y[list(self.columns)]) / np.where(width > 0.0, width, 1.0)
+        return self.prices[int(np.linalg.norm(away, axis=1).argmin())]
+
+    def price_below(self, rows: Rows) -> tuple[Floats, float]:
+        """Slopes (n_columns,) and constant of a linear price that none of these rows is below.
+
+        It fits their prices by least squares, lowered by the largest amount that it is above one.
+        """
+        if not self.prices:
+            return np.zeros(len(self.columns)), 0.0
+        own, prices = self.rows[list(rows)], np.array(self.prices)[list(rows)]
+        middle, width = own.mean(axis=0), np.ptp(own, axis=0)
+        unit = (own - middle) / np.where(width > 0.0, width, 1.0)
+        fit = np.linalg.lstsq(unit, prices - prices.mean(), rcond=None)[0]
+        slopes = fit / np.where(width > 0.0, width, 1.0)
+        return slopes, float((prices - own @ slopes).min())
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ once, by J ≥ ‖P (A (y − y0) + b)‖², where P projects onto what continuo
 without such columns that bound is J itself.
 
 **The exact problem** (`choose`), solved in steps. A combination is the problem with the listed
-columns held, its continuous columns minimised by `sequential`. Up to `MOST` combinations are gone
-through one by one, each as far as what is known of it (`Least`) does not put it behind the best:
-without continuous columns the best few are the best there are. Of more, a node's relaxation is the
-problem within the hull of its rows. That is a local optimum and no bound: the best of a tree is the
-best found.
+columns held, its continuous columns minimised by `sequential`. Few combinations (`are_few`) are
+gone through one by one, each as far as what is known of it (`Least`) does not put it behind the
+best: without continuous columns the best few are the best there are. Of more, a node's relaxation
+is the problem within the hull of its rows. That is a local optimum and no bound: the best of a tree
+is the best found.
 """
 
 from __future__ import annotations
@@ -227,7 +227,9 @@ def _within(bounds: Bounds, own: ListedValues, rows: Rows) -> Rows:
 
 RELAXED = 3  # starts of the relaxation of all combinations
 MISSED = 1e-7  # of a constraint's terms: what the programs leave of a limit
-MOST = 5000  # combinations that are gone through one by one
+# Combinations that are gone through one by one, without anything continuous and with. Of 16 000
+# without that takes 14 to 35 s where a tree takes 40 to 200; of 6 000 with, 200 s and more.
+LISTED, MOST = 20_000, 5000
 TOGETHER = 64  # combinations that are looked at together
 STOPPED = (End.SECONDS, End.INTERRUPTED)
 
@@ -237,7 +239,8 @@ class Chosen:
     """The best combinations met, the best first: their rows, and each with its exact optimum.
 
     ``search`` is None where time ran out or Ctrl-C came before all was searched, and ``ended`` says
-    which. ``settled``: of each of all ``count`` combinations it is known that it is not better.
+    which. ``each``: they were gone through one by one. ``settled``: of each of all ``count``
+    combinations it is known that it is not better.
     """
 
     rows: tuple[Rows, ...]
@@ -245,8 +248,21 @@ class Chosen:
     search: CatalogueSearch | None
     appraisals: int
     count: int
+    each: bool
     settled: bool
     ended: End | None
+
+
+def are_listed(catalogues: Sequence[ListedValues], lower: Floats, upper: Floats) -> bool:
+    """True where nothing continuous is left between the limits (n_y,) of a design."""
+    listed = [column for own in catalogues for column in own.columns]
+    return not np.delete(upper > lower, listed).any()
+
+
+def are_few(catalogues: Sequence[ListedValues], lower: Floats, upper: Floats) -> bool:
+    """True where all combinations are gone through one by one."""
+    most = LISTED if are_listed(catalogues, lower, upper) else MOST
+    return prod(len(distinct_rows(own)) for own in catalogues) <= most
 
 
 def combinations(
@@ -279,18 +295,18 @@ def choose(
 ) -> Chosen:
     """The combination with the least violation, then the least F; begun near ``starts``.
 
-    Up to `MOST` combinations are gone through one by one, those of which it is known that they are
-    no better excepted; more are searched as a tree. The first few starts are tried at its root. If
-    no combination meets all limits, the tree is searched anew for the one that misses them least.
-    ``deadline`` is a time of `time.monotonic`. ``lacking`` says of a design (n_y,) without anything
-    continuous, which meets all limits, what it misses besides. Raises AccuracyError where no
-    combination has an answer.
+    Few combinations (`are_few`) are gone through one by one, those of which it is known that they
+    are no better excepted; more are searched as a tree. The first few starts are tried at its root.
+    If no combination meets all limits, the tree is searched anew for the one that misses them
+    least. ``deadline`` is a time of `time.monotonic`. ``lacking`` says of a design (n_y,) without
+    anything continuous, which meets all limits, what it misses besides. Raises AccuracyError where
+    no combination has an answer.
     """
     exact = _Exact(problem, catalogues, starts, steps, deadline, progress, lacking)
-    count = prod(map(len, exact.root))
+    each = are_few(catalogues, problem.lower, problem.upper)
     search, ended = None, None
     try:
-        search = exact.searched() if count > MOST else exact.enumerated()
+        search = exact.enumerated() if each else exact.searched()
     except _StoppedError as stopped:
         ended = stopped.end
     except AccuracyError:  # of a tree, in which no combination was met in time
@@ -303,8 +319,8 @@ def choose(
         )
     best = best_first(sorted(exact.fixed), exact.worth)[:KEEP]
     optima = tuple(exact.fixed[rows] for rows in best)
-    settled = search is not None and count <= MOST and exact.is_listed
-    return Chosen(tuple(best), optima, search, exact.appraisals, count, settled, ended)
+    settled, count = search is not None and each and exact.is_listed, prod(map(len, exact.root))
+    return Chosen(tuple(best), optima, search, exact.appraisals, count, each, settled, ended)
 
 
 class _Exact(CatalogueProblem):
@@ -325,8 +341,7 @@ class _Exact(CatalogueProblem):
     ) -> None:
         super().__init__(catalogues, problem.lower.size)
         self.problem, self.starts, self.lacking = problem, starts, lacking
-        listed = [column for own in catalogues for column in own.columns]
-        self.is_listed = not np.delete(problem.upper > problem.lower, listed).any()
+        self.is_listed = are_listed(catalogues, problem.lower, problem.upper)
         self.steps, self.deadline, self.progress = steps, deadline, progress
         self.bounds = Bounds(problem.lower, problem.upper)
         self.fixed: dict[Rows, Optimum] = {}
@@ -351,7 +366,8 @@ class _Exact(CatalogueProblem):
         every, lower, upper = combinations(self.catalogues, problem.lower, problem.upper)
         levels = 0 if problem.least is None else problem.least.levels
         level, violation = np.zeros(len(every), dtype=int), self._kept(lower, upper)
-        value = np.array([problem.price(y) for y in problem.cheapest(lower, upper)])
+        boxes = zip(lower, upper, strict=True)
+        value = np.array([problem.least_value(*box, np.zeros(0)) for box in boxes])
         for start in self.starts:  # so that there is an answer when time runs out
             self.solved(self.nearest(self.root, start))
         while True:
@@ -370,7 +386,7 @@ class _Exact(CatalogueProblem):
                 known = problem.least(level[first], lower[alike], upper[alike])
                 for k, (missed, residual) in zip(alike, known, strict=True):
                     violation[k] = max(violation[k], missed)
-                    value[k] = problem.value(problem.cheapest(lower[k], upper[k]), residual)
+                    value[k] = problem.least_value(lower[k], upper[k], residual)
             else:
                 self.progress(f"catalogues: {len(self.fixed)} of {len(every)} combinations solved")
                 alike, found = np.array([first]), self.solved(every[first])
@@ -414,7 +430,10 @@ class _Exact(CatalogueProblem):
         bounds, rows = hull(self.catalogues, node, self.bounds)
         constraints = (*self.problem.constraints, *rows)
         problem = replace(
-            self.problem, lower=bounds.lower, upper=bounds.upper, constraints=constraints
+            _with_linear_price(self.problem, self.catalogues, node),
+            lower=bounds.lower,
+            upper=bounds.upper,
+            constraints=constraints,
         )
         starts = list(self.starts[:RELAXED])
         if near is not None:  # optima of the whole are those of a node that holds them
@@ -461,6 +480,20 @@ class _Exact(CatalogueProblem):
             if not row.lower - size <= row.coefficients @ found.y <= row.upper + size:
                 return None
         return found
+
+
+def _with_linear_price(
+    problem: DesignProblem, catalogues: Sequence[ListedValues], node: Node
+) -> DesignProblem:
+    """The problem with prices that are linear over a node, and of no combination above its own."""
+    if problem.cost is None:
+        return problem
+    prices, constant = problem.cost.prices.copy(), 0.0
+    for own, rows in zip(catalogues, node, strict=True):
+        slopes, rest = own.price_below(rows)
+        prices[list(own.columns)] += slopes
+        constant += rest + float(slopes @ problem.cost.reference[list(own.columns)])
+    return replace(problem, cost=replace(problem.cost, prices=prices, listed=lambda _y: constant))
 
 
 def _of_feasible(found: Optimum) -> float | None:

@@ -2,8 +2,9 @@
 
 Its rows are m residuals, then k excesses. A row is linear in d until its mode is expected to meet a
 neighbour: behind that kink it is the worse of the line and of the eigenvalue of both modes' matrix
-(`crossing`). A program gets them one-sided: excesses, and of the worst case residuals either way,
-first as at the design, then as they are expected behind the kinks that its own step would pass.
+(`crossing`). A program gets them one-sided: excesses, and residuals if the largest is
+what counts, of the worst case either way; first as at the design, then as they are expected behind
+the kinks that its own step would pass.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ class Rows:
     def __len__(self) -> int:
         return len(self.owner)
 
-    def levels(self, d: Floats) -> tuple[float, float]:
-        """The least v and t, 0 at least, that a step d allows."""
+    def levels(self, d: Floats, least: float) -> tuple[float, float]:
+        """The least v, 0 at least, and t, ``least`` at least, that a step d allows."""
         values = self.value + self.slopes @ d
-        v, t = (np.max(values[of], initial=0.0) for of in (self.of_excess, ~self.of_excess))
-        return float(v), float(t)
+        v = np.max(values[self.of_excess], initial=0.0)
+        return float(v), float(np.max(values[~self.of_excess], initial=least))
 
     def and_more(self, others: Rows) -> Rows:
         """The rows of both, these first."""
@@ -64,7 +65,9 @@ class DesignPoint:
     values: Floats  # (m + k,)
     slopes: Floats  # (m + k, n)
     pairs: NeighbourPairs
+    cost_slopes: Floats  # (n,)
     squared: bool  # least squares: the program has the residuals' squares already
+    one_sided: bool  # residuals are the better the less they are
 
     @classmethod
     def of(cls, problem: DesignProblem, box: UnitBox, z: Floats, seen: Appraisal) -> DesignPoint:
@@ -78,7 +81,9 @@ class DesignPoint:
             values=np.append(seen.residual, seen.excess),
             slopes=slopes[:, box.free] * box.width,
             pairs=pairs.scaled(box.free, box.width),
-            squared=not problem.is_worst_case,
+            cost_slopes=problem.cost_slopes(box.y(z))[box.free] * box.width,
+            squared=problem.is_squared,
+            one_sided=problem.is_one_sided,
         )
 
     @property
@@ -100,17 +105,18 @@ class DesignPoint:
     def first_rows(self) -> Rows:
         """The one-sided rows that hold at the design."""
         residuals, excesses = np.split(np.arange(len(self.values)), [self.m])
-        either = residuals[:0] if self.squared else residuals
-        owner = np.concatenate([excesses, either, either])
-        sign = np.concatenate([np.ones(len(excesses) + len(either)), -np.ones(len(either))])
+        above = residuals[:0] if self.squared else residuals
+        below = above[:0] if self.one_sided else above
+        owner = np.concatenate([excesses, above, below])
+        sign = np.concatenate([np.ones(len(excesses) + len(above)), -np.ones(len(below))])
         return self._one_sided(owner, sign, self.values[owner], self.slopes[owner])
 
     def at(self, d: Floats) -> Expected:
         """The rows expected of a step d (n,)."""
         pairs, values = self.pairs, self.lines(d)
-        own, of_residual = values[pairs.row], pairs.row < self.m
+        own, either = values[pairs.row], self._either(pairs.row)
         found, slopes, turned = pairs.along(own, self.slopes[pairs.row], d)
-        badness, before = (np.where(of_residual, np.abs(one), one) for one in (found, own))
+        badness, before = (np.where(either, np.abs(one), one) for one in (found, own))
         worse = np.flatnonzero(turned & (badness > before))
         worse = worse[np.argsort(-badness[worse], kind="stable")]
         behind, first = np.unique(pairs.row[worse], return_index=True)  # the worst of two pairs
@@ -123,7 +129,7 @@ class DesignPoint:
         Squares are one row together: t is what they are more than those of the lines.
         """
         there, squares = values[behind], behind[: np.searchsorted(behind, self.m)]
-        sign = np.where(behind < self.m, np.sign(there), 1.0)
+        sign = np.where(self._either(behind), np.sign(there), 1.0)
         if self.squared and (p := len(squares)):
             linear, J = self.lines(d)[squares], self.slopes[squares]
             rise = 0.5 * (there[:p] @ there[:p] - linear @ linear)
@@ -131,6 +137,15 @@ class DesignPoint:
             behind, sign = behind[p - 1 :], np.ones(len(behind) - p + 1)
             there, slopes = np.append(rise, there[p:]), np.vstack([steep, slopes[p:]])
         return self._one_sided(behind, sign, there - slopes @ d, slopes)
+
+    def _either(self, rows: Indices) -> NDArray[np.bool_]:
+        """Whether rows are the worse the farther they are from 0, on either side."""
+        return (rows < self.m) & (not self.one_sided)
+
+    @property
+    def worse(self) -> Floats:
+        """The sign (m + k,) of a change that makes each row worse."""
+        return np.where(self._either(np.arange(len(self.values))), np.sign(self.values), 1.0)
 
     def _one_sided(self, owner: Indices, sign: Floats, value: Floats, slopes: Floats) -> Rows:
         return Rows(owner, sign, sign * value, sign[:, None] * slopes, owner >= self.m)
@@ -150,7 +165,7 @@ class DesignPoint:
         Those at kinks that the design may lie in: behind others the row is better than its own
         branch says, and no optimum lies there.
         """
-        worse = np.append(np.sign(self.values[: self.m]), np.ones(len(self.values) - self.m))
+        worse = self.worse
         here = self.pairs.gap <= MEET
         here &= np.isin(self.pairs.row, on)
         here &= np.where(self.pairs.larger, 1.0, -1.0) * worse[self.pairs.row] > 0.0

@@ -2,11 +2,12 @@
 
 What is minimised over the design y is
 
-    F(y) = Σ_k r_k(y)² + p·(y − y_ref)      least squares,      r_k = √ω_k (f_k / f_d,k − 1), or
-    F(y) = max_k |r_k(y)| + p·(y − y_ref)   worst case,
+    F(y) = Σ_k r_k(y)² + c(y)      least squares,      r_k = √ω_k (f_k / f_d,k − 1), or
+    F(y) = max_k |r_k(y)| + c(y)   worst case, or
+    F(y) = max_k r_k(y) + c(y)     the largest of rows such as −f_k,
 
-with prices p, bounds, linear constraints, and excesses c(y) ≤ 0 (how far inequalities are missed).
-Steps and slopes are in units z ∈ [0, 1] of the bounds.
+with a cost c (`Cost`), bounds, linear constraints, and excesses ≤ 0 (how far inequalities are
+missed). Steps and slopes are in units z ∈ [0, 1] of the bounds.
 """
 
 from __future__ import annotations
@@ -31,10 +32,49 @@ T = TypeVar("T")
 
 
 class Objective(StrEnum):
-    """The measure that is made small: the mean square of the residuals, or the largest."""
+    """The measure that is made small: the mean square of the residuals, or the largest.
+
+    The worst case is the largest in magnitude; ``largest`` looks at one sign only.
+    """
 
     LEAST_SQUARES = "least_squares"
     WORST_CASE = "worst_case"
+    LARGEST = "largest"
+
+
+@dataclass(frozen=True)
+class Cost:
+    """c(y) = p·(y − y_ref) + p_m (m(y) − m_ref) + what is chosen of lists, p_m ≥ 0 and m > 0.
+
+    Of parameters, of a mass, and of choices with a price each, which no slope tells.
+    """
+
+    prices: Floats  # (n_y,), per SI unit of y
+    reference: Floats  # (n_y,), y that costs nothing
+    of_mass: float = 0.0  # p_m
+    mass: Callable[[Floats], tuple[float, Floats]] | None = None  # its value and slopes (n_y,)
+    free: float = 0.0  # m_ref
+    is_affine: bool = True  # but for the choices
+    listed: Callable[[Floats], float] = lambda _y: 0.0
+
+    def __call__(self, y: Floats) -> tuple[float, Floats]:
+        """The cost of a design y (n_y,), and its slopes (n_y,)."""
+        value, slopes = float(self.prices @ (y - self.reference)) + self.listed(y), self.prices
+        if self.mass is None:
+            return value, slopes
+        mass, steep = self.mass(y)
+        return value + self.of_mass * (mass - self.free), slopes + self.of_mass * steep
+
+    def least(self, lower: Floats, upper: Floats) -> float:
+        """A cost that no design between two (n_y,) of the same choices is below.
+
+        It is one's where c is affine.
+        """
+        if self.is_affine or np.array_equal(lower, upper):
+            return self(np.where(self(lower)[1] > 0.0, lower, upper))[0]
+        cheapest = np.where(self.prices > 0.0, lower, upper)
+        linear = float(self.prices @ (cheapest - self.reference))
+        return linear + self.listed(cheapest) - self.of_mass * self.free
 
 
 @dataclass(frozen=True)
@@ -68,7 +108,7 @@ class Least(Protocol):
         """The number of levels."""
 
     def __call__(self, level: int, lower: Floats, upper: Floats) -> Iterable[tuple[float, Floats]]:
-        """Yield the violation and the magnitudes of residuals (m,) that no design is below.
+        """Yield the violation and what residuals (m,) make F least that any design has.
 
         Of the designs between each of ``lower`` and ``upper`` (n, n_y); infinite where none has an
         answer.
@@ -83,15 +123,24 @@ class DesignProblem:
     lower: Floats  # (n_y,), finite
     upper: Floats
     constraints: tuple[LinearConstraint, ...] = ()
-    prices: Floats | None = None  # (n_y,), of F per SI unit of y
-    reference: Floats | None = None  # (n_y,), y that costs nothing
+    cost: Cost | None = None
     objective: Objective = Objective.LEAST_SQUARES
     least: Least | None = None
 
     @property
-    def is_worst_case(self) -> bool:
-        """True where the largest residual is what is made small."""
-        return self.objective is Objective.WORST_CASE
+    def is_squared(self) -> bool:
+        """True where squares of residuals are what is made small, not the largest."""
+        return self.objective is Objective.LEAST_SQUARES
+
+    @property
+    def is_one_sided(self) -> bool:
+        """True where residuals are the better the less they are, also below 0."""
+        return self.objective is Objective.LARGEST
+
+    @property
+    def is_error(self) -> bool:
+        """True where F is an error: it cannot be below 0."""
+        return self.cost is None and not self.is_one_sided
 
     def __call__(self, y: Floats, seen: Appraisal) -> float:
         """F of a design and what `appraise` found of it."""
@@ -99,19 +148,29 @@ class DesignProblem:
 
     def value(self, y: Floats, residual: Floats) -> float:
         """F of a design that has these residuals."""
-        if self.is_worst_case:
-            return float(np.max(np.abs(residual), initial=0.0)) + self.price(y)
-        return float(residual @ residual) + self.price(y)
+        return self.measure(residual) + self.price(y)
 
-    def cheapest(self, lower: Floats, upper: Floats) -> Floats:
-        """The design (…, n_y) of least price between two."""
-        return lower if self.prices is None else np.where(self.prices > 0.0, lower, upper)
+    def least_value(self, lower: Floats, upper: Floats, residual: Floats) -> float:
+        """An F that no design between two (n_y,) is below, with these of `Least`."""
+        if self.is_one_sided and not len(residual):  # nothing is known of them
+            return -np.inf
+        return self.measure(residual) + (
+            0.0 if self.cost is None else self.cost.least(lower, upper)
+        )
+
+    def measure(self, residual: Floats) -> float:
+        """F but for the cost."""
+        if self.is_squared or not len(residual):
+            return float(residual @ residual)
+        return float(np.max(residual if self.is_one_sided else np.abs(residual)))
 
     def price(self, y: Floats) -> float:
-        """p·(y − y_ref)."""
-        if self.prices is None:
-            return 0.0
-        return float(self.prices @ (y - (0.0 if self.reference is None else self.reference)))
+        """c(y)."""
+        return 0.0 if self.cost is None else self.cost(y)[0]
+
+    def cost_slopes(self, y: Floats) -> Floats:
+        """The slopes (n_y,) of c."""
+        return np.zeros(len(y)) if self.cost is None else self.cost(y)[1]
 
 
 # --- The bounds as units
@@ -128,7 +187,6 @@ class UnitBox:
     rows: Floats
     row_lower: Floats
     row_upper: Floats
-    prices: Floats
 
     @classmethod
     def of(cls, problem: DesignProblem) -> UnitBox:
@@ -139,7 +197,6 @@ class UnitBox:
         C = C.reshape(len(problem.constraints), len(width))
         fixed = C @ problem.lower
         rows = C[:, free] * width[free]
-        prices = np.zeros(len(width)) if problem.prices is None else problem.prices
         return cls(
             lower=problem.lower,
             all_width=width,
@@ -148,7 +205,6 @@ class UnitBox:
             rows=rows,
             row_lower=np.array([row.lower for row in problem.constraints]) - fixed,
             row_upper=np.array([row.upper for row in problem.constraints]) - fixed,
-            prices=prices[free] * width[free],
         )
 
     @property
@@ -211,4 +267,4 @@ def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) ->
 
 def merit(problem: DesignProblem, value: float, violation: float, weight: float) -> float:
     """Half of F for least squares, as in the program, and the weighted violation."""
-    return (1.0 if problem.is_worst_case else 0.5) * value + weight * violation
+    return (0.5 if problem.is_squared else 1.0) * value + weight * violation

@@ -9,7 +9,8 @@ it `appraise` stacks the rows of all requirements:
     excess of "at most b"      (Σ c_i x_i − b) / |b|
 
 x_i being frequencies or quantities of the design, such as the mass of the mechanism. Where no
-frequency is wanted, the residuals are the changes of the design, (y − y_ref)/width.
+frequency is wanted, the residuals are the rows of what shall have as much room as can be (`aims`),
+like those of limits; or else the changes of the design, (y − y_ref)/width.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class Requirements:
     asked: tuple[Requirement, ...]
     time_weights: Floats
     objective: Objective = Objective.LEAST_SQUARES
-    least_change: tuple[Floats, Floats] | None = None  # y_ref and width, where none is a goal
+    least_change: tuple[Floats, Floats] | None = None  # y_ref and width, where nothing is aimed at
+    aims: tuple[Requirement, ...] = ()  # of the largest, instead of goals
 
     @cached_property
     def goals(self) -> tuple[Requirement, ...]:
@@ -55,7 +57,8 @@ class Requirements:
     @property
     def modes(self) -> int:
         """The highest numbered mode that anything is asked of; 1 if nothing is."""
-        return max((1, *(mode for one in self.asked for mode, _ in one.mode_terms)))
+        every = (*self.asked, *self.aims)
+        return max((1, *(mode for one in every for mode, _ in one.mode_terms)))
 
     @property
     def limit_names(self) -> tuple[str, ...]:
@@ -75,7 +78,9 @@ class Requirements:
 
     @cached_property
     def residuals(self) -> tuple[EdgeRows, ...]:
-        """The rows of the goals, one after the other."""
+        """The rows of the goals or aims, one after the other."""
+        if self.aims:
+            return tuple(rows for one in self.aims for rows in one.edge_rows())
         if self.objective is Objective.WORST_CASE:
             factors = [np.array(one.weight) for one in self.goals]
         else:
@@ -103,7 +108,7 @@ class Requirements:
     ) -> tuple[float, Floats]:
         """The violation that no design between two (n_y,) is below, and so its residuals (m,).
 
-        Its modes are between ``lowest`` and ``highest``; residuals are in magnitude.
+        Its modes are between ``lowest`` and ``highest``; residuals of goals are in magnitude.
         """
         excess, residual = (
             [rows.least(*rows.of.range_over(lower, upper, lowest, highest)) for rows in some]
@@ -139,20 +144,26 @@ class Requirements:
             yield rows.curve(residual[at])
 
     def curves(self, seen: Appraisal) -> Iterator[tuple[Requirement, Floats, Floats]]:
-        """Every goal, then limit, of frequencies, its curve (n,) in Hz and slopes (n, n_y).
+        """Every goal or aim, then limit, of frequencies, its curve (n,) in Hz and slopes (n, n_y).
 
         They are what ``seen`` was made from: nothing is solved.
         """
+        told: set[str] = set()
         for some, values, slopes in (
             (self.residuals, seen.residual, seen.slopes),
             (self.excesses, seen.excess, seen.excess_slopes),
         ):
             for rows, at in _spans(some):
-                if rows.of.mode_terms:
+                if rows.of.mode_terms and rows.of.label not in told:
+                    told.add(rows.of.label)
                     yield rows.of, rows.curve(values[at]), slopes[at] / rows.scale[:, None]
 
     def owner(self, index: int) -> tuple[str, str]:
-        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper."""
+        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper.
+
+        Those of scenarios follow one another, as many of each.
+        """
+        index %= sum(len(rows.edge) for rows in self.excesses)
         rows = next(rows for rows, at in _spans(self.excesses) if index < at.stop)
         return rows.of.name, rows.side
 

@@ -37,7 +37,7 @@ from eigassign.errors import EigassignError
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds
 TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doubled
 OPTIMAL = 1e-7  # stationarity that is accepted
-ROUND_OFF = 1e-12  # of F
+ROUND_OFF = 1e-12  # of F, and of residuals whose squares it has
 PAYS = 0.5  # optima not seen yet: where no more are expected, no further start is made
 # Designs met from which curvature is gathered, for each parameter: with stale residuals instead,
 # 4 of 4 starts with 30 parameters ended after 100 steps, with these after 36 to 72 at an optimum
@@ -114,9 +114,10 @@ def minimise(
                 break
             reached = run.taken(place, move)
             if reached is not None:
-                last = place is best and move.promised == 0.0
+                missed = max(place.seen.violation, MET)
+                nearer = place is best and reached.seen.violation <= missed  # also by its slopes
                 place, predicted = reached, move.expected.values[: reached.m]
-                both = [place] if last else [best, place]
+                both = [place] if nearer else [best, place]
                 best = best_first(both, lambda p: (p.seen.violation, p.value))[0]
             elif move.promised == 0.0 and np.abs(move.d).max() < NEAR:
                 end = End.STALLED
@@ -216,15 +217,16 @@ class _Run:
         return before - after
 
     def _kept(self, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> bool:
-        """True where enough of what the move promised has come."""
+        """True where enough of what the move promised has come, or its slopes balance better."""
         fall = self._fall(place, reached)
-        if move.promised > 0.0:
-            return bool(fall > TAKEN * move.promised)
+        if fall > TAKEN * move.promised > 0.0:
+            return True
         if reached.seen.violation > max(place.seen.violation, MET):
             return False
         # the program keeps off limits by `MET`, which may cost this much
-        on_limits = float(np.abs(move.multipliers[place.m :]).sum())
-        paid = ROUND_OFF * abs(place.value) + MET * on_limits
+        paid = MET * float(np.abs(move.multipliers[place.m :]).sum())
+        of_squares = float(np.linalg.norm(place.seen.residual)) if place.squared else 0.0
+        paid += ROUND_OFF * (abs(place.value) + of_squares)
         return fall >= -paid and self.unbalanced(reached) <= 0.5 * self.unbalanced(place)
 
 
@@ -235,18 +237,23 @@ def _curvature(
 
     By symmetric rank-one updates, the nearest last, so that it holds there best. They are made anew
     at every place: with residuals and multipliers of earlier ones S would be out of date, above all
-    where residuals fall. In the worst case the multipliers of residuals take the place of r. Of
-    rows at kinks the mean of both branches is taken, which is smooth.
+    where residuals fall. Where the largest is made small, the multipliers of residuals take the
+    place of r. The cost counts as a row. Of rows at kinks the mean of both branches is taken, which
+    is smooth.
     """
     weights = np.zeros(len(place.values)) if multipliers is None else multipliers
     if place.squared:
         weights = np.append(place.seen.residual, weights[place.m :])
+    of_cost = 0.5 if place.squared else 1.0  # the program has half of squares
     S = np.zeros((len(place.z), len(place.z)))
     others = ((np.linalg.norm(one.z - place.z), one) for one in met)
     for length, other in sorted(others, key=lambda each: -each[0]):
         d = other.z - place.z
         behind = place.at(d).behind
-        after, before = (weights @ one.smooth_slopes(behind) for one in (other, place))
+        after, before = (
+            weights @ one.smooth_slopes(behind) + of_cost * one.cost_slopes
+            for one in (other, place)
+        )
         rest = after - before - S @ d
         along = float(rest @ d)
         if abs(along) > 1e-8 * np.linalg.norm(rest) * length:

@@ -55,12 +55,16 @@ def first_order(
     violated = _unbalanced_violation(held, place) if seen.violation > ON else 0.0
     rows, slopes = _with_branches(place, m + np.flatnonzero(seen.excess >= -ON))
     held += [(one, "excess", int(k) - m, True) for k, one in zip(rows, slopes, strict=True)]
-    slope, size = box.prices, float(np.abs(box.prices).max())
+    slope, size = place.cost_slopes, float(np.abs(place.cost_slopes).max())
     if m and not place.squared:
-        top = np.abs(r).max()
-        rows, slopes = _with_branches(place, np.flatnonzero(np.abs(r) >= top - ON * max(top, TINY)))
-        steepest, kink, unit = np.sign(r[rows])[:, None] * slopes, np.zeros_like(rows), 1.0
+        badness = place.worse[:m] * r
+        top = badness.max()
+        # rows of one sign are relative, or frequencies in Hz
+        near = ON * max(abs(top), 1.0 if place.one_sided else TINY)
+        rows, slopes = _with_branches(place, np.flatnonzero(badness >= top - near))
+        steepest, kink = place.worse[rows][:, None] * slopes, np.zeros_like(rows)
         size += float(np.abs(steepest).max(initial=0.0))
+        unit = size if place.one_sided else 1.0
     else:
         slope = slope + 2.0 * J.T @ r
         largest = float(np.linalg.norm(r)) if np.linalg.norm(r) > TINY else 0.0

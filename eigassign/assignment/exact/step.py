@@ -2,14 +2,14 @@
 
 At the design reached, in units z ∈ [0, 1] of the bounds, the step d solves eqs. (13)–(14) anew,
 
-    min ½‖r + J d‖² + ½ dᵀS d + ½ p·d + ν v,   c + C d ≤ v,  v ≥ 0,  |d| ≤ Δ,
+    min ½‖r + J d‖² + ½ dᵀS d + ½ c'·d + ν v,   c + C d ≤ v,  v ≥ 0,  |d| ≤ Δ,
 
-or the same with the worst case's epigraph max |r + J d| = t. The bounds |d| ≤ Δ are the trust
-region: its norm is the largest entry, so that it only tightens bounds, and the program stays the
-one that `solver` solves. v keeps it feasible, ν is raised until v falls no further. S is the part
-of the Hessian that J does not hold, gathered from the slopes met (symmetric rank-one updates), made
-convex. Where the design expects of the step rows that the program had not, it is sought anew with
-them.
+or the same with the epigraph of the largest: max |r + J d| ≤ t, or r + J d ≤ t. The bounds |d| ≤ Δ
+are the trust region: its norm is the largest entry, so that it only tightens bounds, and the
+program stays the one that `solver` solves. v keeps it feasible, ν is raised until v falls no
+further. S is the part of the Hessian that J does not hold, gathered from the slopes met (symmetric
+rank-one updates), made convex. Where the design expects of the step rows that the program had not,
+it is sought anew with them.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def step_program(
     """The step of the program at a place, None where there is none, and the region it was made in.
 
     After a ``spoilt`` step the rows pass through what was found there, not only through here. Where
-    steps with more and more rows promise nothing, the region shrinks to where the last ones hold.
+    steps with more and more rows promise nothing, the region shrinks to where the last ones hold;
+    if that helps nothing, the first one is to show by its slopes whether it is nearer.
     """
     if spoilt is not None:
         there, move = spoilt
@@ -65,18 +66,20 @@ def step_program(
     program = _Program(problem, box, place, *_convex(place, region.S))
     if region.weight == 0.0 and len(place.seen.excess):
         region = replace(region, weight=program.first_weight())
+    flat: tuple[ProposedStep, TrustRegion] | None = None
     while True:
         best, has_more_rows, region = program.best_step(region)
         before = merit(problem, place.value, place.seen.violation, region.weight)
         if best is None or spoilt is not None or best.promised > FLAT * max(abs(before), TINY**2):
             return best, region
+        flat = flat or (replace(best, promised=0.0), region)
         if not has_more_rows or region.radius < SMALLEST:
-            return (replace(best, promised=0.0) if best.d.any() else None), region
+            return flat if flat[0].d.any() else (None, region)
         region = replace(region, radius=0.1 * region.radius)
 
 
 def _convex(place: DesignPoint, S: Floats) -> tuple[Floats, Floats]:
-    """S such that JᵀJ + S (S alone, of the worst case) is convex; and a root A of that sum."""
+    """S such that JᵀJ + S (S alone, of the largest) is convex; and a root A of that sum."""
     J = place.slopes[: place.m]
     if place.squared and not S.any():
         return S, np.asarray(np.linalg.qr(J, mode="r"))
@@ -96,17 +99,23 @@ class _Program:
     S: Floats  # convex
     root: Floats  # of the Hessian
 
+    @property
+    def least(self) -> float:
+        """The least t: errors are not below 0."""
+        return -np.inf if self.place.one_sided and self.place.m else 0.0
+
     def first_weight(self) -> float:
         """ν, ten times what balances the steepest objective with the flattest excess."""
         place = self.place
         J, C = np.split(place.slopes, [place.m])
         steep = np.abs(J.T @ place.values[: place.m] if place.squared else J).max(initial=0.0)
-        steep += np.abs(self.box.prices).max(initial=0.0)
+        steep += np.abs(place.cost_slopes).max(initial=0.0)
         return float(10.0 * max(steep, 1e-3) / max(np.abs(C).max(initial=0.0), 1e-3))
 
     def best_step(self, region: TrustRegion) -> tuple[ProposedStep | None, bool, TrustRegion]:
         """The step that promises most, whether rows were added, and the region with its weight."""
         problem, place, rows = self.problem, self.place, self.place.first_rows()
+        cost_here = problem.price(self.box.y(place.z))
         solved, region = self.with_weight(region, rows)
         before = merit(problem, place.value, place.seen.violation, region.weight)
         best, count = None, len(rows)
@@ -114,17 +123,17 @@ class _Program:
             if solved is None:
                 break
             d, multipliers = solved
-            y, expected = self.box.y(place.z + d), place.at(d)
+            cost, expected = cost_here + float(place.cost_slopes @ d), place.at(d)
             curved = before - 0.5 * float(d @ self.S @ d)
-            value = problem.value(y, expected.values[: place.m])
+            value = problem.measure(expected.values[: place.m]) + cost
             violation = float(np.max(expected.values[place.m :], initial=0.0))
             promised = curved - merit(problem, value, violation, region.weight)
             if best is None or promised > best.promised:
                 best = ProposedStep(d, promised, expected, multipliers)
-            v, t = rows.levels(d)
-            value = problem.price(y) + t
+            v, t = rows.levels(d, self.least)
+            value = cost + t
             if place.squared:
-                value = problem.value(y, place.lines(d)[: place.m]) + 2.0 * t
+                value = problem.measure(place.lines(d)[: place.m]) + cost + 2.0 * t
             hoped = curved - merit(problem, value, v, region.weight)
             # a step is taken for a tenth of its promise: as little may be lost at missed rows
             if not len(expected.rows) or hoped <= 0.0 or best.promised >= 0.9 * hoped:
@@ -139,24 +148,26 @@ class _Program:
         """The step that the rows lead to, and the region with a ν that no further rise betters."""
         solved, heavier = self.solved(region, rows), region
         for _ in range(6):  # tenfold rises of ν, while v falls
-            if solved is None or (v := rows.levels(solved[0])[0]) <= MET:
+            if solved is None or (v := rows.levels(solved[0], self.least)[0]) <= MET:
                 break
             heavier = replace(heavier, weight=10.0 * heavier.weight)
             again = self.solved(heavier, rows)
-            if again is not None and rows.levels(again[0])[0] < 0.99 * v:
+            if again is not None and rows.levels(again[0], self.least)[0] < 0.99 * v:
                 region, solved = heavier, again
         return solved, region
 
     def solved(self, region: TrustRegion, rows: Rows) -> tuple[Floats, Floats] | None:
         """d (n,) and the multipliers (m + k,) of rows; None where nothing is found."""
         box, place, n = self.box, self.place, self.box.n
-        slope, limited = box.prices, len(place.seen.excess) > 0
+        slope, limited = place.cost_slopes, len(place.seen.excess) > 0
         if place.squared:
             slope = 0.5 * slope + place.slopes[: place.m].T @ place.values[: place.m]
-        needs_t = not place.squared or not rows.of_excess.all()
-        cost = np.append(slope, [region.weight if limited else 0.0, 1.0 if needs_t else 0.0])
+        needs_t = (not place.squared and place.m > 0) or not rows.of_excess.all()
+        # rows of one sign may have any unit: t is in that of their size
+        unit = max(abs(place.seen.residual).max(), TINY) if np.isinf(self.least) else 1.0
+        cost = np.append(slope, [region.weight if limited else 0.0, unit if needs_t else 0.0])
         offset = box.rows @ place.z
-        own = np.column_stack([rows.slopes, -1.0 * rows.of_excess, -1.0 * ~rows.of_excess])
+        own = np.column_stack([rows.slopes, -1.0 * rows.of_excess, -unit * ~rows.of_excess])
         G = np.vstack([np.pad(box.rows, ((0, 0), (0, 2))), own])
         lower = np.append(box.row_lower - offset, np.full(len(rows), -np.inf))
         upper = np.append(box.row_upper - offset, -rows.value - MET * rows.of_excess)
@@ -171,14 +182,15 @@ class _Program:
             A=np.pad(self.root, ((0, 0), (0, 2))) / np.sqrt(scale),
             b=np.zeros(len(self.root)),
             G=np.vstack([np.eye(n + 2), G / norms[:, None]]),
-            lower=np.concatenate([least, np.zeros(2), lower / norms]),
+            lower=np.concatenate([least, [0.0, self.least], lower / norms]),
             upper=np.concatenate([most, np.full(2, np.inf), upper / norms]),
             cost=cost / scale,
         )
         # No step, with v and t as they are, is feasible: from there limits are walked along in a
         # fraction of the time that OSQP takes, above all where they cannot all be met.
-        v, t = rows.levels(np.zeros(n))
-        found = solve_scaled(scaled, np.append(np.zeros(n), [v + MET if limited else 0.0, t]))
+        v, t = rows.levels(np.zeros(n), self.least)
+        start = np.append(np.zeros(n), [v + MET if limited else 0.0, t / unit])
+        found = solve_scaled(scaled, start)
         if found is None:
             return None
         mu = (scale * found[1][n + 2 :] / norms)[len(offset) :]

@@ -8,8 +8,10 @@ Reading order:
     lower_limit   a mode does not fall below a frequency
     upper_limit   a mode does not exceed a frequency
     gap           two modes stay apart
+    highest       a mode is as high as can be
     band          no mode is in a band
     quantity      the mass, or a weighted sum of design parameters, is within limits
+    static_limit  a node gives way by no more than so much, under a force or the weight
     named_modes   modes that targets name by their shape
     sampling      what a case asks for, at the samples of its trajectories
 """

@@ -84,9 +84,9 @@ class ForbiddenBand(Requirement):
         """The only modes that count, ascending; none where all do."""
         return tuple(sorted(self.modes))
 
-    def below(self, hz: Floats) -> Ints:
-        """The number of modes below each edge (2, n); of ``hz`` (n, count), all that matter."""
-        hz = hz[:, [m - 1 for m in self.counted if m <= hz.shape[1]]] if self.modes else hz
+    def below(self, solved: Solved) -> Ints:
+        """The number of modes below each edge (2, n), of all that matter."""
+        hz = self._counted(solved)
         edges = (self.lower, self.upper)
         return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
 
@@ -106,7 +106,9 @@ class ForbiddenBand(Requirement):
     def _one_side(
         self, kind: type[Requirement], mode: int, lower: Floats, upper: Floats
     ) -> Requirement:
-        own = {"label": f"{self.name}: mode {mode}", "terms": ((mode, 1.0),), "modes": (mode,)}
+        own: dict[str, object] = {"label": self.name, "terms": ((mode, 1.0),), "modes": ()}
+        if mode > 0:
+            own |= {"label": f"{self.name}: mode {mode}", "modes": (mode,)}
         return kind(**vars(self) | own | {"lower": lower, "upper": upper, "part_of": self.name})
 
     def curve(self, solved: Solved) -> Floats:
@@ -140,26 +142,32 @@ class ForbiddenBand(Requirement):
         raised = (1.0 + margin.room) * (1.0 + margin.raised)
         return self.lower * (1.0 - margin.room), self.upper * raised
 
-    def errors_by_count(self, hz: Floats, margin: Margin) -> Floats:
+    def errors_by_count(self, solved: Solved, margin: Margin) -> Floats:
         """The largest error (count + 1,) along one trajectory with 0, 1, … modes below the band.
 
-        ``hz`` (n, count) at its rows are all modes that matter.
+        Below 0 it is the room that is left. ``solved`` are all that matter.
         """
-        own = hz[:, [m - 1 for m in self.counted]] if self.modes else hz
+        own = self._counted(solved)
         low, high = (edge[:, None] for edge in self.drawn_out(margin))
-        down, up = np.maximum(own / low - 1.0, 0.0), np.maximum(1.0 - own / high, 0.0)
-        return np.array([errors.max() for errors in _by_count(down, up)])
+        return np.array([e.max() for e in _by_count(own / low - 1.0, 1.0 - own / high)])
 
     def least_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """No errors (n,): which mode is where is not known."""
         return np.zeros(len(self.lower))
 
     def _counted(self, solved: Solved) -> Floats:
-        own = solved.hz[self.rows]
-        return own[:, [m - 1 for m in self.counted]] if self.modes else own
+        if not self.modes:
+            return solved.hz[self.rows]
+        most = solved.hz.shape[1]  # of modes that have mass
+        return np.stack([solved.curve(m)[self.rows] for m in self.counted if m <= most], axis=1)
 
-    def near(self, initial: Solved, exact: Solved) -> tuple[int, ...]:
-        """The modes near the band before or after, and at least those on either side of it."""
+    def near(self, initial: Solved, exact: Solved) -> tuple[int, ...] | None:
+        """The modes near the band before or after, and at least those on either side of it.
+
+        None of a band of followed modes, whose curves say it all.
+        """
+        if self.followed:
+            return None
         both = np.stack([initial.hz[self.rows], exact.hz[self.rows]])
         low, high = self.lower.min(), self.upper.max()
         inside = (both > low * (1.0 - NEAR)) & (both < high * (1.0 + NEAR))
@@ -176,9 +184,10 @@ class ForbiddenBand(Requirement):
 
 def _by_count(down: Floats, up: Floats) -> list[Floats]:
     """The errors (n,) by the number of modes below: of modes (n, count) the ways below and above
-    the band.
+    the band, negative where there is room; infinite room where there is no mode.
     """
+    none = -np.inf
     return [
-        np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
+        np.maximum(down[:, :k].max(axis=1, initial=none), up[:, k:].max(axis=1, initial=none))
         for k in range(down.shape[1] + 1)
     ]

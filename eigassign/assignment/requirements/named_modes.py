@@ -17,8 +17,7 @@ Floats = NDArray[np.float64]
 
 def followed_modes(file: CaseFile) -> tuple[FollowedMode, ...]:
     """The modes that targets follow by their shape, each once, in the order of the file."""
-    named = (target.followed for target in file.targets)
-    return tuple(dict.fromkeys(mode for mode in named if mode is not None))
+    return tuple(dict.fromkeys(mode for target in file.targets for mode in target.followed))
 
 
 def named_design(file: CaseFile, followed: FollowedMode) -> Floats:

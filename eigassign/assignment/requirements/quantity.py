@@ -99,6 +99,10 @@ class LimitedQuantity(Requirement):
         assert not isinstance(value, int)
         return float(np.asarray(c * value(y)[0]))
 
+    def amount_of(self, value: float) -> float:
+        """The amount that a value of its rows stands for."""
+        return value
+
     def slopes(self, y: Floats) -> Floats:
         """The slopes (n_y,) of the quantity at a design (n_y,)."""
         value, c = self.terms[0]
@@ -150,7 +154,8 @@ class MassLimit(LimitedQuantity):
     @classmethod
     def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
         """Yield the limits of the mass, if there are any."""
-        if (given := file.design.mass) is not None:
+        given = file.design.mass
+        if given is not None and (given.min, given.max) != (None, None):
             yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
 
     @property

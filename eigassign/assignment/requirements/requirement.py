@@ -14,6 +14,7 @@ a class in a module of its own that says in which of this it differs.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
@@ -86,13 +87,14 @@ class Requirement(Brief):
 
     A gap is on two modes, a band on all the ``modes`` it names, or without any on all there are.
     Modes are numbered from 1; those followed by their shape −1, −2, …, the last of them named being
-    −1: they are in ``terms``, and none of ``modes``. ``along`` has each trajectory's part of
-    the requirement's own arrays. Edges are in Hz, or in the SI unit of the quantity. Raises
-    UsageError for a weight that is not finite and above 0.
+    −1: they are in ``terms``, and in ``modes`` that of a band alone. ``along`` has each
+    trajectory's part of the requirement's own arrays. Edges are in Hz, or in the SI unit of the
+    quantity. Raises UsageError for a weight that is not finite and above 0.
     """
 
     form: ClassVar[type[AnyTarget]]  # of the case file
     columns: ClassVar[tuple[str, ...]] = ("target", "initial", "one shot", "exact")
+    is_aim: ClassVar[bool] = False  # of the objective: always met, and the farther the better
 
     label: str  # in words: "mode 2 at least 320 Hz"
     place: str  # key path in the case file
@@ -104,7 +106,7 @@ class Requirement(Brief):
     along: tuple[tuple[str, slice], ...] = ()
     weight: float = 1.0
     trajectory: str | None = None  # the only one on which it holds
-    followed: FollowedMode | None = None
+    followed: tuple[FollowedMode, ...] = ()
     part_of: str = ""  # the label of the whole, where it is a part of a band
 
     def __post_init__(self) -> None:
@@ -132,7 +134,7 @@ class Requirement(Brief):
 
     @property
     def kind(self) -> str:
-        """The key that only its targets have: frequency, at_least, at_most, keep_out or gap."""
+        """The key that only its targets have, such as at_least; ``highest`` of the objective."""
         return self.form.kind
 
     @property
@@ -200,7 +202,7 @@ class Requirement(Brief):
 
     def outside(self, low: Floats, high: Floats) -> Floats:
         """The way (n,) of ``low`` below the lower edge, or of ``high`` above the upper one."""
-        with_edge = np.isfinite(self.lower)
+        with_edge = np.isfinite(self.lower) & (self.lower != 0.0)
         below = np.where(with_edge, 1.0 - low / np.where(with_edge, self.lower, 1.0), 0.0)
         return np.maximum(np.maximum(below, high / self.upper - 1.0), 0.0)
 
@@ -218,7 +220,7 @@ class Requirement(Brief):
     @property
     def in_one_shot(self) -> bool:
         """True where eqs. (13)–(14) take it: a wanted frequency of a numbered mode."""
-        return self.is_goal and self.followed is None
+        return self.is_goal and not self.followed
 
     @property
     def constraint(self) -> LinearConstraint | None:
@@ -243,11 +245,16 @@ class Requirement(Brief):
         root, lam_d = np.sqrt(weights), lam_from_hz(self.hz)
         return root[:, None] * (model.l / lam_d[:, None]), root * (model.l0 / lam_d - 1.0)
 
-    def value(self, y: Floats, found: Frequencies) -> tuple[Floats, Floats]:
-        """Its curve (n,) and slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
+    def value(
+        self, y: Floats, found: Frequencies, terms: Terms | None = None
+    ) -> tuple[Floats, Floats]:
+        """Its curve (n,) and slopes (n, n_y) at a design y (n_y,) of frequencies ``found``.
+
+        Or those that it had with other ``terms``.
+        """
         value: Floats | float = 0.0
         slopes: Floats | float = 0.0
-        for term, c in self.terms:
+        for term, c in self.terms if terms is None else terms:
             own, steep = found.of(term, self.rows) if isinstance(term, int) else term(y)
             value, slopes = value + c * own, slopes + c * steep
         return np.atleast_1d(value), np.atleast_2d(slopes)
@@ -273,12 +280,19 @@ class Requirement(Brief):
     @property
     def mode(self) -> int:
         """Its mode, of several the lowest, 1 of all; of a followed one what it is named by."""
-        return min(self.modes, default=1) if self.followed is None else self.followed.like
+        followed = (mode.like for mode in self.followed)
+        return min((*(mode for mode in self.modes if mode > 0), *followed), default=1)
 
     @property
     def curve_name(self) -> str:
         """The name of the mode whose frequency its curve is, to tell columns and files apart."""
-        return f"mode {self.mode}" if self.followed is None else self.followed.name
+        return self.followed[0].name if self.followed else f"mode {self.mode}"
+
+    @property
+    def followed_numbers(self) -> tuple[int, ...]:
+        """The numbers of the modes ``followed``, all below 0."""
+        each = {*self.modes, *(mode for mode, _ in self.mode_terms)}
+        return tuple(sorted(number for number in each if number < 0))
 
     @property
     def axis(self) -> str:
@@ -324,24 +338,27 @@ class EdgeRows:
     ) -> Iterator[NeighbourPairs]:
         """Yield the rows, numbered from ``first``, with those of the modes below and above.
 
-        Not with modes that go ``along``, whose rows are smooth together with these. ``found`` must
-        have its mixed slopes.
+        Of each of their modes, and not with modes that go ``along``, whose rows are smooth together
+        with these. ``found`` must have its mixed slopes.
         """
         assert found.mixed is not None
-        (mode, _), rows, lowest = self.of.terms[0], self.of.rows, found.mixed.shape[1] + 1
-        if len(self.of.terms) > 1 or not isinstance(mode, int) or mode < 0:
+        modes, rows, lowest = self.of.mode_terms, self.of.rows, found.mixed.shape[1] + 1
+        along = {*along, *(mode for mode, _ in modes)}
+        if len(modes) < len(self.of.terms):
             return
-        own, scale = found.of(mode, rows)[0], self.scale
-        for neighbour in (mode - 1, mode + 1):
-            if neighbour in along or not 1 <= neighbour <= lowest:
+        for (mode, c), step in itertools.product(modes, (-1, 1)):
+            neighbour, scale = mode + step, c * self.scale
+            if mode < 0 or neighbour in along or not 1 <= neighbour <= lowest:
                 continue
-            hz, slopes = found.of(neighbour, rows)
+            swapped = tuple((neighbour if each == mode else each, own) for each, own in modes)
+            hz, slopes = self.of.value(np.zeros(0), found, swapped)
+            gap = found.of(neighbour, rows)[0] / found.of(mode, rows)[0] - 1.0
             yield NeighbourPairs(
                 row=np.arange(first, first + len(hz)),
-                other=scale * (hz - self.edge),
-                others=scale[:, None] * slopes,
+                other=self.scale * (hz - self.edge),
+                others=self.scale[:, None] * slopes,
                 mixed=scale[:, None] * found.mixed[rows, min(mode, neighbour) - 1],
-                gap=np.abs(hz / own - 1.0),
+                gap=np.abs(gap),
                 larger=np.equal(neighbour < mode, scale > 0.0),
             )
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.highest import HighestFrequency
 from eigassign.assignment.requirements.lower_limit import LowerLimit
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.quantity import (
@@ -26,11 +27,19 @@ from eigassign.assignment.requirements.quantity import (
     MassLimit,
 )
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.static_limit import Placed, static_limits
 from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted
-from eigassign.case.schema.targets import AnyTarget, FrequencyFile, FrequencyProfile
+from eigassign.case.schema.targets import (
+    AnyMode,
+    AnyTarget,
+    FollowedMode,
+    FrequencyFile,
+    FrequencyProfile,
+    StaticTarget,
+)
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import CaseError, MechanismError, UsageError
@@ -44,27 +53,44 @@ _SLACK = 1e-9  # of the duration: rounding of a time grid, far below a step
 _LINEAR = 1e-12  # relative: a point of a profile this near to a straight line is on it
 KINDS: dict[str, type[Requirement]] = {
     one.form.kind: one
-    for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap)
+    for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap, HighestFrequency)
 }  # by the key that only their targets have
 QUANTITIES: tuple[type[LimitedQuantity], ...] = (MassLimit, DriveLimit, LinearLimit)
 
 
 def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ...]:
-    """The requirements of all targets, one for each mode, in the order of the file.
+    """The requirements of the mode to be highest, if any, and of all targets, one for each mode.
 
     Raises CaseError where a profile ends before a trajectory does, a part of a trajectory has no
     sample, or a file cannot be read.
     """
     return tuple(
-        one for k, target in enumerate(file.targets) for one in _of_target(file, k, target, path)
+        one
+        for place, target in file.asked
+        if target.kind in KINDS
+        for one in _of_target(file, place, target, path)
     )
 
 
 def design_limits(
     file: CaseFile, model: Model, path: Trajectories | None
 ) -> tuple[LimitedQuantity, ...]:
-    """The limits of quantities of the design, those of drives along whole trajectories."""
-    return tuple(one for kind in QUANTITIES for one in kind.of_case(file, model, path))
+    """The limits of quantities of the design, those of drives along whole trajectories.
+
+    Raises CaseError where a part of a trajectory has no sample, MechanismError where a node is
+    rigid, or nothing holds it.
+    """
+    limits = [one for kind in QUANTITIES for one in kind.of_case(file, model, path)]
+    if path is not None:
+        limits += static_limits(file, model, path, list(_static(file, path)))
+    return tuple(limits)
+
+
+def _static(file: CaseFile, path: Trajectories) -> Iterator[Placed]:
+    for k, target in enumerate(file.targets):
+        if isinstance(target, StaticTarget):
+            rows = _rows(file, f"targets[{k}]", target, path)
+            yield k, target, rows, tuple(_along(path, rows)), _where(target)
 
 
 def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
@@ -113,26 +139,26 @@ def time_weights(path: Trajectories) -> Floats:
 
 
 def _of_target(
-    file: CaseFile, k: int, target: AnyTarget, path: Trajectories
+    file: CaseFile, place: str, target: AnyTarget, path: Trajectories
 ) -> Iterator[Requirement]:
-    kind, place = KINDS[target.kind], f"targets[{k}]"
+    kind = KINDS[target.kind]
     rows = _rows(file, place, target, path)
     along = tuple(_along(path, rows))
     sampled = (
         _sampled(file, curve, f"{place}.{dotted(keys)}", rows, path)
         for keys, curve in target.frequencies
     )
-    lower, upper = kind.edges(target, *sampled)
-    for modes in target.named:
-        who, terms = _who(modes), kind.terms_of(modes)
-        if target.followed is not None:
-            own = followed_modes(file)
-            who = target.followed.name
-            modes, terms = (), ((own.index(target.followed) - len(own), 1.0),)
+    edges = kind.edges(target, *sampled)
+    lower, upper = (np.broadcast_to(edge, rows.stop - rows.start) for edge in edges)
+    own = followed_modes(file)
+    for named in target.named:
+        followed = tuple(mode for mode in named if isinstance(mode, FollowedMode))
+        modes = tuple(m if isinstance(m, int) else own.index(m) - len(own) for m in named)
+        terms = kind.terms_of(modes)
         yield kind(
-            label=f"{who} {kind.asked(target)}{_where(target)}",
+            label=f"{_who(named)} {kind.asked(target)}{_where(target)}",
             place=place,
-            modes=modes,
+            modes=tuple(mode for mode in modes if mode > 0 or not terms),
             terms=terms,
             rows=rows,
             lower=lower,
@@ -140,13 +166,15 @@ def _of_target(
             along=along,
             weight=target.weight,
             trajectory=target.trajectory,
-            followed=target.followed,
+            followed=tuple(sorted(followed, key=own.index)),
         )
 
 
-def _who(modes: tuple[int, ...]) -> str:
+def _who(modes: tuple[AnyMode, ...]) -> str:
     if not modes:
         return "every mode"
+    if any(isinstance(mode, FollowedMode) for mode in modes):
+        return " and ".join(f"mode {m}" if isinstance(m, int) else m.name for m in modes)
     *first, last = map(str, modes)
     return f"modes {', '.join(first)} and {last}" if first else f"mode {last}"
 
@@ -195,7 +223,8 @@ def _knots(file: CaseFile, curve: _Curve, key: str) -> _Knots:
     if isinstance(curve, FrequencyProfile):
         return curve.frequency, curve.time
     if isinstance(curve, FrequencyFile):
-        columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
+        of_columns = {"time": DIMENSIONS["time"], "frequency": curve.dimension}
+        columns = [CsvColumn(name, (own,)) for name, own in of_columns.items()]
         try:
             numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
         except MechanismError as error:

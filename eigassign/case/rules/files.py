@@ -8,27 +8,37 @@ before anything is read of it.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, text
-from eigassign.case.rules.lookups import curves, links, trajectories
-from eigassign.files import MATRIX, TABLE, objection, printable
+from eigassign.case.reader import Finding, KeyPath, Tree, at, entries
+from eigassign.case.rules.lookups import curves, design_entries, links, trajectories
+from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
 _SPARE = ("measurements", "sweep")
+_MATRIX = ("stiffness", "mass")  # keys that may name a matrix in a file
+_VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62})", re.DOTALL)
 
 
 class NamedFile(NamedTuple):
     """A file that the case names: its key, absolute path and largest size in bytes.
 
     ``spare``: of all commands that run a case only one needs it, `update` or `batch`.
+    ``variable``: the matrix in it that is meant, where the case names one.
     """
 
     path: KeyPath
     file: str
     limit: int
     spare: bool
+    variable: str = ""
+
+    @property
+    def value(self) -> str:
+        """What the case would write with an absolute path."""
+        return f"{self.file}:{self.variable}" if self.variable else self.file
 
 
 def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
@@ -36,18 +46,32 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     tables = [(path, body, "file") for path, body in trajectories(tree) if at(body, "tip") is None]
     tables += [(path, body, "file") for path, body in curves(tree)]
     tables += [((key,), at(tree, key), "file") for key in _SPARE]
+    lists = ((name, at(body, "choices")) for name, body in design_entries(tree))
+    tables += [(("design", name, "choices"), body, "file") for name, body in lists]
     matrices = [
         (path, body, key)
         for _, path, body in links(tree, "superelement")
-        for key in ("stiffness", "mass")
+        for key in (*_MATRIX, "file", "nodes_file")
     ]
+    meshes = [(path, body, "mesh") for _, path, body in links(tree, "solid")]
     found = []
-    for group, limit in ((tables, TABLE), (matrices, MATRIX)):
+    for group, limit in ((tables, TABLE), (matrices, MATRIX), (meshes, MESH)):
         for path, body, key in group:
-            if (file := text(body, key)) is not None:
-                place = os.path.abspath(folder / file)
-                found.append(NamedFile((*path, key), place, limit, path[0] in _SPARE))
+            listed = enumerate(entries(body, key))
+            given = [((*path, key), at(body, key)), *(((*path, key, k), f) for k, f in listed)]
+            for place, name in given:
+                if isinstance(name, str):
+                    file, variable = os.path.abspath(folder / name), ""
+                    if key in _MATRIX:
+                        file, variable = split_variable(file)
+                    found.append(NamedFile(place, file, limit, path[0] in _SPARE, variable))
     return found
+
+
+def split_variable(name: str) -> tuple[str, str]:
+    """``parts.mat:K`` as the file and the name of a matrix in it, "" where there is none."""
+    found = _VARIABLE.fullmatch(name)
+    return (found.group(1), found.group(2)) if found else (name, "")
 
 
 def not_allowed(named: Sequence[NamedFile], folder: Path) -> Iterator[Finding]:

@@ -24,10 +24,11 @@ MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
 # --- Materials and sections
 
 
-def beams_have_known_materials(tree: Tree) -> Iterator[Finding]:
-    """The material of every beam exists."""
+def links_have_known_materials(tree: Tree) -> Iterator[Finding]:
+    """The material of every beam and solid exists."""
     known = names(tree, "mechanism", "materials")
-    for path, beam in beams(tree):
+    solids = ((path, body) for _, path, body in links(tree, "solid"))
+    for path, beam in (*beams(tree), *solids):
         name = text(beam, "material")
         if name is not None and name not in known:
             yield (*path, "material"), unknown("material", name, known)
@@ -69,6 +70,16 @@ def materials_have_a_shear_modulus_where_beams_need_it(tree: Tree) -> Iterator[F
         if at(material, "poissons_ratio") is None and at(material, "shear_modulus") is None:
             message = f"needs poissons_ratio or shear_modulus: {what}"
             yield ("mechanism", "materials", name or ""), message
+
+
+def solids_have_a_poissons_ratio(tree: Tree) -> Iterator[Finding]:
+    """The matrices of a solid are made for one ν; Young's modulus and density multiply them."""
+    for _, _, body in links(tree, "solid"):
+        name = text(body, "material") or ""
+        material = at(tree, "mechanism", "materials", name)
+        if isinstance(material, Mapping) and at(material, "poissons_ratio") is None:
+            instead = " instead of shear_modulus" if "shear_modulus" in material else ""
+            yield ("mechanism", "materials", name), f"a solid needs poissons_ratio{instead}"
 
 
 def bare_sections_have_the_moments_of_their_space(tree: Tree) -> Iterator[Finding]:
@@ -164,7 +175,14 @@ def superelements_have_rows_of_their_own_for_each_node(tree: Tree) -> Iterator[F
     n = len(wanted.split())
     for _, path, body in links(tree, "superelement"):
         owner: dict[int, str] = {}
+        numbered: dict[int, str] = {}
         for name, node in items(body, "nodes"):
+            number = at(node, "id")
+            number = number[0] if isinstance(number, tuple) and number else number
+            first = numbered.setdefault(number, name) if isinstance(number, int) else name
+            if first != name and at(node, "dofs") is None:
+                message = f"node {shown(number)} is {first!r} already"
+                yield (*path, "nodes", name, "id"), message
             dofs, inner = entries(node, "dofs"), (*path, "nodes", name, "dofs")
             if 3 <= len(dofs) <= 6 and len(dofs) != n:
                 yield inner, f"needs {n} entries, the rows of {wanted}; got {len(dofs)}"
@@ -174,16 +192,6 @@ def superelements_have_rows_of_their_own_for_each_node(tree: Tree) -> Iterator[F
                 if dof in owner:
                     yield (*inner, k), f"row {shown(dof)} belongs to node {owner[dof]!r} already"
                 owner.setdefault(dof, name)
-
-
-def superelements_have_matrix_files(tree: Tree) -> Iterator[Finding]:
-    """The files of a superelement are in a format that can be read."""
-    for _, path, body in links(tree, "superelement"):
-        for key in ("stiffness", "mass"):
-            file = text(body, key)
-            if file is not None and not file.lower().endswith((".mtx", ".npy", ".npz")):
-                message = "expected a Matrix Market (.mtx) or NumPy (.npy, .npz) file, got "
-                yield (*path, key), message + shown(file)
 
 
 def links_that_a_joint_travels_along_are_not_reduced(tree: Tree) -> Iterator[Finding]:

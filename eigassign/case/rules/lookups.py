@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from eigassign.case.reader import KeyPath, Tree, at, entries, items, lacks, names, text
-from eigassign.case.schema.design import RESERVED, column_names, is_entry
+from eigassign.case.schema.design import PRICE, RESERVED, column_names, is_entry
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.parts import Quantity
@@ -51,7 +51,7 @@ def links(tree: Tree, kind: str) -> Iterator[tuple[str, KeyPath, object]]:
 
 
 def type_of(link: object) -> str | None:
-    """beam, rigid, frame or superelement; None if it is none of them."""
+    """beam, rigid, frame, superelement or solid; None if it is none of them."""
     if not isinstance(link, Mapping):
         return None
     kind = link.get("type", "beam")
@@ -194,11 +194,21 @@ def choices(entry: object) -> list[tuple[str, object]] | None:
 
 
 class PlacedColumn(NamedTuple):
-    """One component of y as the file has it: its name, its property, and where that is named."""
+    """One component of y as the file has it: its name, its property, and where that is named.
+
+    ``others`` are further properties in its proportion: path, factor and place of each.
+    """
 
     name: str
     parameter: str | None
     place: KeyPath
+    others: tuple[tuple[str, object, KeyPath], ...] = ()
+
+    @property
+    def properties(self) -> list[tuple[str, KeyPath]]:
+        """Path and place of each of its properties."""
+        first = [] if self.parameter is None else [(self.parameter, self.place)]
+        return [*first, *((path, place) for path, _, place in self.others)]
 
 
 def columns(tree: Tree) -> list[PlacedColumn]:
@@ -207,13 +217,28 @@ def columns(tree: Tree) -> list[PlacedColumn]:
     for name, body in design_entries(tree):
         listed_choices = choices(body)
         if listed_choices is None:
-            found.append(PlacedColumn(name, text(body, "parameter"), ("design", name, "parameter")))
+            found.append(parameter(name, body))
         for first, choice in (listed_choices or ())[:1]:
-            paths = names(choice)
+            paths = [path for path in names(choice) if path != PRICE]
             place: KeyPath = ("design", name, "choices", first)
             pairs = zip(column_names(name, paths), paths, strict=True)
             found += [PlacedColumn(column, path, (*place, path)) for column, path in pairs]
     return found
+
+
+def parameter(name: str, body: object) -> PlacedColumn:
+    """The column of a parameter, of one property or of several."""
+    place: KeyPath = ("design", name, "parameter")
+    own, first = text(body, "parameter"), place
+    others: list[tuple[str, object, KeyPath]] = []
+    for k, each in enumerate(entries(body, "parameter")):
+        if k == 0 and isinstance(each, str):
+            own, first = each, (*place, k)
+        elif isinstance(each, str):
+            others.append((each, 1.0, (*place, k)))
+        else:
+            others += [(path, factor, (*place, k, path)) for path, factor in items(each)]
+    return PlacedColumn(name, own, first, tuple(others))
 
 
 def curves(tree: Tree) -> list[tuple[KeyPath, object]]:
@@ -228,5 +253,9 @@ def curves(tree: Tree) -> list[tuple[KeyPath, object]]:
 
 def followed_modes(tree: Tree) -> list[tuple[KeyPath, object]]:
     """Key path and content of every mode that is named by its shape."""
-    bodies = [at(target, "mode") for target in entries(tree, "targets")]
-    return [(("targets", k, "mode"), b) for k, b in enumerate(bodies) if isinstance(b, Mapping)]
+    found: list[tuple[KeyPath, object]] = []
+    for k, target in enumerate(entries(tree, "targets")):
+        found.append((("targets", k, "mode"), at(target, "mode")))
+        pair = enumerate(entries(target, "gap", "between"))
+        found += ((("targets", k, "gap", "between", i), body) for i, body in pair)
+    return [(path, body) for path, body in found if isinstance(body, Mapping)]

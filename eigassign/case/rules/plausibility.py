@@ -12,7 +12,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
-from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, RigidLink, Taper
+from eigassign.case.schema.links import (
+    BeamLink,
+    FrameBeam,
+    FrameLink,
+    RigidLink,
+    SolidLink,
+    Taper,
+)
 from eigassign.case.schema.mechanism import Body
 from eigassign.case.schema.sections import BareSection
 from eigassign.case.schema.targets import (
@@ -132,6 +139,8 @@ def materials_and_sections_are_used(document: Document) -> Iterator[Finding]:
         beams += [link] if isinstance(link, BeamLink) else []
         beams += link.beams.values() if isinstance(link, FrameLink) else []
     used = {("materials", beam.material) for beam in beams}
+    solids = (link for link in document.mechanism.links.values() if isinstance(link, SolidLink))
+    used |= {("materials", solid.material) for solid in solids}
     used |= {("sections", name) for beam in beams for name in _ends(beam.section)}
     given = [
         (g, name) for g in ("materials", "sections") for name in getattr(document.mechanism, g)
@@ -139,8 +148,8 @@ def materials_and_sections_are_used(document: Document) -> Iterator[Finding]:
     unused = [each for each in given if each not in used]
     for group, name in unused:
         yield ("mechanism", group, name), "no link uses it"
-    for name, parameter in document.design.parameters.items():
-        if tuple(parameter.parameter.split(".")[:2]) in unused:
+    for name, column in document.design.parameters.items():
+        if all(tuple(path.split(".")[:2]) in unused for path in column.factors):
             yield ("design", name, "parameter"), "has no effect: no link uses it"
 
 
@@ -350,7 +359,7 @@ def limits_leave_room(document: Document) -> Iterator[Finding]:
         (k, type(target), mode, target.curve, (target.trajectory, target.during))
         for k, target in enumerate(document.targets)
         if isinstance(target, (AtLeastTarget, AtMostTarget)) and isinstance(target.curve, float)
-        for mode in (mode for modes in target.named for mode in modes if not target.followed)
+        for mode in (() if target.followed else target.numbers)
     ]
     for k, _, upper, most, when in (one for one in limits if one[1] is AtMostTarget):
         for _, _, lower, least, also in (one for one in limits if one[1] is AtLeastTarget):

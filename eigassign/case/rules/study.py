@@ -86,15 +86,14 @@ def branches_are_ranges_of_driven_joints(tree: Tree) -> Iterator[Finding]:
 def parameters_vary_different_properties(tree: Tree) -> Iterator[Finding]:
     """Components of the design have properties of their own."""
     owner: dict[str, str] = {}
-    for name, path, place in columns(tree):
-        entry = str(place[1])
-        if path is None:
-            if entry.lower().startswith("constraint"):
-                yield ("design", entry), "did you mean the reserved key 'constraints'?"
-        elif path in owner:
-            yield place, f"{path} is a design parameter already: {owner[path]!r}"
-        else:
-            owner[path] = name
+    for column in columns(tree):
+        name, entry = column.name, str(column.place[1])
+        if column.parameter is None and entry.lower().startswith("constraint"):
+            yield ("design", entry), "did you mean the reserved key 'constraints'?"
+        for path, place in column.properties:
+            if path in owner and owner[path] != name:
+                yield place, f"{path} is a design parameter already: {owner[path]!r}"
+            owner.setdefault(path, name)
 
 
 def limited_drives_are_of_coordinates(tree: Tree) -> Iterator[Finding]:

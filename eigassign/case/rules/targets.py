@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, names, text
 from eigassign.case.rules.lookups import (
@@ -10,12 +10,14 @@ from eigassign.case.rules.lookups import (
     curves,
     design_entries,
     followed_modes,
+    is_spatial,
+    node_problem,
     number,
     trajectories,
     trajectory_names,
 )
-from eigassign.case.schema.design import is_entry
-from eigassign.case.schema.targets import TARGETS
+from eigassign.case.schema.design import PRICE, is_entry
+from eigassign.case.schema.targets import TARGETS, StaticTarget, kinds_of
 from eigassign.case.schema.trajectory import DURATION, TIME, TipTrajectory
 from eigassign.case.suggestions import listed, shown, unknown
 
@@ -41,6 +43,20 @@ def targets_are_on_trajectories(tree: Tree) -> Iterator[Finding]:
         if motion is not None and not (motion[0] <= span[1] and span[0] <= motion[1]):
             lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
             yield path, f"is no part of it: {lasts}"
+
+
+def statics_are_of_nodes(tree: Tree) -> Iterator[Finding]:
+    """The node of a static target exists, and what sags has a weight."""
+    kinds = [kind for kind, form in TARGETS.items() if issubclass(form, StaticTarget)]
+    for k, target in enumerate(entries(tree, "targets")):
+        for kind in kinds:
+            node = text(target, kind, "at")
+            if node is not None and (problem := node_problem(tree, node)):
+                yield ("targets", k, kind, "at"), problem
+        weighs = isinstance(at(tree, "mechanism", "gravity"), tuple)
+        if at(target, "sag") is not None and not weighs:
+            down = "[0, 0, -9.81]" if is_spatial(tree) else "[0, -9.81]"
+            yield ("targets", k, "sag"), f"nothing sags without mechanism.gravity: {down}, say"
 
 
 def a_mode_has_one_frequency_at_a_time(tree: Tree) -> Iterator[Finding]:
@@ -123,18 +139,63 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
         return
     instead = "method: one_shot takes frequency targets of numbered modes, bounds, lists and "
     instead += "linear constraints only; take method: sequential"
-    if text(tree, "assignment", "objective") == "worst_case":
+    if at(tree, "assignment", "objective") not in (None, "least_squares"):
         yield ("assignment", "objective"), f"is not least_squares; {instead}"
+    if at(tree, "assignment", "robust") is True:
+        yield ("assignment", "robust"), f"is no limit of a quadratic program; {instead}"
     for k, target in enumerate(entries(tree, "targets")):
-        kind = next((key for key in TARGETS if at(target, key) is not None), None)
-        if kind is not None and not TARGETS[kind].is_goal:
-            yield ("targets", k, kind), f"is no wanted frequency; {instead}"
+        kinds = kinds_of(target) if isinstance(target, Mapping) else []
+        if kinds and not TARGETS[kinds[0]].is_goal:
+            yield ("targets", k, kinds[0]), f"is no wanted frequency; {instead}"
     for path, _ in followed_modes(tree):
         yield path, f"is followed by its shape; {instead}"
     for key, what in (("mass", "the mass"), ("torque", "torques of drives")):
         limits = at(tree, "design", key)
         if limits is not None and not is_entry(limits):
-            yield ("design", key), f"limits {what}; {instead}"
+            limited = "limits" if key == "torque" or set(names(limits)) != {"price"} else "prices"
+            yield ("design", key), f"{limited} {what}; {instead}"
+    for name, body in design_entries(tree):
+        for choice, values in (choices(body) or ())[:1]:
+            if at(values, PRICE) is not None:
+                yield ("design", name, "choices", choice, PRICE), f"is a price; {instead}"
+
+
+# --- Objectives that are no error of wanted frequencies
+
+
+def objectives_have_what_they_take(tree: Tree) -> Iterator[Finding]:
+    """What is to be light, high or wide has limits beside it, no wanted frequencies.
+
+    Bands or gaps can be wide where there are some, a mode high along a trajectory that there is.
+    """
+    objective, path = at(tree, "assignment", "objective"), ("assignment", "objective")
+    highest, known = at(objective, "highest"), trajectory_names(tree)
+    name = "highest" if highest is not None else objective
+    if name not in ("lightest", "highest", "widest"):
+        return
+    if text(tree, "assignment", "method") == "one_shot":  # which takes none of them
+        return
+    kinds = [
+        {key for key in TARGETS if at(own, key) is not None} for own in entries(tree, "targets")
+    ]
+    for k in (k for k, kind in enumerate(kinds) if "frequency" in kind):
+        message = f"objective {name} comes near to no frequency: write at_least, at_most or both"
+        yield ("targets", k, "frequency"), message
+    if name == "widest" and not any(kind & {"keep_out", "gap"} for kind in kinds):
+        yield path, "widest is about the room of bands and gaps: there is no keep_out or gap target"
+    for place, _ in followed_modes(tree) if name == "widest" else ():
+        if "keep_out" in kinds[int(place[1])] or "gap" in kinds[int(place[1])]:
+            yield place, "is followed by its shape: widest takes bands and gaps of numbered modes"
+    if (where := text(highest, "trajectory")) is not None and where not in known:
+        yield (*path, "highest", "trajectory"), unknown("trajectory", where, known)
+
+
+def robust_designs_have_tolerances(tree: Tree) -> Iterator[Finding]:
+    """Something deviates where deviations count."""
+    deviates = any(at(body, "tolerance") is not None for _, body in design_entries(tree))
+    if at(tree, "assignment", "robust") is True and not deviates:
+        message = "no parameter has a tolerance: give one at least, such as tolerance: 2 %"
+        yield ("assignment", "robust"), message
 
 
 # --- Frequencies that change in time are wanted for the whole motion
@@ -145,8 +206,13 @@ _SLACK = 1e-9  # of the duration: rounding of the ends, far below a sampling ste
 def profiles_cover_their_trajectories(tree: Tree) -> Iterator[Finding]:
     """A profile reaches from the first to the last time of every motion that it is for."""
     motions = list(zip(trajectory_names(tree), _motions(tree), strict=True))
+    at_rest = [_is_at_rest(body) for _, body in trajectories(tree)]
     for path, curve in curves(tree):
         target = entries(tree, "targets")[int(path[1])]
+        for (name, _), rests in zip(motions, at_rest, strict=True):
+            if rests and isinstance(curve, Mapping) and text(target, "trajectory") in (None, name):
+                message = f"changes in time, and trajectory {name!r} is a pose at rest: give one "
+                yield path, message + "frequency, or a trajectory with a time"
         span, where = _span(at(curve, "time")), text(target, "trajectory")
         for name, motion in motions:
             if span is None or motion is None or where not in (None, name):
@@ -165,6 +231,10 @@ def profiles_cover_their_trajectories(tree: Tree) -> Iterator[Finding]:
 def _motions(tree: Tree) -> list[Span | None]:
     """First and last time of each trajectory; None where the file does not say (a CSV does)."""
     return [_duration(body) for _, body in trajectories(tree)]
+
+
+def _is_at_rest(trajectory: object) -> bool:
+    return len(entries(trajectory, "q")) == 1
 
 
 def _duration(trajectory: object) -> Span | None:

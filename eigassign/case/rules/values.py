@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eigassign.case.reader import KeyPath, Tree, at, entries, items, names, text
+from eigassign.case.reader import KeyPath, Tree, at, entries, items, names
 from eigassign.case.rules.files import named_files
 from eigassign.case.rules.lookups import (
     ANY,
@@ -25,6 +25,7 @@ from eigassign.case.rules.lookups import (
     guessed,
     is_spatial,
     of_freedom,
+    parameter,
     trajectories,
 )
 from eigassign.case.rules.properties import (
@@ -33,11 +34,12 @@ from eigassign.case.rules.properties import (
     known_property,
     properties,
 )
+from eigassign.case.schema.design import PRICE, is_entry
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.schema.targets import FREQUENCY
 from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import shown
-from eigassign.case.units import QuantityError, read_quantity, read_rate
+from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_rate
 
 Undecided = tuple[KeyPath, object, Quantity | None]  # None: no unit can be meant
 
@@ -48,7 +50,7 @@ def completed(tree: Tree, folder: Path) -> Tree:
     for path, value in [
         *_numbers(tree),
         *_prices(tree),
-        *((each.path, each.file) for each in named_files(tree, folder)),
+        *((each.path, each.value) for each in named_files(tree, folder)),
         *_defaults(tree),
     ]:
         inner = changes
@@ -81,10 +83,17 @@ def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
 
 
 def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
-    """Prices for one SI unit of their property."""
+    """Prices for one SI unit of their property, or of the mass of the whole."""
+    price = at(tree, "design", "mass", "price")
+    if isinstance(price, str) and not is_entry(at(tree, "design", "mass")):
+        try:
+            yield ("design", "mass", "price"), read_rate(price, DIMENSIONS["mass"])
+        except QuantityError as error:
+            yield ("design", "mass", "price"), error
     for name, body in design_entries(tree):
         of_choices = (((path,), path, price) for path, price in items(body, "price"))
-        for place, path, price in (((), text(body, "parameter"), at(body, "price")), *of_choices):
+        first = parameter(name, body).parameter
+        for place, path, price in (((), first, at(body, "price")), *of_choices):
             if isinstance(price, str):
                 prop = known_property(tree, path)
                 try:
@@ -117,7 +126,9 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
         yield from _in_list(listed, kinds, path)
     for path, body in trajectories(tree):
         for name, value in items(body, "set"):
-            yield (*path, "set", name), value, known_property(tree, name) or ANY
+            kind, more = known_property(tree, name), at(value, "add")
+            yield (*path, "set", name), value, kind or ANY
+            yield (*path, "set", name, "add"), more, Quantity(kind.dimension) if kind else ANY
         for joint, limits in items(body, "branch"):
             freedom = freedoms(tree, joint) or ()
             both = [of_freedom(freedom[0] if len(freedom) == 1 else None)] * 2
@@ -147,7 +158,8 @@ def _of_design(tree: Tree, known: Mapping[str, Quantity | None]) -> Iterator[Und
         for choice, values in choices(body) or ():
             for path, value in items(values):
                 place = ("design", name, "choices", choice, path)
-                yield place, value, known_property(tree, path) or ANY
+                if path != PRICE:
+                    yield place, value, known_property(tree, path) or ANY
         prop = known.get(name)
         own = prop or ANY
         for key in ("min", "max"):

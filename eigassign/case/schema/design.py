@@ -20,8 +20,10 @@ from eigassign.case.schema.parts import (
     Frozen,
     FrozenDict,
     Named,
+    OneOrList,
     Part,
     Quantity,
+    must,
     needs_one_of,
     quantity,
     wrong,
@@ -32,10 +34,10 @@ from eigassign.case.units import QuantityError
 YValue: TypeAlias = Annotated[
     float, Quantity(elsewhere="of the parameter's dimension, SI when bare")
 ]
-Price: TypeAlias = Annotated[
-    float, Quantity(elsewhere="for one SI unit when bare, or such as 3 / kg")
-]
+_RATE = "for one SI unit when bare, or such as 3 / kg"
+Price: TypeAlias = Annotated[float, Quantity(elsewhere=_RATE)]
 RESERVED = ("constraints", "mass", "torque")  # names under `design` that are no entries of it
+PRICE = "price"  # beside the paths of a choice
 MOST_CHOICES = 1000  # of an entry; a maker's whole list of profiles has some hundreds
 _SHARE = quantity("fraction", above=0)
 
@@ -92,6 +94,28 @@ def _require_order(low: float | None, high: float | None) -> None:
         raise wrong(f"min {low:g} is above max {high:g} (SI units)", "min")
 
 
+def _several(given: tuple[str | Mapping[str, float], ...]) -> tuple[str | Mapping[str, float], ...]:
+    if not isinstance(given[0], str):
+        raise wrong("the first is a path alone: its value is that of the parameter", 0)
+    seen: set[str] = set()
+    for k, each in enumerate(given):
+        for path in (each,) if isinstance(each, str) else each:
+            if path in seen:
+                raise wrong(f"{path} is listed twice", k)
+            seen.add(path)
+    return given
+
+
+Factor: TypeAlias = Annotated[
+    float, Quantity(), must(bool, "must not be 0: leave out what stays as it is")
+]
+OneOfSeveral: TypeAlias = Annotated[
+    Annotated[str, Tag("<path>")]
+    | Annotated[Mapping[str, Factor], Field(min_length=1), Frozen, Tag("<factors>")],
+    Discriminator(lambda value: "<factors>" if isinstance(value, Mapping) else "<path>"),
+]
+
+
 class Parameter(Part):
     """One design parameter: a property of the mechanism between bounds, or of listed values.
 
@@ -99,7 +123,9 @@ class Parameter(Part):
 
     Keys:
         parameter: path of a real number in the file, such as `sections.<name>.diameter`,
-            `bodies.<name>.mass`, `links.<name>.length` or `coordinates.<name>.drive.stiffness`
+            `bodies.<name>.mass`, `links.<name>.length`, `joints.<name>.position.0` or
+            `coordinates.<name>.drive.stiffness`; or a list of paths, of which the first has the
+            parameter's value, the others as well, or `{path: factor}` times it
         min: lower bound
         max: upper bound
         values: the values it may take, instead of bounds
@@ -109,7 +135,9 @@ class Parameter(Part):
 
     model_config = needs_one_of(("min", "max"), ("values",))
 
-    parameter: str
+    parameter: OneOrList[
+        str, Annotated[tuple[OneOfSeveral, ...], Field(min_length=2), AfterValidator(_several)]
+    ]
     min: YValue | None = None
     max: YValue | None = None
     values: (
@@ -134,10 +162,26 @@ class Parameter(Part):
         return self
 
     @property
+    def factors(self) -> Mapping[str, float]:
+        """Its properties by path, the first one first, each with its share of the value."""
+        listed = (self.parameter,) if isinstance(self.parameter, str) else self.parameter
+        each = (dict.fromkeys([p], 1.0) if isinstance(p, str) else p for p in listed)
+        return FrozenDict({path: factor for own in each for path, factor in own.items()})
+
+    @property
     def range(self) -> tuple[float, float]:
         """The bounds, or the smallest and the largest of the values."""
         bounds = self.values or tuple(v for v in (self.min, self.max) if v is not None)
         return bounds[0], bounds[-1]
+
+
+class _OrTable:
+    """The JSON Schema of choices: by name, or in a CSV file, which is read before the schema."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: Any, handler: Any) -> dict[str, Any]:
+        file = {"type": "object", "additionalProperties": {"type": "string"}}
+        return {"anyOf": [handler(core), {**file, "required": ["file"], "maxProperties": 1}]}
 
 
 class Choices(Part):
@@ -146,7 +190,9 @@ class Choices(Part):
     Each property is a part of y, called `<name>.<property>`, as in `boom.area`.
 
     Keys:
-        choices: by name, each with values by path; all set the same properties
+        choices: by name, each with values by path, and its `price` if all have one; all set the
+            same properties. Or `file`, a CSV file with a line for each: its name in the first
+            column, the paths as the names of the others
         price: for one unit of a property, by its path
     """
 
@@ -154,12 +200,18 @@ class Choices(Part):
         Mapping[str, Annotated[Mapping[str, YValue], Field(min_length=1), Frozen]],
         Field(min_length=1, max_length=MOST_CHOICES),
         Frozen,
+        _OrTable,
     ]
     price: Annotated[Mapping[str, Price], Frozen] = FrozenDict()
 
     @model_validator(mode="after")
     def _are_alike_and_differ(self) -> Self:
         (first, model), *others = self.choices.items()
+        if not self.properties:
+            raise wrong("sets no property", "choices", first)
+        if PRICE in model and self.price:
+            message = "each choice has a price of its own: leave these out, or those"
+            raise wrong(message, "price")
         seen = {self._row(model): first}
         for name, choice in others:
             for path in choice:
@@ -173,14 +225,20 @@ class Choices(Part):
                 raise wrong(f"has the same values as {same!r}", "choices", name)
             seen[self._row(choice)] = name
         for path in self.price:
-            if path not in model:
-                raise wrong(f"the choices do not set it; they set {listed(model)}", "price", path)
+            if path not in self.properties:
+                known = listed(self.properties)
+                raise wrong(f"the choices do not set it; they set {known}", "price", path)
         return self
 
     @property
     def properties(self) -> tuple[str, ...]:
         """Paths of the properties that every choice sets, in the order of the first choice."""
-        return tuple(next(iter(self.choices.values())))
+        return tuple(path for path in next(iter(self.choices.values())) if path != PRICE)
+
+    @property
+    def prices(self) -> tuple[float, ...]:
+        """What each choice costs, (n_choices,); nothing where none has a price of its own."""
+        return tuple(choice[PRICE] for choice in self.choices.values() if PRICE in choice)
 
     @property
     def rows(self) -> tuple[tuple[float, ...], ...]:
@@ -215,20 +273,22 @@ class Constraint(Part):
 
 
 class MassLimits(Part):
-    """Limits of the mass of the whole mechanism.
+    """Limits of the mass of the whole mechanism, and its price.
 
     Keys:
         min: at least
         max: at most
+        price: what a kilogram costs, such as 4 / kg
     """
 
     min: Annotated[float, quantity("mass", above=0)] | None = None
     max: Annotated[float, quantity("mass", above=0)] | None = None
+    price: Annotated[float, Quantity(above=0, elsewhere=_RATE)] | None = None
 
     @model_validator(mode="after")
     def _binds(self) -> Self:
-        if self.min is None and self.max is None:
-            raise wrong("the mass needs min, max or both")
+        if self.min is None and self.max is None and self.price is None:
+            raise wrong("the mass needs min, max or both, or a price")
         _require_order(self.min, self.max)
         return self
 
@@ -267,26 +327,42 @@ ENTRIES: dict[str, type[Part]] = {"parameter": Parameter, "choices": Choices}
 
 @dataclass(frozen=True)
 class DesignColumn:
-    """One component of y: the property that it is, and its bounds in SI units.
+    """One component of y: the properties that it is, and its bounds in SI units.
 
-    Of a catalogue they are the smallest and the largest value listed. ``price`` is for one SI unit.
+    ``factors`` are by path, that of the first is 1. Of a catalogue the bounds are the smallest and
+    the largest value listed. ``price`` is for one SI unit.
     """
 
-    parameter: str
+    factors: Mapping[str, float]
     min: float
     max: float
     price: float | None = None
     tolerance: Tolerance | None = None
 
+    @property
+    def parameter(self) -> str:
+        """Path of the property whose value it is: the first."""
+        return next(iter(self.factors))
+
+    @property
+    def said(self) -> str:
+        """All of its properties: `sections.upper.height, sections.fore.height (0.8 times that)`."""
+        pairs = self.factors.items()
+        return ", ".join(p if f == 1.0 else f"{p} ({f:.6g} times that)" for p, f in pairs)
+
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Columns of y that take one of the listed ``rows`` together, (n_choices, n_columns) in SI."""
+    """Columns of y that take one of the listed ``rows`` together, (n_choices, n_columns) in SI.
+
+    ``prices`` (n_choices,) are those of whole choices, if they have any.
+    """
 
     name: str
     columns: tuple[int, ...]
     choices: tuple[str, ...]
     rows: tuple[tuple[float, ...], ...]
+    prices: tuple[float, ...] = ()
 
 
 def column_names(entry: str, properties: Sequence[str]) -> list[str]:
@@ -324,12 +400,19 @@ class Design(Part):
                 names = column_names(name, entry.properties)
                 for column, path, values in zip(names, entry.properties, columns, strict=True):
                     price = entry.price.get(path)
-                    found[column] = DesignColumn(path, min(values), max(values), price)
+                    own = FrozenDict({path: 1.0})
+                    found[column] = DesignColumn(own, min(values), max(values), price)
             else:
                 found[name] = DesignColumn(
-                    entry.parameter, *entry.range, entry.price, entry.tolerance
+                    entry.factors, *entry.range, entry.price, entry.tolerance
                 )
         return FrozenDict(found)
+
+    @cached_property
+    def varied(self) -> Mapping[str, tuple[tuple[int, float], ...]]:
+        """Each property that varies, by path, with its column of y and its factor."""
+        columns = enumerate(self.parameters.values())
+        return {path: ((k, f),) for k, column in columns for path, f in column.factors.items()}
 
     @cached_property
     def catalogues(self) -> tuple[Catalogue, ...]:
@@ -338,7 +421,8 @@ class Design(Part):
         for name, entry in self.entries.items():
             if isinstance(entry, Choices):
                 columns = tuple(range(start, start + len(entry.properties)))
-                found.append(Catalogue(name, columns, tuple(entry.choices), entry.rows))
+                names = tuple(entry.choices)
+                found.append(Catalogue(name, columns, names, entry.rows, entry.prices))
                 start += len(columns)
                 continue
             if entry.values is not None:

@@ -21,7 +21,7 @@ from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_
 from eigassign.case.schema.sections import SHAPES
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
-from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm
+from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm, kinds_of
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
@@ -72,7 +72,7 @@ _KINDS: dict[str, type[Part]] = {
     **ENTRIES,
 }
 _TAGS = {f"<{kind}>" for kind in _KINDS}
-_TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>"}
+_TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>", "<path>", "<factors>"}
 _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
@@ -199,7 +199,7 @@ def _no_motion(error: Any) -> _Explained:
 
 def _no_target(error: Any) -> _Explained:
     given = error["input"]
-    kinds = [key for key in TARGETS if key in given]
+    kinds = kinds_of(given)
     if kinds:
         return (kinds[1],), f"{kinds[0]} is given already: write a target of its own for each"
     near = [(key, hint) for key in given if (hint := suggestion(key, TARGETS))]
@@ -236,9 +236,11 @@ def _literal(error: Any) -> _Explained:
     value = error["input"]
     words = expected.replace("'", "").replace(" or ", ", ").split(", ")
     others = {"<value>": "{stiffness: ...}", "<one>": "a list", "<auto>": "a whole number"}
-    also = others.get(error["loc"][-1], "")
+    also = "{highest: 1}" if "objective" in error["loc"] else others.get(error["loc"][-1], "")
     also = f", or {also}" if also else ""
     hint = suggestion(value, words) if isinstance(value, str) else ""
+    if "objective" in error["loc"] and value == "highest":
+        hint = ": say of which mode, as {highest: 1}"
     return (), f"expected {expected}{also}, got {shown(value)}{hint}"
 
 

@@ -1,13 +1,13 @@
-"""The key `links` of a mechanism: beams, rigid bodies, frames of beams, superelements.
+"""The key `links` of a mechanism: beams, rigid bodies, frames of beams, superelements, solids.
 
 To add a type of link: write its model and put it into the union `Link`.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from eigassign.case.schema.parts import (
     File,
@@ -15,11 +15,14 @@ from eigassign.case.schema.parts import (
     KindBy,
     Named,
     NumberOr,
+    OneOrList,
     OneOrMoreNamed,
     Part,
     ValueOr,
     kinds,
+    needs_one_of,
     quantity,
+    wrong,
 )
 from eigassign.case.schema.vectors import LENGTH, Angle, Inertia, Vector, only_in
 
@@ -137,38 +140,114 @@ class FrameLink(Part):
     reduce_to: ReduceTo | None = None
 
 
+NodeNumber: TypeAlias = Annotated[int, Field(ge=1, le=10**9)]
+
+
 class SuperelementNode(Part):
     """A node at which the part is joined to others.
 
     Keys:
-        position: its place
+        id: its number in the other program; its rows and its place are found by it. It needs
+            displacements and rotations; in a plane the freedoms 3, 4 and 5 of the node are held.
+            `[101, 103]`: the rotations of 101 are the displacements of 103, a ROT NODE of CalculiX
+        position: its place, where no file has it, or another one is meant
         dofs: its rows in the matrices, counted from 0, in the order u_x, u_y, θ_z, in space u_x,
-            u_y, u_z, θ_x, θ_y, θ_z
+            u_y, u_z, θ_x, θ_y, θ_z; of files that do not say whose their rows are
     """
 
-    position: Vector
-    dofs: Annotated[tuple[Dof, ...], Field(min_length=3, max_length=6)]
+    model_config = needs_one_of(("id",), ("position", "dofs"))
+
+    id: OneOrList[NodeNumber, tuple[NodeNumber, NodeNumber]] | None = None
+    position: Vector | None = None
+    dofs: Annotated[tuple[Dof, ...], Field(min_length=3, max_length=6)] | None = None
+
+    @model_validator(mode="after")
+    def _is_found(self) -> Self:
+        for key in ("position", "dofs"):
+            if self.id is None and getattr(self, key) is None:
+                raise wrong(f"required key is missing: {key}, or id, the node's number", key)
+        return self
 
 
 class SuperelementLink(Part):
-    """A part by its matrices, from another program.
+    """A part by its matrices, from another program, without supports.
+
+    What a file is, is told by its content: Nastran (DMIG punch, OP4), Abaqus (matrix output,
+    substructures), CalculiX (.sti, .mas), Ansys (Matrix Market, Harwell-Boeing), MATLAB, NumPy.
 
     Keys:
-        stiffness: file of the matrix, Matrix Market or NumPy, in SI units, without supports
+        stiffness: file of the matrix; of a file with several, `parts.mat:K` names it
         mass: file of the matrix, likewise
+        file: one file that holds both, in place of these two
+        units: of the matrices and of the places in files, not of what this file says
+        nodes_file: file, or list of files, that say where nodes are (CSV of id, x, y, z, or the
+            other program's input with *NODE or GRID) or whose the rows are (.dof, .mapping)
         nodes: by name
         reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
             (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
     """
 
+    model_config = needs_one_of(("stiffness", "mass"), ("file",))
+
     type: Literal["superelement"]
-    stiffness: File
-    mass: File
+    stiffness: File | None = None
+    mass: File | None = None
+    file: File | None = None
+    units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"] = "m-kg-s"
+    nodes_file: OneOrList[File, Annotated[tuple[File, ...], Field(min_length=1)]] | None = None
     nodes: OneOrMoreNamed[SuperelementNode]
     reduce_to: ReduceTo | None = None
 
+    @model_validator(mode="after")
+    def _has_both(self) -> Self:
+        for key in ("stiffness", "mass"):
+            if self.file is None and getattr(self, key) is None:
+                raise wrong(f"required key is missing: {key}, or file, which holds both", key)
+            if self.file is not None and getattr(self, key) is not None:
+                raise wrong(f"stands beside file, which holds both: leave out {key}, or file", key)
+        return self
+
+
+class SolidNode(Part):
+    """A node that stands for a surface of a solid.
+
+    Keys:
+        surface: its name in the mesh: a physical group, node set, surface or property
+        coupling: `rigid`, the surface moves with the node as one (RBE2); or `distributing`, the
+            node follows the mean motion of the surface (RBE3)
+        position: its place; the centre of the surface unless given
+    """
+
+    surface: str
+    coupling: Literal["rigid", "distributing"] = "rigid"
+    position: Vector | None = None
+
+
+class SolidLink(Part):
+    """A part by its mesh, of tetrahedra of 4 or 10 nodes or hexahedra of 20.
+
+    In a plane its nodes move in the x-y plane only; the mesh stays spatial.
+
+    Keys:
+        mesh: its file, of gmsh (.msh), Abaqus, CalculiX (.inp) or Nastran (.bdf)
+        units: of the file; lengths are in mm where it is `mm-t-s` or `mm-kg-ms`
+        material: its name
+        nodes: by name
+        reduce_to: the mesh is replaced by the link's own modes up to this frequency
+            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
+    """
+
+    type: Literal["solid"]
+    mesh: File
+    units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"] = "m-kg-s"
+    material: str
+    nodes: OneOrMoreNamed[SolidNode]
+    reduce_to: ReduceTo = "auto"
+
 
 Link: TypeAlias = Annotated[
-    BeamLink | RigidLink | FrameLink | SuperelementLink, KindBy("type", "link", default="beam")
+    BeamLink | RigidLink | FrameLink | SuperelementLink | SolidLink,
+    KindBy("type", "link", default="beam"),
 ]
+IMPORTED = ("superelement", "solid")  # of which only nodes and matrices are known
 LINKS = kinds(Link)

@@ -48,8 +48,9 @@ class DimensionLimit:
 
     small: str
     large: str
-    factor: int = 1
+    factor: float = 1
     may_meet: bool = False
+    beyond: str = "cannot exist"  # what is said of a section beyond it
 
     def holds(self, small: float, large: float) -> bool:
         """True where these values of the two dimensions are possible."""
@@ -57,7 +58,8 @@ class DimensionLimit:
         return a < large or (self.may_meet and a == large)
 
     def __str__(self) -> str:
-        share = self.large if self.factor == 1 else f"half of {self.large}"
+        named = {1.0: "", 2.0: "half of "}
+        share = f"{named.get(self.factor, f'{1 / self.factor:g} of ')}{self.large}"
         return f"must be {'at most' if self.may_meet else 'less than'} {share}"
 
 
@@ -189,6 +191,27 @@ class RectangleSection(SectionBase):
         return max(self.height, self.width) if spatial else self.height
 
 
+class BoxSection(RectangleSection):
+    """Hollow rectangle of one wall thickness, without roundings.
+
+    Keys:
+        width: outer, along local z
+        height: outer, along local y, which lies in the plane of a planar mechanism
+        thickness: of the wall, at most 0.4 of the smaller side; thicker ones are a `rectangle`
+    """
+
+    shape: Literal["box"]  # type: ignore[assignment]
+    thickness: Annotated[float, LENGTH]
+
+    def limits(self) -> tuple[DimensionLimit, ...]:
+        """Up to which torsion and shear are known well, see `mechanism.elements.sections`."""
+        beyond = "is no box whose torsion and shear are known well"
+        return tuple(
+            DimensionLimit("thickness", side, factor=2.5, may_meet=True, beyond=beyond)
+            for side in ("width", "height")
+        )
+
+
 class IProfileSection(SectionBase):
     """Two flanges and a web.
 
@@ -218,7 +241,7 @@ class IProfileSection(SectionBase):
 
 
 Section: TypeAlias = Annotated[
-    BareSection | CircleSection | TubeSection | RectangleSection | IProfileSection,
+    BareSection | CircleSection | TubeSection | RectangleSection | BoxSection | IProfileSection,
     KindBy("shape", "shape", default="bare"),
 ]
 SHAPES = kinds(Section)

@@ -17,15 +17,45 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     Quantity,
+    ValueOr,
     quantity,
     wrong,
 )
-from eigassign.case.schema.targets import Frequency, Mode, Modes
+from eigassign.case.schema.targets import Frequency, HighestTarget, Mode, Modes
 from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
 
 QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
 Auto: TypeAlias = Literal["auto"]
 MOST_MEASUREMENTS = 10_000  # of one case
+
+
+class HighestMode(Part):
+    """A mode along one trajectory, or along all.
+
+    Keys:
+        mode: its number
+        trajectory: name of the only trajectory that counts; all unless given
+    """
+
+    mode: Mode
+    trajectory: str | None = None
+
+
+class Highest(Part):
+    """The objective that a mode's least frequency along the trajectories be as high as can be.
+
+    Keys:
+        highest: number of the mode, or the mode and a trajectory
+    """
+
+    highest: ValueOr[Mode, HighestMode]
+
+    @property
+    def target(self) -> HighestTarget:
+        """The same as a target."""
+        if isinstance(self.highest, HighestMode):
+            return HighestTarget(mode=self.highest.mode, trajectory=self.highest.trajectory)
+        return HighestTarget(mode=self.highest)
 
 
 class AssignmentKeys(Part):
@@ -35,7 +65,9 @@ class AssignmentKeys(Part):
         method: `sequential` goes on to the optimum of the exact problem; `one_shot` is the paper's
             single quadratic program, for frequency targets of numbered modes, bounds, lists and
             linear limits
-        objective: the mean square error, or the largest weighted error
+        objective: what is made small or large: `least_squares` the mean square error, `worst_case`
+            the largest weighted error, `lightest` the mass, `{highest: 1}` the least frequency of a
+            mode, `widest` the least relative room of all bands and gaps
         starts: number of designs to start from; the first are the initial design and the one shot,
             the others by turns the most promising of a sample and spread ones. `auto` goes on
             while more than half an optimum is expected unseen, to 100 starts at most
@@ -43,14 +75,24 @@ class AssignmentKeys(Part):
         seconds: at most so long; no limit unless given
         max_error: how far a frequency may be from its target; 2 % unless given. If it is given, a
             larger error sets the exit code
+        robust: whether all that is asked holds for every deviation within the tolerances of the
+            parameters, not only for the design itself
     """
 
     method: Literal["sequential", "one_shot"] = "sequential"
-    objective: Literal["least_squares", "worst_case"] = "least_squares"
+    objective: ValueOr[Literal["least_squares", "worst_case", "lightest", "widest"], Highest] = (
+        "least_squares"
+    )
     starts: NumberOr[Annotated[int, Field(ge=1, le=1000)], Auto] = "auto"
     steps: Annotated[int, Field(ge=1, le=1_000_000)] = 100
     seconds: Annotated[float, DURATION] | None = None
     max_error: Annotated[float, quantity("fraction", above=0)] | None = None
+    robust: bool = False
+
+    @property
+    def named_objective(self) -> str:
+        """The objective in one word: that of a mode is ``highest``."""
+        return self.objective if isinstance(self.objective, str) else "highest"
 
 
 class ExpansionKeys(Part):
@@ -93,7 +135,9 @@ class Measurement(Part):
     """A measured frequency.
 
     Keys:
-        time: of the trajectory when it was measured; between samples q is linear in time
+        time: of the trajectory when it was measured; between samples q is linear in time. Along a
+            path of a tip q is that of the mechanism as it is written, whatever design explains the
+            measurements: give `q` where the machine followed the path with another one
         q: instead of the time: one value of each coordinate
         trajectory: name of the trajectory, where there are several
         mode: its number, counted from the lowest elastic one

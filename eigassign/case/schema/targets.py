@@ -1,6 +1,7 @@
-"""The key `targets`: wanted frequencies, limits, bands to keep out of, gaps between modes.
+"""The key `targets`: wanted frequencies, limits, bands to keep out of, gaps between modes, statics.
 
-A target has exactly one of the keys in `TARGETS`, which say what kind it is. What the rest of the
+A target has exactly one of the keys in `TARGETS`, which say what kind it is, beside the limit of
+what is static. What the rest of the
 program goes through are requirements (`assignment.requirements`): one for each of a target's
 `named`.
 """
@@ -28,10 +29,12 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.trajectory import TIME, Coordinates, Times
-from eigassign.case.units import DIMENSIONS
+from eigassign.case.schema.vectors import Direction
+from eigassign.case.units import DIMENSIONS, SPEED, Dimension
 
 FREQUENCY = quantity("frequency", above=0)
 Frequency: TypeAlias = Annotated[float, FREQUENCY]
+Speed: TypeAlias = Annotated[float, Quantity(SPEED, above=0)]
 Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
 
 
@@ -72,25 +75,43 @@ class FrequencyFile(Part):
         file: relative to the case file; columns `time` and `frequency`
     """
 
+    dimension: ClassVar[Dimension] = DIMENSIONS["frequency"]  # of the column `frequency`
     file: File
 
 
+class SpeedProfile(FrequencyProfile):
+    """A speed of rotation that changes in time, linear between the points given."""
+
+    frequency: Annotated[tuple[Speed, ...], Field(min_length=2)]
+
+
+class SpeedFile(FrequencyFile):
+    """The same in a CSV file."""
+
+    dimension = SPEED
+
+
 CURVES: dict[str, type[Part]] = {"profile": FrequencyProfile, "csv": FrequencyFile}
-
-
+_WHICH_CURVE = Discriminator(
+    lambda value: (
+        "<csv>"
+        if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value)
+        else "<profile>"
+        if isinstance(value, (FrequencyProfile, Mapping))
+        else "<value>"
+    )
+)
 Curve: TypeAlias = Annotated[
     Annotated[Frequency, Tag("<value>")]
     | Annotated[FrequencyProfile, Tag("<profile>")]
     | Annotated[FrequencyFile, Tag("<csv>")],
-    Discriminator(
-        lambda value: (
-            "<csv>"
-            if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value)
-            else "<profile>"
-            if isinstance(value, (FrequencyProfile, Mapping))
-            else "<value>"
-        )
-    ),
+    _WHICH_CURVE,
+]
+SpeedCurve: TypeAlias = Annotated[
+    Annotated[Speed, Tag("<value>")]
+    | Annotated[SpeedProfile, Tag("<profile>")]
+    | Annotated[SpeedFile, Tag("<csv>")],
+    _WHICH_CURVE,
 ]
 
 
@@ -99,12 +120,12 @@ class Harmonic(Part):
 
     Keys:
         harmonic: the multiple
-        of: the frequency
+        of: the frequency, or speed of rotation in rpm
         margin: to either side
     """
 
     harmonic: Annotated[float, Quantity(above=0)]
-    of: Curve
+    of: SpeedCurve
     margin: Annotated[float, Quantity(DIMENSIONS["fraction"], above=0, below=1)]
 
 
@@ -157,6 +178,8 @@ class FollowedMode(Part):
         return f"the mode like mode {self.like} ({', '.join(where)})"
 
 
+AnyMode: TypeAlias = int | FollowedMode
+
 # --- Targets
 
 
@@ -184,14 +207,21 @@ class AnyTarget(Part):
         raise NotImplementedError
 
     @property
-    def named(self) -> tuple[tuple[int, ...], ...]:
+    def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """The modes of each of its requirements; none where every mode is meant."""
         raise NotImplementedError
 
     @property
-    def followed(self) -> FollowedMode | None:
-        """The mode that it follows by its shape."""
-        return None
+    def followed(self) -> tuple[FollowedMode, ...]:
+        """The modes that it follows by their shapes."""
+        each = (mode for modes in self.named for mode in modes)
+        return tuple(mode for mode in each if isinstance(mode, FollowedMode))
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers of all modes that it names, of followed ones where they are named."""
+        each = (mode for modes in self.named for mode in modes)
+        return tuple(mode.like if isinstance(mode, FollowedMode) else mode for mode in each)
 
     @classmethod
     def curve_of(cls, mode: str) -> str:
@@ -233,16 +263,11 @@ class ModeTarget(AnyTarget):
         return (((self.kind,), self.curve),)
 
     @property
-    def named(self) -> tuple[tuple[int, ...], ...]:
+    def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """One mode each; all modes are at least f if and only if mode 1 is."""
         if self.modes is None:
-            return ((self.mode.like if isinstance(self.mode, FollowedMode) else self.mode or 1,),)
+            return ((self.mode or 1,),)
         return ((1,),) if self.modes == "all" else tuple((mode,) for mode in self.modes)
-
-    @property
-    def followed(self) -> FollowedMode | None:
-        """The mode that it follows by its shape."""
-        return self.mode if isinstance(self.mode, FollowedMode) else None
 
     @model_validator(mode="after")
     def _names_modes(self) -> Self:
@@ -299,14 +324,14 @@ class KeepOutTarget(AnyTarget):
 
     Keys:
         keep_out: the band, or one about a harmonic
-        mode: number of the only mode that keeps out
+        mode: number of the only mode that keeps out, or one followed by its shape
         modes: several numbers; `all` unless given
     """
 
     kind = "keep_out"
     in_time = (("keep_out", "of"),)
-    keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
-    mode: Mode | None = None
+    keep_out: OneOrList[Harmonic, tuple[Speed, Speed]]
+    mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
 
     @property
@@ -317,9 +342,9 @@ class KeepOutTarget(AnyTarget):
         return tuple((("keep_out", k), edge) for k, edge in enumerate(self.keep_out))
 
     @property
-    def named(self) -> tuple[tuple[int, ...], ...]:
+    def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """The modes of all of them together."""
-        modes = () if self.mode is None else (self.mode,)
+        modes: tuple[AnyMode, ...] = () if self.mode is None else (self.mode,)
         return (modes if self.modes is None else () if self.modes == "all" else self.modes,)
 
     @field_validator("keep_out", mode="before")
@@ -343,19 +368,20 @@ class Gap(Part):
     """At least so many Hz between two modes.
 
     Keys:
-        between: their numbers, the lower first
-        at_least: their distance
+        between: their numbers, the lower first; or modes followed by their shapes
+        at_least: how far the second is above the first
     """
 
-    between: tuple[Mode, Mode]
+    between: tuple[ValueOr[Mode, FollowedMode], ValueOr[Mode, FollowedMode]]
     at_least: Frequency
 
     @model_validator(mode="after")
     def _is_between_two(self) -> Self:
         low, high = self.between
         if low == high:
-            raise wrong(f"a gap is between two modes, got {low} twice", "between")
-        if low > high:
+            name = low.name if isinstance(low, FollowedMode) else low
+            raise wrong(f"a gap is between two modes, got {name} twice", "between")
+        if isinstance(low, int) and isinstance(high, int) and low > high:
             raise wrong(f"the lower mode comes first: [{high}, {low}]", "between")
         return self
 
@@ -376,21 +402,153 @@ class GapTarget(AnyTarget):
         return ((("gap", "at_least"), self.gap.at_least),)
 
     @property
-    def named(self) -> tuple[tuple[int, ...], ...]:
+    def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """The pair."""
         return (self.gap.between,)
 
 
+class HighestTarget(AnyTarget):
+    """The mode whose least frequency is made as high as can be; asked for by the objective.
+
+    Keys:
+        mode: its number
+    """
+
+    kind = "highest"
+    mode: Mode
+
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """None."""
+        return ()
+
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """The mode."""
+        return ((self.mode,),)
+
+
+# --- Statics
+
+
+class Node(Part):
+    """Where something may give way by so much.
+
+    Keys:
+        at: the node, `<link>.<node>`
+    """
+
+    at: str
+
+
+class PushedNode(Node):
+    """Where a force acts, and along which direction it and the way that gives are.
+
+    Keys:
+        direction: in the axes of the ground
+    """
+
+    direction: Direction
+
+
+class StaticTarget(AnyTarget):
+    """A limit of what statics gives at every pose: it is on no mode."""
+
+    limit: ClassVar[str]  # the key that it has with kinds of other targets
+
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """None."""
+        return ()
+
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """No mode."""
+        return ()
+
+    @property
+    def place(self) -> Node:
+        """The node, with the direction that it is pushed along."""
+        place: Node = getattr(self, self.kind)
+        return place
+
+    @property
+    def edge(self) -> float:
+        """The limit, in SI units."""
+        return float(getattr(self, self.limit))
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_limited_to_one_side(cls, value: Any) -> Any:
+        other = "at_most" if cls.limit == "at_least" else "at_least"
+        if isinstance(value, Mapping) and other in value:
+            raise wrong(f"a {cls.kind} has the limit {cls.limit}", other)
+        return value
+
+
+class StiffnessTarget(StaticTarget):
+    """A node does not give way by more than a force over this stiffness, the drives holding.
+
+    Keys:
+        stiffness: where, and along which direction
+        at_least: force over the way along it, at every sample
+    """
+
+    kind = "stiffness"
+    limit = "at_least"
+    stiffness: PushedNode
+    at_least: Annotated[float, quantity("stiffness", above=0)]
+
+
+class ComplianceTarget(StaticTarget):
+    """The same by its inverse.
+
+    Keys:
+        compliance: where, and along which direction
+        at_most: way over the force along it, at every sample
+    """
+
+    kind = "compliance"
+    limit = "at_most"
+    compliance: PushedNode
+    at_most: Annotated[float, quantity("compliance", above=0)]
+
+
+class SagTarget(StaticTarget):
+    """The weight bends the links by no more than this.
+
+    Keys:
+        sag: where
+        at_most: way of the node, whatever its direction, at every sample
+    """
+
+    kind = "sag"
+    limit = "at_most"
+    sag: Node
+    at_most: Annotated[float, quantity("length", above=0)]
+
+
+# By the key that says the kind, which the limit of what is static does not.
 TARGETS: dict[str, type[AnyTarget]] = {
     target.kind: target
-    for target in (FrequencyTarget, AtLeastTarget, AtMostTarget, KeepOutTarget, GapTarget)
-}  # by the key that only they have
+    for target in (
+        *(FrequencyTarget, AtLeastTarget, AtMostTarget, KeepOutTarget, GapTarget),
+        *(StiffnessTarget, ComplianceTarget, SagTarget),
+    )
+}
+
+
+def kinds_of(value: Mapping[str, object]) -> list[str]:
+    """The kinds that the keys of a target name; of statics, a limit is none."""
+    kinds = [key for key in TARGETS if key in value]
+    static = any(issubclass(TARGETS[kind], StaticTarget) for kind in kinds)
+    return [key for key in kinds if not (static and key in ("at_least", "at_most"))]
 
 
 def _target_tag(value: object) -> str | None:
     if isinstance(value, AnyTarget):
         return f"<{value.kind}>"
-    keys = [key for key in TARGETS if isinstance(value, Mapping) and key in value]
+    keys = kinds_of(value) if isinstance(value, Mapping) else []
     return f"<{keys[0]}>" if len(keys) == 1 else None
 
 
@@ -399,6 +557,9 @@ TargetForm: TypeAlias = Annotated[
     | Annotated[AtLeastTarget, Tag("<at_least>")]
     | Annotated[AtMostTarget, Tag("<at_most>")]
     | Annotated[KeepOutTarget, Tag("<keep_out>")]
-    | Annotated[GapTarget, Tag("<gap>")],
+    | Annotated[GapTarget, Tag("<gap>")]
+    | Annotated[StiffnessTarget, Tag("<stiffness>")]
+    | Annotated[ComplianceTarget, Tag("<compliance>")]
+    | Annotated[SagTarget, Tag("<sag>")],
     Discriminator(_target_tag, "no_target", "no key names a kind of target"),
 ]

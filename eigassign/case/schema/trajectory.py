@@ -22,6 +22,7 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     Quantity,
+    ValueOr,
     quantity,
     wrong,
 )
@@ -61,22 +62,33 @@ Orientations: TypeAlias = Annotated[  # a triple of angles, or a list of them
 ]
 
 
+class Added(Part):
+    """What a property has more along a trajectory than the file, or the design, gives it.
+
+    Keys:
+        add: the amount
+    """
+
+    add: PropertyValue
+
+
 class AnyTrajectory(Part):
     """What every trajectory may have.
 
     Keys:
         name: of the trajectory; its place "1", "2", … unless given
         weight: what each of its seconds counts beside those of others
-        set: properties of the mechanism by their paths, with the values they have along it
+        set: properties of the mechanism by their paths, with the values they have along it, or
+            `{add: amount}`, also to what is a design parameter
     """
 
     name: Name | None = None
     weight: Annotated[float, Quantity(above=0)] = 1.0
-    set: ByReference[PropertyValue] = FrozenDict()
+    set: ByReference[ValueOr[PropertyValue, Added]] = FrozenDict()
 
 
 class SampledTrajectory(AnyTrajectory):
-    """Samples of the coordinates.
+    """Samples of the coordinates; one alone is a pose at rest, which counts as a second.
 
     Keys:
         q: one value of each coordinate for each sample
@@ -84,12 +96,16 @@ class SampledTrajectory(AnyTrajectory):
         duration: instead of times: equal steps from 0
     """
 
-    q: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
+    q: Annotated[tuple[Coordinates, ...], Field(min_length=1)]
     time: Times | None = None
     duration: Annotated[float, DURATION] | None = None
 
     @model_validator(mode="after")
     def _has_one_clock(self) -> Self:
+        if len(self.q) == 1:
+            for key in {"time", "duration"} & self.model_fields_set:
+                raise wrong("one sample is a pose at rest: leave the time out", key)
+            return self
         if (self.time is None) == (self.duration is None):
             raise wrong("give either time (one per sample) or duration, and not both")
         if self.time is not None and len(self.time) != len(self.q):

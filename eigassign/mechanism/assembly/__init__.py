@@ -13,6 +13,7 @@ Read in this order; each imports only from those above it:
     gravity           the stiffness that the weight adds in a pose
     total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
+    energies          energies of a mode in links, drives, springs, weight and bodies
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]
     dynamics          what motion and loads add to eq. (1), at a pose
 """

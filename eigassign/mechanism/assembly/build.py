@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import (
     AffineEntries,
@@ -37,7 +38,8 @@ from eigassign.mechanism.kinematics.property_limits import property_limits
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats
 from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
-from eigassign.series.compiler import compile_program
+from eigassign.series.compiler import Program, compile_program
+from eigassign.series.expression import Scalar
 
 LocalLinks: TypeAlias = tuple[list[LocalLink], NodeMotions]
 
@@ -84,7 +86,7 @@ def build_pencil(
         if hangs_on_stiffness(case, motion):
             coarse = local_links(in_few_elements(case), parameters, motion)
         add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
-    _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
+    add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
     if g is not None:
         known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
@@ -106,13 +108,13 @@ def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> C
 def in_few_elements(case: CaseFile) -> CaseFile:
     """The case with one element for each beam whose section does not vary, beams and frames whole.
 
-    Superelements are left their interface: no part has a mode as low as the frequency named here.
+    Superelements and solids are left their interface: no part has a mode as low as what is named.
     """
 
     def few(part: Any) -> Any:
         update: dict[str, Any] = {}
         if hasattr(part, "reduce_to"):
-            update["reduce_to"] = 1e-9 if part.type == "superelement" else None
+            update["reduce_to"] = 1e-9 if part.type in IMPORTED else None
         if hasattr(part, "elements") and isinstance(part.section, str):
             update["elements"] = 1
         if hasattr(part, "beams"):
@@ -143,6 +145,13 @@ def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
     links = {name: scaled(link) for name, link in case.mechanism.links.items()}
     mechanism = case.mechanism.model_copy(update={"links": links})
     return replace(case, mechanism=mechanism), tuple(counts)
+
+
+def has_tapers(case: CaseFile) -> bool:
+    """True where the section of a beam varies along it."""
+    links = case.mechanism.links.values()
+    parts = [part for link in links for part in (link, *getattr(link, "beams", {}).values())]
+    return any(not isinstance(getattr(part, "section", ""), str) for part in parts)
 
 
 def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
@@ -244,26 +253,40 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
     )
 
 
-def _add_drives(
+def add_drives(
     stiffness: AffineEntries,
     mass: AffineEntries,
     case: CaseFile,
     parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
+    only: str | None = None,
 ) -> None:
     """½ k ṡ² of a held joint and ½ J ṡ² of any driven one, with its rate ṡ = r q̇."""
     for i, (name, coordinate) in enumerate(case.coordinates.items()):
-        if isinstance(coordinate.drive, str):
+        if isinstance(coordinate.drive, str) or only not in (None, name):
             continue
         r = motion.coordinates.rates[i]
         for target, key in ((stiffness, "stiffness"), (mass, "inertia")):
-            given = getattr(coordinate.drive, key)
-            if given is None:
+            value = drive_value(case, parameters, name, key)
+            if value is None:
                 continue
-            value = parameters.number(f"coordinates.{name}.drive.{key}", given)
             for row, column in zip(*np.nonzero(np.outer(r, r)), strict=True):
                 target.add(n_u + row, n_u + column, value * (r[row] * r[column]))
+
+
+def drive_value(case: CaseFile, parameters: ModelParameters, name: str, key: str) -> Scalar | None:
+    """Stiffness or inertia of a coordinate's drive, None where it has none.
+
+    The inertia of a motor's rotor J_m is J_m N² on the joint, with the gear's ratio N.
+    """
+    drive: Any = case.coordinates[name].drive
+    path = f"coordinates.{name}.drive"
+    if key == "inertia" and getattr(drive, "motor_inertia", None) is not None:
+        ratio = parameters.number(f"{path}.ratio", drive.ratio or 1.0)
+        return parameters.number(f"{path}.motor_inertia", drive.motor_inertia) * ratio**2.0
+    given = getattr(drive, key, None)
+    return None if given is None else parameters.number(f"{path}.{key}", given)
 
 
 def _compile(
@@ -279,13 +302,7 @@ def _compile(
     if not n_dof:
         raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
     entries = [stiffness, mass] if weight is None else [stiffness, mass, weight]
-    used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
-    used[0] = True
-    for entry in entries:
-        used[entry[2] + 1] = True
-    place, atoms = np.cumsum(used) - 1, np.flatnonzero(used)[1:] - 1
-    theta = [(r, c, place[a + 1], v) for r, c, a, v in entries]
-    rows, columns, weights = pattern(theta, n_dof, len(atoms) + 1)
+    rows, columns, weights, program = compiled_pattern(entries, parameters, n_dof)
     return Pencil(
         n_dof=n_dof,
         n_u=n_u,
@@ -294,7 +311,7 @@ def _compile(
         columns=columns,
         stiffness=weights[0] + weights[2] if weight is not None else weights[0],
         mass=weights[1],
-        program=compile_program(parameters.recorder, atoms.tolist(), parameters.count),
+        program=program,
         to_program=parameters.to_z,
         shift=parameters.shift,
         n_q=len(parameters.coordinates) + len(parameters.loads),
@@ -303,6 +320,20 @@ def _compile(
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
         weight=_weight((rows, columns), weights, case, parameters, motion, n_u),
     )
+
+
+def compiled_pattern(
+    entries: Sequence[Entries], parameters: ModelParameters, n_dof: int
+) -> tuple[Ints, Ints, list[sparse.csr_array], Program]:
+    """The common pattern of several matrices, their weights on it, and θ's program."""
+    used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
+    used[0] = True
+    for entry in entries:
+        used[entry[2] + 1] = True
+    place, atoms = np.cumsum(used) - 1, np.flatnonzero(used)[1:] - 1
+    theta = [(r, c, place[a + 1], v) for r, c, a, v in entries]
+    program = compile_program(parameters.recorder, atoms.tolist(), parameters.count)
+    return *pattern(theta, n_dof, len(atoms) + 1), program
 
 
 def _weight(

@@ -28,7 +28,7 @@ from scipy import sparse
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, Row
 from eigassign.mechanism.elements.mesh import Reduction, Term, total
-from eigassign.mechanism.kinematics.rotations import multiply
+from eigassign.mechanism.kinematics.rotations import multiply, some
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -86,6 +86,19 @@ def _add_whole(
 def inertia(link: LocalLink) -> Objects:
     """Nᵀ m N (n_twist, n_twist) about the link's origin: of a reduced one the whole mass."""
     return _constants(link).inertia
+
+
+def weighed(link: LocalLink, pull: Objects) -> dict[int, Scalar]:
+    """Qᵀ m N a over u: what acts on a link under one acceleration a (n_twist,), in its axes."""
+    own = {s: [(int(link.own[s]), 1.0)] for s in np.flatnonzero(link.own >= 0).tolist()}
+    places: dict[int, Row] = {**own, **link.carried}
+    found: dict[int, Scalar] = {}
+    for coefficient, momentum in _constants(link).momenta:
+        for s, k in zip(*(each.tolist() for each in np.nonzero(momentum)), strict=True):
+            force = coefficient * pull[k] * float(momentum[s, k])
+            for unknown, moved in places.get(s, ()) if some(force) else ():
+                found[unknown] = found.get(unknown, 0.0) + force * moved
+    return found
 
 
 @dataclass(frozen=True, eq=False)

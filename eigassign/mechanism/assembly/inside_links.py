@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from scipy import sparse
 
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.mesh import LinkMesh, element_motion, total
+from eigassign.mechanism.elements.mesh import LinkMesh, element_motion
 from eigassign.mechanism.elements.profiles import BeamValues, Profile
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import Objects
@@ -47,13 +47,25 @@ class ReducedLinks:
         own = values[5 * k : 5 * k + 3]
         return motion_matrix(self.links[k], own, self.pencil.n_u, self.pencil.n_dof)
 
-    def matrices(
-        self, k: int, values: Sequence[Floats]
-    ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Stiffness and mass of the whole link k, with all its dofs."""
-        reduction, (kappa, mu) = self.links[k].reduction, values[5 * k + 3 : 5 * k + 5]
-        assert reduction is not None
-        return total(reduction.mesh.stiffness, kappa), total(reduction.mesh.mass, mu)
+    def coefficients(self, k: int, values: Sequence[Floats]) -> tuple[Floats, Floats]:
+        """Those of stiffness and mass of the whole link k, with all its dofs; 0 of other dofs.
+
+        Only terms that enter its interior count.
+        """
+        return values[5 * k + 3] * self._inside[k][0], values[5 * k + 4] * self._inside[k][1]
+
+    @cached_property
+    def _inside(self) -> list[tuple[Floats, Floats]]:
+        """1 for each term of stiffness and mass of a link that enters its interior, 0 for others"""
+        found = []
+        for link in self.links:
+            reduction = link.reduction
+            assert reduction is not None
+            i, mesh = reduction.interior, reduction.mesh
+            both = (mesh.stiffness, mesh.mass)
+            each = [[float(t.matrix[i].nnz > 0) for t in terms] for terms in both]
+            found.append((np.array(each[0]), np.array(each[1])))
+        return found
 
 
 def reduced_links(
@@ -70,6 +82,71 @@ def reduced_links(
         for terms in (mesh.stiffness, mesh.mass):
             arrays.append(np.array([t.coefficient for t in terms], dtype=object))
     return ReducedLinks(reduced, parameters.compiled(*arrays), parameters, pencil)
+
+
+# --- solids
+
+
+class SolidLink(NamedTuple):
+    """A solid: its place among the unknowns, and its mesh with all dofs."""
+
+    name: str
+    local: LocalLink
+    mesh: LinkMesh
+
+
+@dataclass(frozen=True, eq=False)
+class SolidLinks:
+    """The solids of a mechanism."""
+
+    links: tuple[SolidLink, ...]
+    parameters: ModelParameters
+    pencil: Pencil
+
+    def lost(self, x: Floats, z: Floats) -> Floats:
+        """2 × the energy that their meshes lack in motions z (n_dof, count) at x (n_x,), about.
+
+        (n_links, count, count)
+        """
+        values = [each[0] for each in self._table(self.parameters.z(x[None]))]
+        found = []
+        for k, link in enumerate(self.links):
+            B = motion_matrix(link.local, values[4 * k : 4 * k + 3], self.pencil.n_u, len(z))
+            v, gram = np.asarray(B @ z), self._grams[k]
+            energy = link.mesh.lost.energy(v) if gram is None else v.T @ gram @ v  # type: ignore
+            found.append(values[4 * k + 3][0] * energy)
+        return np.array(found)
+
+    @cached_property
+    def _grams(self) -> list[Floats | None]:
+        """The same of all motions of reduced links, for coefficients of 1."""
+        made = []
+        for link in self.links:
+            reduction = link.local.reduction
+            made.append(None if reduction is None else link.mesh.lost.energy(reduction.basis))  # type: ignore
+        return made
+
+    @cached_property
+    def _table(self) -> CompiledArrays:
+        """`motion_scalars` of each link, and the coefficient."""
+        arrays: list[Objects] = []
+        for link in self.links:
+            assert link.mesh.lost is not None
+            coefficient = np.array([link.mesh.lost.coefficient], dtype=object)
+            arrays += [*motion_scalars(link.local), coefficient]
+        return self.parameters.compiled(*arrays)
+
+
+def solid_links(
+    parameters: ModelParameters, links: Sequence[tuple[str, LocalLink, LinkMesh]], pencil: Pencil
+) -> SolidLinks | None:
+    """The links (name, place, mesh) that are solids; None without any."""
+    found = []
+    for name, local, mesh in links:
+        whole = mesh if mesh.reduction is None else mesh.reduction.mesh
+        if whole.lost is not None:
+            found.append(SolidLink(name, local, whole))
+    return SolidLinks(tuple(found), parameters, pencil) if found else None
 
 
 # --- the elements of beams
@@ -94,11 +171,8 @@ class Alike(NamedTuple):
 
     def profile(self) -> Profile:
         """Their values as arrays (n,)."""
-        shear = BeamValues._fields.index("shear")
-        rows: Any = np.moveaxis(self.values, 0, -1)
-        if not self.sheared:
-            rows = [[None if k == shear else v for k, v in enumerate(one)] for one in rows]
-        return [BeamValues(*one) for one in rows]
+        rows = [BeamValues(*one) for one in np.moveaxis(self.values, 0, -1)]
+        return rows if self.sheared else [r._replace(shear_z=None, shear_y=None) for r in rows]
 
     def different(self) -> tuple[Alike, Ints]:
         """The different ones among them, and which of these every one is."""
@@ -184,7 +258,7 @@ class MeshedLinks:
         row = [profile for strand in strands for profile in strand.profiles]
         kinds: dict[tuple[bool, int], list[int]] = {}
         for k, profile in enumerate(row):
-            kinds.setdefault((profile[0].shear is not None, len(profile)), []).append(k)
+            kinds.setdefault((profile[0].shear_z is not None, len(profile)), []).append(k)
         found = []
         for (sheared, _), which in kinds.items():
             different = {id(row[k]): row[k] for k in which}
@@ -199,7 +273,10 @@ class MeshedLinks:
 
 
 class _Kind(NamedTuple):
-    """Elements of one kind, as `Alike`, and their different values (n_different, n_legendre, 9)."""
+    """Elements of one kind, as `Alike`, and their different values.
+
+    Those are (n_different, n_legendre, 10).
+    """
 
     sheared: bool
     elements: Ints

@@ -8,7 +8,7 @@ between exact, Taylor and reduced evaluation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 STACK_LIMIT = 500_000  # numbers: 4 MB
+KEPT = 1_000_000  # numbers that are kept of a program: 8 MB
 # Numbers up to which matrices at few poses come quicker from dense terms: 7 µs instead of 18 for
 # two_link (7·10³), 16 instead of 20 for 3·10⁴ (four_bar), 39 instead of 25 for 8·10⁴ (gantry).
 TINY_STACK = 20_000
@@ -42,14 +43,21 @@ def theta_slopes(
     program: Program, to_program: Floats, shift: Floats, x: Floats, along: Ints
 ) -> Floats:
     """∂θ/∂x_i (len(along), 1 + n_outputs, n) of θ = (1, program(to_program x + shift)), exactly."""
-    algebra = Tangents(len(x), len(along))
-    z = algebra.constant(shift)
+    z = Tangents(len(x), len(along)).constant(shift)
     z[:, : len(x)] += to_program @ x.T
     z[:, len(x) :] = np.repeat(to_program[:, along], len(x), axis=1)
-    rows = program.run(algebra, z)[:, len(x) :]
+    size = len(x), len(along)
+    kept = len(program.outputs) * z.shape[1] <= KEPT
+    rows = (_run if kept else _run.__wrapped__)(program, *size, z.tobytes())[:, len(x) :]
     slopes = np.zeros((len(along), 1 + len(rows), len(x)))
     slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
     return slopes
+
+
+@lru_cache(maxsize=2)  # frequencies and statics of a design want the same, one after the other
+def _run(program: Program, samples: int, directions: int, z: bytes) -> Floats:
+    variables = np.frombuffer(z).reshape(-1, (1 + directions) * samples)
+    return program.run(Tangents(samples, directions), variables)
 
 
 @dataclass(frozen=True, eq=False)

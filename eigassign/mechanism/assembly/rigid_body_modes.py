@@ -186,7 +186,7 @@ def _recombined(
 def _spans(case: CaseFile, parameters: ModelParameters) -> Floats:
     """How far z may be varied: a rad or m, and half of the range of a property."""
     n = len(parameters.coordinates)
-    half = [0.5 * (high - low) for low, high in case.ranges.values()]
+    half = [0.5 * (high - low) for low, high in case.box]
     return np.append(np.ones(n), parameters.to_z[n:, n:] @ half)
 
 
@@ -264,7 +264,8 @@ class _Resistance:
         if not zero.any() or left.shape[1] == n_rigid:
             return
         paths = dict.fromkeys(np.array(self.springs)[zero].tolist())
-        named = {p.parameter: name for name, p in self.case.design.parameters.items()}
+        design = self.case.design.parameters.items()
+        named = {path: name for name, column in design for path in column.factors}
         path = next(iter(paths))
         place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
         what = " and ".join(named.get(path, path) for path in paths)

@@ -24,9 +24,15 @@ from eigassign.mechanism.assembly.node_motion import (
     combined,
 )
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
-from eigassign.mechanism.kinematics.joints import mounting
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, carried, multiply, present
+from eigassign.mechanism.kinematics.rotations import (
+    DOFS,
+    Objects,
+    carried,
+    mounting,
+    multiply,
+    present,
+)
 from eigassign.mechanism.kinematics.topology import GROUND, NodeName, split
 from eigassign.series.expression import Scalar, is_constant
 
@@ -87,7 +93,8 @@ class SpringEnds:
         for name, spring in springs.items():
             start, end = (GROUND if e == "ground" else split(e) for e in spring.between)
             stiffness = self._stiffness(f"springs.{name}", spring)
-            yield self._motions(start, end, mounting(spring), stiffness)
+            mount = mounting(self.parameters.angles(f"springs.{name}", spring))
+            yield self._motions(start, end, mount, stiffness)
 
     def _stiffness(self, path: str, spring: Any) -> list[Scalar]:
         """Six values k_t, k_r per axis; a number stands for every axis of the space."""
@@ -108,7 +115,7 @@ class SpringEnds:
         self, start: NodeName, end: NodeName, mount: Objects, stiffness: Sequence[Scalar]
     ) -> SpringMotion:
         """Motion of both ends in the spring's axes, the first carried to the second."""
-        here, there, arm = self._in_world(start), self._in_world(end), np.zeros(3, dtype=object)
+        here, there, arm = self.in_world(start), self.in_world(end), np.zeros(3, dtype=object)
         if end != GROUND:
             arm = self._place(end) - self._place(start)
             here = apply(carried(np.eye(3).astype(object), arm), here)
@@ -122,7 +129,7 @@ class SpringEnds:
     def _place(self, node: NodeName) -> Objects:
         return self.motion.placement(node[0]).at(self._local(node))[1]
 
-    def _in_world(self, node: NodeName) -> MotionRows:
+    def in_world(self, node: NodeName) -> MotionRows:
         """Full motion of a node in world axes: elastic rows and N T columns."""
         if node == GROUND:
             return [{} for _ in range(6)]

@@ -8,9 +8,10 @@ Read in this order; each imports only from those above it:
     inner          what a mesh leaves out: the motion inside its elements
     mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
     bodies         rigid links, point masses and rigid bodies at nodes
-    sparse_factor  factors of symmetric definite sparse matrices
+    sparse_factor  factors of symmetric definite sparse matrices, and their largest modes
     craig_bampton  fixed-interface modes instead of a link's interior dofs
-    matrix_file    a matrix from a file of another program, within limits
     superelement   links from another finite-element program
-    links          the mesh of any link: beam, frame, rigid or superelement
+    solid          links from the mesh of a solid part
+    free_part      mass, inertia and free-free frequencies of a part, in words
+    links          the mesh of any link: beam, frame, rigid, superelement or solid
 """

@@ -62,11 +62,10 @@ class Shear(NamedTuple):
 
 def shear(profile: Profile, h: Scalar) -> tuple[Shear, Shear]:
     """The shear numbers of bending in the element's x-y and x-z plane."""
-    kGA = profile[0].shear
-    if kGA is None:
-        return Shear(0.0, 0.0), Shear(0.0, 0.0)
     found = []
-    for key in ("EI_z", "EI_y"):
+    for key, kGA in (("EI_z", profile[0].shear_z), ("EI_y", profile[0].shear_y)):
+        if kGA is None:
+            return Shear(0.0, 0.0), Shear(0.0, 0.0)
         EI = _antisymmetric([getattr(beam, key) for beam in profile])
         if is_constant(EI) and not np.any(EI):  # out of the plane of a planar mechanism
             found.append(Shear(0.0, 0.0))
@@ -123,7 +122,7 @@ def element_mass(profile: Profile, h: Scalar) -> list[ElementTerm]:
             if degree <= QUADRATIC:
                 lengths = (h, h**2.0, h**3.0)
                 terms += _polynomial(beam.mass * scale, each, bending_mass(plane, degree), lengths)
-            if beam.shear is not None:
+            if beam.shear_z is not None:
                 lengths = (h**-1.0, 1.0, h)
                 terms += _polynomial(rotary * scale, each, rotary_mass(plane, degree), lengths)
     return _folded(terms)

@@ -40,7 +40,8 @@ def add_bodies(
     for key, body in case.mechanism.bodies.items():
         link, _, node = body.at.partition(".")
         if link == name:
-            lever = vector(getattr(body, "offset", None) or (0.0,)) + arms.get(node, 0.0)
+            offset = parameters.vector(f"bodies.{key}.offset", body.offset)
+            lever = offset + arms.get(node, 0.0)
             _add(parameters, f"bodies.{key}", body, mass, nodes["@origin" if arms else node], lever)
 
 
@@ -64,7 +65,7 @@ def rigid_link(case: CaseFile, parameters: ModelParameters, tree: Topology, name
     nodes, mass = {"@origin": slots[0]}, Entries((width, width))
     named = ["start", *(["end"] if link.length is not None else []), *(link.nodes or {})]
     arms = {key: node_position(case, parameters, tree, (name, key)) for key in named}
-    center = vector(getattr(link, "center", None) or (0.0,))
+    center = parameters.vector(f"links.{name}.center", link.center)
     _add(parameters, f"links.{name}", link, mass, slots[0], center)
     add_bodies(case, parameters, name, mass, nodes, arms)
     rigid = rigid_motion([vector([0.0])], slots, width, space)

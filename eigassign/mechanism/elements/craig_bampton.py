@@ -25,9 +25,15 @@ from scipy.linalg import eigh
 from scipy.sparse import linalg
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, MechanismError
+from eigassign.case.schema.targets import StaticTarget
+from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
-from eigassign.mechanism.elements.sparse_factor import kept_factor
+from eigassign.mechanism.elements.sparse_factor import (
+    LOOSE,
+    kept_factor,
+    largest_beside,
+    largest_modes,
+)
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 
 Floats = NDArray[np.float64]
@@ -54,8 +60,9 @@ def reduced_where_asked(
     i = np.setdiff1d(np.arange(mesh.n_local), b)
     if not len(i):
         return mesh
-    lam = (2.0 * np.pi * frequency_hz) ** 2
-    parts = [_DesignBlocks(K, M, b, i, path) for K, M in _matrices(case, parameters, mesh)]
+    designs, softest = _matrices(case, parameters, mesh, i)
+    lam = softest * (2.0 * np.pi * frequency_hz) ** 2
+    parts = [_DesignBlocks(K, M, b, i, path) for K, M in designs]
     central = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
     N, Psi = total(mesh.rigid, central).toarray(), parts[0].Psi
     Psi = Psi + (N[i] - Psi @ N[b]) @ np.linalg.pinv(N[b])  # Ψ N_b = N_i to the last digit
@@ -77,12 +84,13 @@ def interface(case: CaseFile, name: str) -> set[str]:
 
 
 def used_nodes(case: CaseFile, name: str) -> set[str]:
-    """Nodes of a link that something else is attached to."""
+    """Nodes of a link that something else is attached to, or that a static target is about."""
     mechanism: Any = case.mechanism
     used = [f"{name}.start"]  # a tip is followed rigidly
     used += [end for joint in mechanism.joints.values() for end in (joint.base, joint.follower)]
     used += [body.at for body in mechanism.bodies.values()]
     used += [end for spring in mechanism.springs.values() for end in spring.between]
+    used += [target.place.at for target in case.targets if isinstance(target, StaticTarget)]
     pairs = [str(end).partition(".") for end in used]
     return {node for link, _, node in pairs if link == name}
 
@@ -113,21 +121,41 @@ def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
 
 
 def _matrices(
-    case: CaseFile, parameters: ModelParameters, mesh: LinkMesh
-) -> list[tuple[sparse.csr_array, sparse.csr_array]]:
-    """K and M in the middle of the bounds, then at both ends where they differ there."""
+    case: CaseFile, parameters: ModelParameters, mesh: LinkMesh, i: Ints
+) -> tuple[list[tuple[sparse.csr_array, sparse.csr_array]], float]:
+    """K and M in the middle of the bounds, then at both ends where their interiors differ there.
+
+    Interiors in proportion have the same Ψ and Φ. With them the largest λ of the middle over that
+    of the same mode at such an end, or 1: all that is below a frequency there is below it times so.
+    """
     terms = [*mesh.stiffness, *mesh.mass]
-    values = coefficients(parameters, terms, _designs(case))
-    different = [0, *(k for k in (1, 2) if not np.array_equal(values[:, k], values[:, 0]))]
-    n = len(mesh.stiffness)
+    values, n = coefficients(parameters, terms, _designs(case)), len(mesh.stiffness)
+    inner = [np.flatnonzero([np.diff(t.matrix[i].indptr).any() for t in mesh.stiffness])]
+    inner.append(n + np.flatnonzero([np.diff(t.matrix[i].indptr).any() for t in mesh.mass]))
+    different, softest = [0], 1.0
+    for k in (1, 2):
+        stiff, heavy = (_proportion(values[own, k], values[own, 0]) for own in inner)
+        if stiff is None or heavy is None:
+            different.append(k)
+        else:
+            softest = max(softest, heavy / stiff)
     return [
         (total(mesh.stiffness, values[:n, k]), total(mesh.mass, values[n:, k])) for k in different
-    ]
+    ], softest
+
+
+def _proportion(a: Floats, b: Floats) -> float | None:
+    """The factor c of a = c b > 0; 1 of nothing, None where there is no such factor."""
+    if not len(a) or np.array_equal(a, b):
+        return 1.0
+    c = float(a @ b) / float(b @ b) if b.any() else 0.0
+    # entries may differ by round-off
+    return c if c > 0.0 and (np.abs(a - c * b) <= 1e-12 * np.abs(a)).all() else None
 
 
 def _designs(case: CaseFile) -> Floats:
     """The middle, the lower and the upper bounds of loads and design, (3, n_p)."""
-    low, high = np.array([*case.ranges.values()], dtype=np.float64).reshape(-1, 2).T
+    low, high = np.array(case.box, dtype=np.float64).reshape(-1, 2).T
     return np.array([0.5 * (low + high), low, high])
 
 
@@ -215,7 +243,6 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
 # --- fixed-interface modes: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ
 
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
-LOOSE = 1e-3  # relative accuracy of the largest μ left out
 
 
 def fixed_modes(
@@ -225,9 +252,8 @@ def fixed_modes(
     n, least = K.shape[0], 1.0 / lam
     # Lanczos is asked for 16 modes first, then for twice as many
     rows, count = M.T, 16  # M is symmetric: products run faster row by row
-    mass = linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)
     while n > DENSE and count < n // 2:
-        mu, phi = _lanczos(K, mass, factor, count, 0.0)
+        mu, phi = largest_modes(factor, K.T, lambda v: np.asarray(rows @ v), count)
         if mu[-1] < least:
             return np.asarray(phi[:, mu >= least])
         count *= 2
@@ -238,44 +264,12 @@ def fixed_modes(
 def largest_left_out(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, W: Floats
 ) -> float:
-    """The largest μ = wᵀMw / wᵀKw over all w with WᵀK w = 0; an upper bound within `LOOSE`.
-
-    By deflation: M' = Pᵀ M P with P = I − W (WᵀKW)⁻¹ WᵀK has μ = 0 on the span of W.
-    """
+    """The largest μ of what a reduction to W leaves out; an upper bound within `LOOSE`."""
     n = K.shape[0]
     if W.shape[1] >= n:
         return 0.0
-    KW = np.asarray(K @ W)
-    kept = np.linalg.solve(W.T @ KW, KW.T) if W.shape[1] else np.zeros((0, n))
-
-    def deflated(v: Floats) -> Floats:
-        heavy = M @ (v - W @ (kept @ v))
-        return np.asarray(heavy - kept.T @ (W.T @ heavy))
-
-    if n <= DENSE:
-        mu = eigh(deflated(np.eye(n)), K.toarray(), eigvals_only=True)
-        return float(mu[-1])
-    mass = linalg.LinearOperator((n, n), matvec=deflated, dtype=np.float64)
-    mu, _ = _lanczos(K, mass, factor, 1, LOOSE)
-    return float(mu[0]) * (1.0 + LOOSE)
-
-
-def _lanczos(
-    K: sparse.csc_array,
-    mass: linalg.LinearOperator,
-    factor: linalg.SuperLU,
-    count: int,
-    tolerance: float,
-) -> tuple[Floats, Floats]:
-    """The largest μ, descending, and their vectors of unit K-norm."""
-    n = K.shape[0]
-    inverse = linalg.LinearOperator((n, n), matvec=factor.solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(n)
-    try:
-        mu, phi = linalg.eigsh(
-            mass, count, M=K.T, Minv=inverse, which="LA", v0=start, tol=tolerance
-        )
-    except linalg.ArpackNoConvergence as error:
-        raise AccuracyError(f"the fixed-interface modes did not converge: {error}") from error
-    order = np.argsort(-mu)
-    return np.asarray(mu[order]), np.asarray(phi[:, order])
+    if n > DENSE:
+        mu = largest_beside(factor, K.T, lambda v: np.asarray(M @ v), W, LOOSE)[0]
+        return mu * (1.0 + LOOSE)
+    P = np.eye(n) - W @ np.linalg.solve(W.T @ (K @ W), (K @ W).T)
+    return float(eigh(P.T @ (M @ P), K.toarray(), eigvals_only=True)[-1])

@@ -70,7 +70,7 @@ def inner_parts(profile: Profile, h: Floats, space: str) -> list[InnerPart]:
         if axis == "z" or space == "spatial":
             dofs = (w, slope, w + 6, slope + 6)
             scale = np.stack([np.ones_like(h), sign * h] * 2, axis=1)
-            slender = profile[0].shear is None
+            slender = profile[0].shear_z is None
             energies = _slender(axis) if slender else _sheared(axis, phi, skew)
             parts.append(_part(dofs, scale, profile, h, *energies))
     return parts
@@ -102,7 +102,7 @@ def _sheared(axis: str, phi: Any, skew: Any) -> tuple[list[_Energy], list[_Energ
     return (
         [
             _Energy(f"EI_{axis}", -3, own(ROTATION, 1), inner(0.0, 1.0, 0, 1)),
-            _Energy("shear", -1, strain, inner(1.0, -1.0, 1, 0)),
+            _Energy(f"shear_{axis}", -1, strain, inner(1.0, -1.0, 1, 0)),
         ],
         [
             _Energy("mass", 1, own(DEFLECTION, 0), inner(1.0, 0.0, 0, 0)),

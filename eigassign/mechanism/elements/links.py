@@ -1,4 +1,4 @@
-"""The mesh of any link in its own frame: beam, rigid body, frame of beams, superelement."""
+"""The mesh of any link in its own frame: beam, rigid body, frame of beams, superelement, solid."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from eigassign.mechanism.elements.profiles import (
     beam_values,
     each_element,
 )
+from eigassign.mechanism.elements.solid import solid_mesh
 from eigassign.mechanism.elements.superelement import superelement_mesh
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
@@ -49,6 +50,8 @@ def link_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name:
             return _frame(case, parameters, name)
         case "superelement":
             return superelement_mesh(case, parameters, name)
+        case "solid":
+            return solid_mesh(case, parameters, name)
     return _beam(case, parameters, tree, name)
 
 

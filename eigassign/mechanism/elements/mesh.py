@@ -6,7 +6,7 @@ merged, and what is constant becomes one matrix.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -74,6 +74,17 @@ class LinkMesh:
     rigid: Sequence[Term]
     strands: Sequence[Strand] = ()
     reduction: Reduction | None = None
+    lost: Lost | None = None  # of solids
+
+
+class Lost(NamedTuple):
+    """2 × the energy that a mesh of solid elements lacks, about: coefficient × energy(v).
+
+    ``energy`` takes motions v (n_local, count) and gives (count, count).
+    """
+
+    coefficient: Scalar
+    energy: Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,19 +27,23 @@ STATIONS, SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is 
 # by what values at the stations give P_0 … P_4, (l, g)
 _PROJECTION = (SHARES[:, None] * legendre.legvander(STATIONS, TERMS - 1)).T
 _PROJECTION = _PROJECTION * (np.arange(TERMS)[:, None] + 0.5)
+# of which shapes what is no polynomial along a taper
+NO_POLYNOMIALS = {"rectangle": ("GJ",), "box": ("GJ", "shear_z", "shear_y")}
 
 
 class BeamValues(NamedTuple):
     """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y.
 
-    Numbers, expressions, or arrays of numbers (n,): one for each of n elements.
+    Numbers, expressions, or arrays of numbers (n,): one for each of n elements. ``shear_z`` goes
+    with EI_z, ``shear_y`` with EI_y.
     """
 
     EA: Scalar
     EI_z: Scalar
     EI_y: Scalar
     GJ: Scalar
-    shear: Scalar | None
+    shear_z: Scalar | None
+    shear_y: Scalar | None
     mass: Scalar
     polar: Scalar
     rotary_z: Scalar
@@ -54,7 +58,7 @@ def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
 
     ρA three times [kg/m], ρI_p, ρI_y, ρI_z [kg m]; without shear the rotary ones are neglected.
     """
-    rotary = (0.0, 0.0) if beam.shear is None else (beam.rotary_y, beam.rotary_z)
+    rotary = (0.0, 0.0) if beam.shear_z is None else (beam.rotary_y, beam.rotary_z)
     return (beam.mass, beam.mass, beam.mass, beam.polar, *rotary)
 
 
@@ -76,12 +80,15 @@ def _values(
     rho = parameters.number(path + "density", data.density)
     sheared = bool(getattr(beam, "shear", False))
     G = _shear_modulus(case, parameters, beam, E, sheared)
+    kappa, kappa_y = section.shear_coefficient, section.shear_coefficient_y
+    kGA = G * section.area * kappa if sheared else None
     return BeamValues(
         EA=E * section.area,
         EI_z=E * section.inertia_z,
         EI_y=E * section.inertia_y,
         GJ=G * section.torsion_constant,
-        shear=G * section.area * section.shear_coefficient if sheared else None,
+        shear_z=kGA,
+        shear_y=G * section.area * kappa_y if sheared and kappa_y is not None else kGA,
         mass=rho * section.area,
         polar=rho * section.polar_inertia,
         rotary_z=rho * section.inertia_z,
@@ -131,9 +138,10 @@ def beam_profiles(
 
     weights = _legendre_weights(n)
     table = [_combined(v, weights) for v in zip(*map(at, STATIONS.tolist()), strict=True)]
-    shape = case.mechanism.sections[beam.section.start].shape
-    if case.mechanism.space == "spatial" and shape == "rectangle":  # no polynomial along a taper
-        table[BeamValues._fields.index("GJ")] = _torsion(at, n)
+    for key in NO_POLYNOMIALS.get(case.mechanism.sections[beam.section.start].shape, ()):
+        k = BeamValues._fields.index(key)
+        if table[k] is not None and (key != "GJ" or case.mechanism.space == "spatial"):
+            table[k] = _in_each(key, at, n)
     if together and all(each is None or isinstance(each, np.ndarray) for each in table):
         rows: Any = [[None if each is None else each.T for each in table]]
     else:
@@ -169,10 +177,13 @@ def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:
     ]
 
 
-def _torsion(at: Callable[[float], BeamValues], n: int) -> Any:
-    """GJ over each of n elements, (n, 5) as of `_combined`, from values of its own in each."""
+def _in_each(key: str, at: Callable[[float], BeamValues], n: int) -> Any:
+    """A value over each of n elements, (n, 5) as of `_combined`, from stations in each."""
     weights = _PROJECTION[None]
-    rows = [_combined(tuple(at(t).GJ for t in row), weights)[0] for row in _stations(n).tolist()]
+    rows = [
+        _combined(tuple(getattr(at(t), key) for t in row), weights)[0]
+        for row in _stations(n).tolist()
+    ]
     return np.array(rows) if all(isinstance(row, np.ndarray) for row in rows) else rows
 
 

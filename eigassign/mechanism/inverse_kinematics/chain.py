@@ -163,7 +163,8 @@ class _TipTables:
     """The chain's scalars over z and y, compiled once, and evaluated for all states together.
 
     The links are placed anew with open loops: passive freedoms are variables, closure is an
-    equation to be met, and every freedom moves by itself. A design parameter then turns no link.
+    equation to be met, and every freedom moves by itself. Of the design only angles of joints then
+    turn links.
     """
 
     case: CaseFile
@@ -213,13 +214,13 @@ class _TipTables:
 
     @cached_property
     def _design_table(self) -> CompiledArrays:
-        """∂(place)/∂y (d, n_y) and ∂F/∂y (n_e, n_y)."""
-        place, _, _, F, _ = self._recorded[1]
+        """∂(place)/∂y (d, n_y), ∂(rotation)/∂y (9 or 0, n_y) and ∂F/∂y (n_e, n_y)."""
+        place, rotation, _, F, _ = self._recorded[1]
         first = len(self.motion.offset) + len(self.loads)
         columns = range(first, first + self._n_y)
         parts = [
             np.array([[derivative(f, k) for k in columns] for f in of], dtype=object)
-            for of in (place, F)
+            for of in (place, rotation, F)
         ]
         return self._compiled([part.reshape(-1, self._n_y) for part in parts])
 
@@ -232,9 +233,13 @@ class _TipTables:
     def evaluate_with_design(self, z: Floats, y: Floats) -> TipEvaluation:
         """The same with derivatives by (q, y, p) instead of (q, p)."""
         seen = self.evaluate(z, y)
-        place, closing = self._design_table(self._variables(z, y))
+        place, turning, closing = self._design_table(self._variables(z, y))
         J = np.zeros((*seen.jacobian.shape[:2], self._n_y))
         J[:, : self.d] = place
+        if seen.rotation is not None:  # ω per y of Ṙ Rᵀ = [ω]×
+            W = np.einsum("nijy,nkj->nyik", turning.reshape(len(z), 3, 3, -1), seen.rotation)
+            spin = [W[:, :, 2, 1], W[:, :, 0, 2], W[:, :, 1, 0]]
+            J[:, self.d :] = np.stack([spin[k] for k in self.turns], axis=1)
         after = [len(self.motion.offset)]
         parted = [np.split(both, after, axis=2) for both in (seen.jacobian, seen.closure)]
         tip, closure = (

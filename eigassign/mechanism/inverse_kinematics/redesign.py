@@ -172,7 +172,9 @@ def _require_within_reach(path: PathOfDesign) -> None:
     n_q, n_y = ik.n_q, len(design.y)
     moved = reduced(ik.evaluate_with_design(path.u, design, design.y), n_q + n_y).J
     left = moved[:, :, n_q:] + moved[:, :, :n_q] @ path._slopes(design.y, path.u)[:, :n_q]
-    off = np.linalg.norm(left, axis=1).max(axis=0) * np.abs(design.y)
+    # what moves the tip is in m or rad, and may be 0: it counts as L or 1 at least
+    size = np.maximum(np.abs(design.y), min(ik.lever, 1.0))
+    off = np.linalg.norm(left, axis=1).max(axis=0) * size
     for name, length in zip(design.names, off, strict=True):
         # 1e-6 of L, per relative change of the parameter, is round-off
         if length > 1e-6 * ik.lever:

@@ -55,6 +55,12 @@ def _relative(case: CaseFile, tree: Topology) -> tuple[Floats, Floats]:
         if i is not None and wanted[i]:
             under = _absolute_base(case, tree, edge, i, absolute)
             relative[i], offset[i] = relative[i] - under[0], -under[1] - _mount(case, edge)
+            if np.isnan(offset[i]):
+                message = (
+                    "is absolute, while the angle of its joint, or of one below, is a design "
+                    "parameter or set along a trajectory: write relative"
+                )
+                raise MechanismError(f"coordinates.{tuple(case.coordinates)[i]}.angle", message)
         if edge in tree.edges:
             absolute[edge.follower[0]] = _carried_angle(
                 case, tree, edge, absolute, relative, offset
@@ -63,7 +69,9 @@ def _relative(case: CaseFile, tree: Topology) -> tuple[Floats, Floats]:
 
 
 def _mount(case: CaseFile, edge: JointEdge) -> float:
-    return float(getattr(case.mechanism.joints[edge.joint], "angle", 0.0))
+    """The angle that a joint is turned by; NaN where it varies."""
+    varies = f"joints.{edge.joint}.angle" in case.varied
+    return np.nan if varies else float(case.mechanism.joints[edge.joint].angle)
 
 
 def _absolute_base(

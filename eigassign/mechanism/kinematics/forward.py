@@ -11,22 +11,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap
-from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, mounting, turned
+from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
     Floats,
     Objects,
     cross,
+    mounting,
     multiply,
     present,
-    vector,
 )
 from eigassign.mechanism.kinematics.topology import JointEdge, NodeName, Topology
 from eigassign.series.expression import Scalar
@@ -236,21 +235,31 @@ class _Placing:
 
     def _motion(self, edge: JointEdge) -> JointMotion:
         """R, lever and A of a joint as it is walked, mounting and position included."""
-        own = self.tree.of_joint(edge.joint)
-        joint = self.case.mechanism.joints[edge.joint]
-        if own:
-            return walked(joint, edge.turned, [self.values[k] for k in own])
+        own, name = self.tree.of_joint(edge.joint), edge.joint
+        joint = self.case.mechanism.joints[name]
+        varies = any(path.startswith(f"joints.{name}.") for path in self.parameters.by_path)
+        if own or varies:
+            values = [self.values[k] for k in own]
+            return walked(self.case, self.parameters, name, edge.turned, values)
         keys = ("type", "angle", "orientation", "position")
         alike = (*(str(getattr(joint, key, None)) for key in keys), edge.turned)
         if alike not in self._rigid:
-            self._rigid[alike] = walked(joint, edge.turned, [])
+            self._rigid[alike] = walked(self.case, self.parameters, name, edge.turned, [])
         return self._rigid[alike]
 
 
-def walked(joint: Any, backwards: bool, values: Sequence[Scalar]) -> JointMotion:
+def walked(
+    case: CaseFile,
+    parameters: ModelParameters,
+    name: str,
+    backwards: bool,
+    values: Sequence[Scalar],
+) -> JointMotion:
     """Motion of a joint with its mounting and position, from base to follower or backwards."""
-    motion = _mounted(joint, mounting(joint), joint_motion(joint, values))
-    position = vector(getattr(joint, "position", None) or (0.0, 0.0))
+    joint, path = case.mechanism.joints[name], f"joints.{name}"
+    mount = mounting(parameters.angles(path, joint))
+    motion = _mounted(joint, mount, joint_motion(joint, values))
+    position = parameters.vector(f"{path}.position", joint.position)
     motion = motion._replace(translation=position + motion.translation)
     return turned(motion) if backwards else motion
 

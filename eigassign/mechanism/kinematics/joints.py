@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.kinematics.rotations import Objects, carried, euler, multiply, rotation
+from eigassign.mechanism.kinematics.rotations import Objects, carried, multiply, rotation
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 X, Y, Z = np.eye(3)
-ROUND_OFF = 1e-15  # of an entry of a rotation: a few units in the last place of 1
 
 
 class JointMotion(NamedTuple):
@@ -70,18 +69,6 @@ def turned(motion: JointMotion) -> JointMotion:
     back = motion.rotation.T
     lever = multiply(back, motion.translation) * -1.0
     return JointMotion(back, lever, multiply(carried(back, lever), motion.freedoms) * -1.0)
-
-
-def mounting(joint: object) -> Objects:
-    """Rotation of a joint's zero position, or of a spring's axes: planar or spatial angles.
-
-    Quarter turns are without round-off, which would make functions of (q, y) of what depends on
-    none, such as the weight along a vertical axis.
-    """
-    given = getattr(joint, "orientation", None)
-    R = euler((0.0, 0.0, getattr(joint, "angle", 0.0) or 0.0) if given is None else given)
-    whole = np.round(R)
-    return np.where(np.abs(R - whole) < ROUND_OFF, whole, R).astype(object)
 
 
 def _universal(joint: Any, values: Sequence[Scalar]) -> JointMotion:

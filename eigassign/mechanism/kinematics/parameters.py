@@ -6,7 +6,7 @@ that kinematics and elements see the same ones.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.links import IMPORTED
+from eigassign.mechanism.imports.parts import imported_part
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree
+from eigassign.mechanism.solids.part import couplings
 from eigassign.series.compiler import CompiledArrays, compile_arrays
-from eigassign.series.expression import Expression, Recorder, Scalar
+from eigassign.series.expression import Recorder, Scalar
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +40,8 @@ class ModelParameters:
     design: tuple[str, ...]
     relative: Floats  # A of s = A q + b
     offset: Floats
-    by_path: dict[str, Expression] = field(default_factory=dict)
+    sums: Mapping[str, Sequence[tuple[int, float]]] = field(default_factory=dict)  # over p, by path
+    by_path: Mapping[str, Scalar] = field(default_factory=dict)
     passive: tuple[Scalar, ...] = ()
     loads: tuple[str, ...] = ()
     scales: Floats = field(default_factory=lambda: np.zeros(0))  # (n_loads,)
@@ -78,6 +82,18 @@ class ModelParameters:
         """The value at a key path of the case, as an expression if it varies."""
         return self.by_path.get(path, value)
 
+    def vector(self, path: str, values: Sequence[float] | None) -> Objects:
+        """The vector (3,) at a key path of the case, each component as `number`; else zero."""
+        given = enumerate(values or ())
+        return vector([self.number(f"{path}.{k}", float(value)) for k, value in given])
+
+    def angles(self, path: str, part: Any) -> Objects:
+        """(rx, ry, rz) in rad by which a joint or a spring is turned, in a plane about z alone."""
+        turned = getattr(part, "orientation", None)
+        if turned is not None:
+            return self.vector(f"{path}.orientation", turned)
+        return vector([0.0, 0.0, self.number(f"{path}.angle", part.angle)])
+
     def freedom(self, k: int) -> Scalar:
         """Joint freedom k: a coordinate, or a passive one behind them."""
         n_q = len(self.coordinates)
@@ -89,7 +105,7 @@ class ModelParameters:
 
     def rerecorded(self, recorder: Recorder, n_passive: int) -> ModelParameters:
         """The same on another recorder, the passive freedoms being its last variables."""
-        moved = _properties(recorder, len(self.coordinates), tuple(self.by_path), self.scales)
+        moved = _properties(recorder, len(self.coordinates), self.sums, self.scales)
         passive = tuple(recorder.variable(self.count + k) for k in range(n_passive))
         return replace(self, recorder=recorder, by_path=moved, passive=passive)
 
@@ -97,7 +113,7 @@ class ModelParameters:
 def parameters(case: CaseFile) -> ModelParameters:
     """The variables of a case."""
     recorder, maps = Recorder(), coordinates(case, build_tree(case))
-    scales = np.array([_scale(path, *load.range) for path, load in case.loads.items()])
+    scales = np.array([_scale(load.path, *load.range) for load in case.loads.values()])
     return ModelParameters(
         recorder=recorder,
         coordinates=tuple(case.coordinates),
@@ -106,24 +122,31 @@ def parameters(case: CaseFile) -> ModelParameters:
         relative=maps.relative,
         offset=maps.offset,
         scales=scales,
-        by_path=_properties(recorder, len(case.coordinates), tuple(case.ranges), scales),
+        sums=case.varied,
+        by_path=_properties(recorder, len(case.coordinates), case.varied, scales),
     )
 
 
 def _properties(
-    recorder: Recorder, first: int, paths: Sequence[str], scales: Floats
-) -> dict[str, Expression]:
+    recorder: Recorder,
+    first: int,
+    sums: Mapping[str, Sequence[tuple[int, float]]],
+    scales: Floats,
+) -> dict[str, Scalar]:
     """Properties by path, their variables numbered from ``first``; the loads are scaled."""
-    found = {path: recorder.variable(first + k) for k, path in enumerate(paths)}
-    for path, scale in zip(paths, scales.tolist(), strict=False):
-        found[path] = found[path] * scale
+    found: dict[str, Scalar] = {}
+    for path, terms in sums.items():
+        for k, factor in terms:
+            scale = scales[k] if k < len(scales) else 1.0
+            found[path] = found.get(path, 0.0) + recorder.variable(first + k) * (factor * scale)
     return found
 
 
 def _scale(path: str, low: float, high: float) -> float:
     """A power of two near half the range, or near the value where there is none."""
     size = 0.5 * (high - low) or abs(high)
-    return 2.0 ** round(np.log2(size)) if size and not path.startswith("links.") else 1.0
+    of_space = path.startswith(("links.", "joints."))
+    return 2.0 ** round(np.log2(size)) if size and not of_space else 1.0
 
 
 def initial_design(case: CaseFile) -> Floats:
@@ -138,8 +161,13 @@ def written_loads(case: CaseFile) -> Floats:
 
 
 def link_type(case: CaseFile, link: str) -> str:
-    """beam, rigid, frame or superelement."""
+    """beam, rigid, frame, superelement or solid."""
     return str(getattr(case.mechanism.links[link], "type", "beam"))
+
+
+def is_imported(case: CaseFile, link: str) -> bool:
+    """True where a link is known by its matrices: nobody knows where its inner dofs point."""
+    return link_type(case, link) in IMPORTED
 
 
 def length(case: CaseFile, parameters: ModelParameters, link: str) -> Scalar:
@@ -162,7 +190,13 @@ def node_position(
     named = getattr(data, "nodes", None) or {}
     if name in named:
         given = named[name]
-        return vector([float(c) for c in getattr(given, "position", given)])
+        place = getattr(given, "position", given)
+        if place is None and link_type(case, link) == "solid":  # the centre of its surface
+            centre = couplings(data, f"mechanism.links.{link}")[1][name].place
+            place = centre[: 2 if case.mechanism.space == "planar" else 3].tolist()
+        elif place is None:
+            place = imported_part(case, link).places[name]
+        return parameters.vector(f"links.{link}.nodes.{name}", place)
     if name == "end":
         return vector([length(case, parameters, link)])
     return np.zeros(3, dtype=object)

@@ -6,7 +6,7 @@ whoever asks. Each is linear in x = (q, y), rows · x + offset ≥ 0, or > 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,21 +48,20 @@ class PropertyLimits:
 def property_limits(case: CaseFile) -> PropertyLimits | None:
     """The limits of a case; None where nothing varies that has any."""
     n_q = len(case.coordinates)
-    paths = tuple(case.ranges)  # loads, then design parameters
     names = (*case.coordinates, *case.loads, *case.design.parameters)
-    at = {path: n_q + k for k, path in enumerate(paths)}
     rows: list[Floats] = []
     found: list[tuple[float, bool, str]] = []
-    for terms, offset, strict, words in (*_own(case, paths), *_of_sections(case, paths)):
+    for terms, offset, strict, words in (*_own(case), *_of_sections(case)):
         row = np.zeros(len(names))
         for path, factor in terms:
-            row[at[path]] = factor
+            for k, own in case.varied[path]:
+                row[n_q + k] += factor * own
         rows.append(row)
         found.append((offset, strict, words))
     if not rows:
         return None
     reach = np.zeros(len(names))
-    reach[n_q:] = [max(abs(low), abs(high)) for low, high in case.ranges.values()]
+    reach[n_q:] = [max(abs(low), abs(high)) for low, high in case.box]
     return PropertyLimits(
         rows=np.array(rows),
         offset=np.array([each[0] for each in found]),
@@ -77,10 +76,9 @@ def property_limits(case: CaseFile) -> PropertyLimits | None:
 _Limit = tuple[list[tuple[str, float]], float, bool, str]  # terms by path, offset, strict, words
 
 
-def _own(case: CaseFile, paths: Sequence[str]) -> Iterator[_Limit]:
+def _own(case: CaseFile) -> Iterator[_Limit]:
     """Limits of each property by itself."""
-    kinds = (*case.load_quantities, *case.design_quantities)
-    for path, kind in zip(paths, kinds, strict=True):
+    for path, kind in zip(case.varied, case.quantities(case.varied), strict=True):
         unit = f" {kind.dimension.si}" if kind.dimension and kind.dimension.si else ""
         for sign, limit, factor, strict in (
             (">", kind.above, 1.0, True),
@@ -93,17 +91,17 @@ def _own(case: CaseFile, paths: Sequence[str]) -> Iterator[_Limit]:
                 yield [(path, factor)], -factor * limit, strict, words
 
 
-def _of_sections(case: CaseFile, paths: Sequence[str]) -> Iterator[_Limit]:
+def _of_sections(case: CaseFile) -> Iterator[_Limit]:
     """Limits between two dimensions of a section of which one varies, at least."""
     for name, section in case.mechanism.sections.items():
         for limit in section.limits():
             terms, offset = [], 0.0
             for key, factor in ((limit.large, 1.0), (limit.small, -float(limit.factor))):
                 path = f"sections.{name}.{key}"
-                if path in paths:
+                if path in case.varied:
                     terms.append((path, factor))
                 else:
                     offset += factor * getattr(section, key)
             if terms:
-                words = f"section {name!r} cannot exist, for {limit.small} {limit}"
+                words = f"section {name!r} {limit.beyond}, for {limit.small} {limit}"
                 yield terms, offset, not limit.may_meet, words

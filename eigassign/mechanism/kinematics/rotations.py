@@ -10,10 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.expression import Scalar, cos, sin
+from eigassign.series.expression import Scalar, cos, is_constant, sin
 
 Objects = NDArray[np.object_]
 Floats = NDArray[np.float64]
+ROUND_OFF = 1e-15  # of an entry of a rotation: a few units in the last place of 1
 DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}  # of a motion (v, ω): x, y, z each
 # entries (i, j) of [a]×: which component of a, and its sign
 CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
@@ -22,7 +23,7 @@ CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0
 
 def vector(values: Sequence[Scalar]) -> Objects:
     """Three components; a planar vector gets z = 0."""
-    padded = [*values, 0.0, 0.0][:3]
+    padded = [*values, 0.0, 0.0, 0.0][:3]
     return np.array(padded, dtype=object)
 
 
@@ -38,10 +39,23 @@ def rotation(axis: Floats, angle: Scalar) -> Objects:
     return R
 
 
-def euler(angles: Sequence[float]) -> Floats:
-    """R = Rz(rz) Ry(ry) Rx(rx) for (rx, ry, rz) in rad."""
-    x, y, z = (rotation(axis, a) for axis, a in zip(np.eye(3), angles, strict=True))
-    return np.asarray(multiply(z, multiply(y, x)), dtype=np.float64)
+def mounting(angles: Sequence[Scalar] | Objects) -> Objects:
+    """R = Rz(rz) Ry(ry) Rx(rx) for (rx, ry, rz) in rad, as joints and springs are turned.
+
+    Quarter turns are without round-off, which would make functions of (q, y) of what depends on
+    none, such as the weight along a vertical axis.
+    """
+    x, y, z = (_whole(rotation(axis, a)) for axis, a in zip(np.eye(3), angles, strict=True))
+    return _whole(multiply(z, multiply(y, x)))
+
+
+def _whole(R: Objects) -> Objects:
+    """R with −1, 0 and 1 for the numbers that are so but for round-off."""
+    near = R.ravel().tolist()
+    for k, value in enumerate(near):
+        if is_constant(value) and abs(value - round(value)) < ROUND_OFF:
+            near[k] = float(round(value))
+    return np.array(near, dtype=object).reshape(3, 3)
 
 
 def skew(a: Sequence[Scalar] | Objects | Floats) -> NDArray[np.object_]:

@@ -60,7 +60,7 @@ class Trajectory(Brief):
     ``sampled`` is the trajectory without the instants that were put between its samples.
     """
 
-    time_s: Floats  # (n,) strictly increasing, n >= 2
+    time_s: Floats  # (n,) strictly increasing; one alone is a pose at rest
     q: Floats  # (n, n_q) in rad or m
     tip: Floats | None  # (n, 2 or 3) in m
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
@@ -204,7 +204,7 @@ def _from_samples(
     time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
     if spec.time is not None:
         time_s = np.array(spec.time, dtype=np.float64)
-    notes = _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
+    notes = () if len(q) == 1 else _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
     return Trajectory(time_s, q, None, notes)
 
 
@@ -479,7 +479,8 @@ def rates(trajectory: Trajectory, everywhere: bool = False) -> Rates:
     resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
     rate[:, resting] = acceleration[:, resting] = 0.0
     # what q rounded to 1e-16 leaves of second differences where the velocity does not change
-    rounded = 1e-15 * np.abs(q).max(axis=0) / np.diff(time_s).min() ** 2
+    step = np.diff(time_s).min(initial=np.inf)
+    rounded = 1e-15 * np.abs(q).max(axis=0) / step**2
     acceleration[np.abs(acceleration) <= rounded] = 0.0
     return Rates(samples, q[samples], rate, acceleration)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -11,7 +9,11 @@ from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise, has_positive_pivots
+from eigassign.mechanism.elements.sparse_factor import (
+    factorise,
+    has_positive_pivots,
+    largest_modes,
+)
 from eigassign.modal.exact.condensation import Modes, positive_at_top, rigid_coupling
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
@@ -45,7 +47,17 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     if pencil.weight is not None and not has_positive_pivots(factor):
         raise MechanismError("mechanism", LIMP)
     M_rows = M_EE.T  # symmetric: products run faster row by row
-    mu, z = lanczos(factor, K_E.T, lambda v: M_rows @ v - (coupling @ v) @ M_FE, count)
+
+    def mass_product(v: Floats) -> Floats:
+        return np.asarray(M_rows @ v - (coupling @ v) @ M_FE)
+
+    try:
+        mu, z = largest_modes(factor, K_E.T, mass_product, count)
+    except linalg.ArpackError as error:
+        if len(E) > DENSE_MOST:
+            raise AccuracyError(FINE) from error
+        # Few directions have mass: ARPACK before SciPy 1.16 cannot build a larger Krylov space.
+        mu, z = np.zeros(count), np.zeros((len(E), count))  # none is sure: dense algebra decides
     noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)
     sure = ~may_be_roundoff(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
     if sure.all():
@@ -57,32 +69,6 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     else:
         raise MissingMassError(int(sure.argmin()))
     return lam, positive_at_top(phi)
-
-
-def lanczos(
-    factor: linalg.SuperLU,
-    K: sparse.csr_array,
-    mass: Callable[[Floats], Floats],
-    count: int,
-) -> tuple[Floats, Floats]:
-    """Largest μ of M z = μ K z, descending, z with unit K-norm, for M as a product."""
-    n = K.shape[0]
-    M = linalg.LinearOperator((n, n), matvec=mass)
-    inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
-    start = np.random.default_rng(0).standard_normal(n)
-    # Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20
-    krylov = min(max(20, 2 * count + 1), 10 + 2 * count)
-    try:
-        mu, z = linalg.eigsh(M, count, M=K, Minv=inverse, which="LM", v0=start, ncv=krylov)
-    except linalg.ArpackNoConvergence as error:
-        raise AccuracyError(f"the exact modes did not converge: {error}") from error
-    except linalg.ArpackError as error:
-        if n > DENSE_MOST:
-            raise AccuracyError(FINE) from error
-        # Few directions have mass: ARPACK before SciPy 1.16 cannot build a larger Krylov space.
-        return np.zeros(count), np.zeros((n, count))  # no mode is sure: dense algebra decides
-    order = np.argsort(-mu)
-    return mu[order], z[:, order]
 
 
 # --- Symmetric sparse matrices from the non-zeros of the pencil, without sorting or duplicates

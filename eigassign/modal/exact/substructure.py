@@ -43,14 +43,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg
 
-from eigassign.errors import AccuracyError, MechanismError
+from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import definite_factor
+from eigassign.mechanism.elements.sparse_factor import definite_factor, largest_modes
 from eigassign.modal.exact.condensation import Modes, condense_blocks, positive_at_top
 from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff
-from eigassign.modal.exact.sparse import block, lanczos, principal, solve_sparse
+from eigassign.modal.exact.sparse import block, principal, solve_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -155,6 +155,39 @@ def _coupling(
     return G, (table @ theta).T.reshape(theta.shape[1], len(directions), s)
 
 
+def solve_large_statics(pencil: Pencil, theta: Floats, f: Floats) -> Floats:
+    """u (n, n_dof, r) with K_E u_E = f_E at θ (n_theta, n) for f (n, n_dof, r), 0 where free.
+
+    By Σ u_S = f_S, u_I = −K_II⁻¹ K_IS u_S, where S has all that any force acts on too; sample by
+    sample where S is large. Raises MechanismError where K_E is not definite.
+    """
+    varying, u, E = varying_unknowns(pencil, theta), np.zeros(f.shape), pencil.elastic
+    loaded = np.flatnonzero((f != 0.0).any(axis=(0, 2)))
+    outer = np.union1d([] if varying is None else varying, np.setdiff1d(loaded, pencil.rigid))
+    if varying is None or len(outer) > MOST_VARYING:
+        for k, data in enumerate((pencil.stiffness @ theta).T):
+            factor = _definite(principal(pencil, data, E))
+            u[k, E] = factor.solve(np.ascontiguousarray(f[k, E]))
+        return u
+    split, s = _split(pencil, outer.astype(np.intp)), len(outer)
+    factor = _definite(principal(pencil, pencil.stiffness @ theta[:, 0], split.inner))
+    K_SS = _outer_block(pencil, split, pencil.stiffness, theta)
+    G, H = _coupling(pencil, split, pencil.stiffness, theta)
+    X = factor.solve(G) if G.size else G
+    inverse = inverse_factor((K_SS - np.swapaxes(H, 1, 2) @ (G.T @ X) @ H)[:, :s, :s])
+    u_S = np.swapaxes(inverse, 1, 2) @ (inverse @ f[:, split.outer[:s]])
+    u[:, split.outer[:s]] = u_S
+    u[:, split.inner] = -(X @ (H[:, :, :s] @ u_S))
+    return u
+
+
+def _definite(K: sparse.csc_array) -> linalg.SuperLU:
+    factor = definite_factor(K)
+    if factor is None:
+        raise MechanismError("mechanism", LIMP)
+    return factor
+
+
 # --- What is the same at every sample: T on a growing basis
 
 BLOCK = 16  # vectors made orthonormal at once
@@ -227,7 +260,7 @@ class Inner:
 
     def modes(self, count: int) -> Floats:
         """Vectors (n_I, count) of the largest eigenvalues of T."""
-        return lanczos(self.factor, self.K, lambda v: self.M @ v, count)[1]
+        return largest_modes(self.factor, self.K, lambda v: np.asarray(self.M @ v), count)[1]
 
     def largest_outside(self, nu: float) -> float | None:
         """ν' ≥ the largest eigenvalue of D; None where W lacks a mode above ν, or may lack one."""

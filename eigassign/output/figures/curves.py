@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.facts import capital, percent
+from eigassign.case.units import handy_unit
+from eigassign.facts import capital, number, percent
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
     Curve,
@@ -96,13 +97,36 @@ def drives(results: RunResults) -> FigurePlan:
     )
 
 
+def statics(results: RunResults) -> FigurePlan:
+    """Stiffness, compliance or sag before and after, with its limit, one panel for each target."""
+    panels = []
+    for k, row in enumerate(results.statics, 1):
+        unit, size = handy_unit(row.unit, row.limit)
+        pairs = ((row.initial_curve, _BEFORE), (row.optimal_curve, _AFTER))
+        edge = np.array([row.limit / size])
+        curves = (Curve(curve / size, series) for curve, series in pairs)
+        label = labelled(f"{k}: {row.name.partition(' ')[0]}", unit)
+        panels.append(Panel(label, (Rule(float(edge[0]), EDGE), *curves), 1.6, holds=(edge,)))
+    panels[0] = replace(panels[0], key=(*BEFORE_AND_AFTER, ("limit", EDGE)))
+    title = "What gives way at rest"
+    names = ", ".join(f"{k}: {row.name}" for k, row in enumerate(results.statics, 1))
+    return FigurePlan(
+        f"statics{suffix(results)}",
+        f"{title}{where(results)}",
+        f"{capital(names)}, along {results.along}; the drives hold.",
+        f"{capital(names)} over time before and after.",
+        Graph(f"{title}{where(results)}", "time [s]", results.time_s, tuple(panels)),
+    )
+
+
 # --- Everything that was asked for, before and after
 
 
 def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     """The modes up to the one above the highest asked for, with targets, limits and bands."""
     wanted = [t for t in results.targets if t.asked.is_goal]
-    limits = [t.asked for t in results.targets if not t.asked.is_goal and len(t.asked.terms) < 2]
+    limits = [t.asked for t in results.targets if not t.asked.is_goal and not t.asked.is_aim]
+    limits = [asked for asked in limits if len(asked.terms) < 2]
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
     time_s = results.time_s
     low, high = graph.bounds([curve.y for curve in modes])
@@ -187,7 +211,7 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
     """A target in time: frequencies before and after, and their distance or what is forbidden."""
     asked = target.asked
     modes = "_".join(map(str, asked.modes)) or "all"
-    if asked.followed is not None:
+    if asked.followed:
         modes = f"like_{asked.mode}"
     place, name, label = where(results), capital(asked.curve_name), capital(asked.label)
     if asked.is_goal:
@@ -199,11 +223,15 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
         kind, what, heading, title = asked.kind, "violation", label, label
         alt = f"{label}: frequencies over time before and after."
         panels = (_limited(results, target),)
+    said = f"Worst {what} {percent(target.error.initial.max_relative)} before and "
+    said += f"{percent(target.error.exact.max_relative)} after."
+    if asked.is_aim:
+        before, after = (number(hz.min()) for hz in (target.initial_hz, target.exact_hz))
+        said = f"{before} Hz before and {after} Hz after at least, at the samples."
     return FigurePlan(
         f"{kind}_mode_{modes}{suffix(results)}",
         f"{heading}{place}",
-        f"Worst {what} {percent(target.error.initial.max_relative)} before and "
-        f"{percent(target.error.exact.max_relative)} after.",
+        said,
         alt,
         Graph(f"{title}{place}", "time [s]", results.time_s[asked.rows], panels),
     )
@@ -236,9 +264,9 @@ def _curves(results: RunResults, target: TargetStudy) -> tuple[Curve, ...]:
     for hz, look, name, e in stages:
         if hz is not None and e:
             met = not target.asked.is_goal and e.max_relative == 0.0
-            found.append(
-                Curve(hz, look, f"{name} ({'met' if met else f'worst {percent(e.max_relative)}'})")
-            )
+            worst = "met" if met else f"worst {percent(e.max_relative)}"
+            worst = f"at least {number(hz.min())} Hz" if target.asked.is_aim else worst
+            found.append(Curve(hz, look, f"{name} ({worst})"))
     return tuple(found)
 
 
@@ -248,7 +276,7 @@ def _limited(results: RunResults, target: TargetStudy) -> Panel:
     curves = _curves(results, target) if near is None else before_and_after(near)
     low, high = asked.forbidden_hz
     marks: tuple[Mark, ...] = (
-        Shade(low, high, graph.VERMILLION, "forbidden"),
+        *(() if asked.is_aim else (Shade(low, high, graph.VERMILLION, "forbidden"),)),
         *(Curve(hz, EDGE) for hz in (low, high) if hz is not None),
         *curves,
     )

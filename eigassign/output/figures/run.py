@@ -30,6 +30,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
             yield curves.other_modes(one, one.others)
     asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
     yield from (curves.drives(one) for one in each if asked)
+    yield from (curves.statics(one) for one in each if one.statics)
     yield from meaning_figures(results)
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,14 +67,19 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     Of more than three targets only the worst distance is told.
     """
     row = results.assignment
-    if row is None or results.error is None:
+    if row is None:
         return None
     few = len(results.targets) <= 3
-    findings = [_finding(target, row.max_error, few) for target in results.targets]
-    findings += [_broken(limit) for limit in row.limits if not limit.satisfied]
+    aim, tone = row.aim, TONES.get(row.verdict, "bad")
+    said = {one.mode: one.words for one in results.meaning.anatomies}
+    findings = [] if aim is None else [Finding(aim.label, aim.before, aim.after, tone)]
+    targets = (target for target in results.targets if not target.asked.is_aim)
+    findings += [_finding(target, row.max_error, few, said) for target in targets]
+    static = {one.name for one in results.statics}
+    findings += [_kept(one) for one in row.limits if one.name in static or not one.satisfied]
     return FirstScreen(
         word=WORDS[row.verdict],
-        tone=TONES.get(row.verdict, "bad") if row.shortcoming is None else "bad",
+        tone=tone if row.shortcoming is None else "bad",
         reason=_sentence(row.reason),
         asked=tuple(_asked(results)),
         findings=tuple(findings),
@@ -90,9 +95,12 @@ def _sentence(text: str) -> str:
 
 def _asked(results: RunResults) -> Iterator[str]:
     row = results.assignment
-    for target in results.targets:
+    if row is not None and row.aim is not None:
+        yield capital(row.aim.label)
+    for target in (each for each in results.targets if not each.asked.is_aim):
         within = f", within {100 * row.max_error:.3g} %" if row and target.asked.is_goal else ""
         yield f"{capital(target.label)}{within}"
+    yield from (capital(static.name) for static in results.statics)
     parameters = [each.name for each in results.design]
     names = ", ".join(parameters[:4]) + (", …" if len(parameters) > 4 else "")
     yield f"by {names} within the bounds" if parameters else "with the design as it is"
@@ -101,8 +109,13 @@ def _asked(results: RunResults) -> Iterator[str]:
         yield f"mass at most {_few(results.mass.upper)} kg"
 
 
-def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
-    """Worst distances, with rms and frequencies; of a limit by how much it is violated."""
+def _finding(
+    target: TargetStudy, accepted: float, detailed: bool, modes: Mapping[str, str]
+) -> Finding:
+    """Worst distances, with rms and frequencies; of a limit by how much it is violated.
+
+    ``modes`` says what they are, by their names, where a target is missed.
+    """
     start, end = target.error.initial, target.error.exact
     before, after = start.max_relative, end.max_relative
     more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
@@ -115,13 +128,18 @@ def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
         said = violated(before), violated(after)
         more *= len(target.asked.terms) == 1
     tone = "good" if met else "fair" if after < before else "bad"
+    if not met:
+        own = [row.name for row in target.followed]
+        own = own or [f"mode {mode}" for mode in sorted(target.judged)]
+        more += [modes[name] for name in own if name in modes]
     return Finding(target.label, *said, tone, tuple(more) if detailed else ())
 
 
-def _broken(limit: LimitRow) -> Finding:
-    """A limit of a quantity that the answer breaks, with its amounts."""
-    before, after = (f"{_few(a)} {limit.unit}".rstrip() for a in (limit.initial, limit.optimal))
-    return Finding(limit.words, before, after, "bad", (limit.stated,))
+def _kept(limit: LimitRow) -> Finding:
+    """A limit of a quantity that the answer breaks, or of statics, with its amounts."""
+    before, after = (limit.said(_rounded(a)) for a in (limit.initial, limit.optimal))
+    tone = "good" if limit.satisfied else "bad"
+    return Finding(limit.words, before, after, tone, (limit.stated,))
 
 
 def _between(hz: Floats) -> str:
@@ -149,6 +167,8 @@ def _trust(results: RunResults) -> Iterator[str]:
         proof = "checked clear" if clear.clear else "NOT clear"
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
         yield f"{capital(clear.label)}: {proof}, {below} below."
+    if row.robust is not None:
+        yield f"Robust instead of alone: {row.robust.words}."
     found = results.meaning.tolerance
     if found is not None:
         yield _sentence(found.words)
@@ -182,9 +202,15 @@ def _cost(results: RunResults) -> Iterator[str]:
         added = f"{change:+.4g} kg".replace("-", "−") if _few(change) != "0" else "unchanged"
         yield f"Mass {_few(mass.initial)} → {_few(mass.optimal)} kg ({added})"
     if results.price is not None:
-        yield f"Price of the change {_few(results.price)}".replace("-", "−")
+        listed = any(row.choice_price is not None for row in results.design)
+        what = "Price" if listed else "Price of the change"
+        yield f"{what} {_few(results.price)}".replace("-", "−")
 
 
 def _few(value: float) -> str:
     """Four digits, and 15000 rather than 1.5e+04: the tables below have more."""
-    return f"{float(f'{value:.4g}') + 0.0:.7g}"
+    return f"{_rounded(value):.7g}"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}") + 0.0

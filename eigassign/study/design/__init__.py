@@ -4,13 +4,12 @@ Reading order:
 
     followed     modes that targets follow by their shape, at any design
     one_shot     the paper's answer: one quadratic program about one expansion point
-    response     frequencies along the trajectory and their slopes in the design
     judgement    what a design does to the targets
     clearance    whether a band stays clear of modes all along a trajectory
-    variants     the problems that the targets make, one for each choice that bands leave
-    starts       the local optima of one of them, from several starts
-    optimum      the design that meets the targets best, by the sequential method
+    search       the design that meets the targets best, from several starts
+    aim          what an objective that is no error has come to
     conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
+    robust       the same for every deviation within tolerances
     answer       the answer by either method
     verdict      the word for it, its reason and shortcoming, of the facts alone
     account      these facts, how the answer was found, and what holds it back

@@ -9,17 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import CatalogueSearch
-from eigassign.assignment.catalogues.choosing import MOST, Chosen
-from eigassign.assignment.exact.design_problem import MET, ON
+from eigassign.assignment.catalogues.choosing import Chosen
+from eigassign.assignment.exact.design_problem import MET, ON, Appraisal
 from eigassign.assignment.exact.optima import NOTHING
-from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.exact.sequential import OPTIMAL, End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.errors import LostModeError
 from eigassign.study.accuracy import model_errors
+from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.clearance import check_clear, error_between
+from eigassign.study.design.clearance import check_band, error_between, followed_between
 from eigassign.study.design.conclusions import extreme, is_proved
-from eigassign.study.design.optimum import Found
-from eigassign.study.design.variants import Task, variant_of
+from eigassign.study.design.judgement import judged_modes
+from eigassign.study.design.one_shot import cost
+from eigassign.study.design.search.optimum import Found
+from eigassign.study.design.search.variants import Task, variant_of
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
     ActiveRow,
@@ -30,6 +35,7 @@ from eigassign.study.results import (
     LocalOptimum,
     MeshError,
     OptimalityRow,
+    RobustRow,
     StepRow,
     TargetStudy,
     WeightRow,
@@ -39,6 +45,7 @@ from eigassign.study.weight import weight_doubt
 
 Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
+DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
 LIMIT = 1e-4  # of a limit, by which it may be missed between samples
 UNTRUSTED = "the expansion is further from exact than validation.max_error allows"
 FINER = "give the links more elements, raise reduce_to, or write auto"
@@ -67,7 +74,12 @@ def assignment_row(
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else found.clearances
     limits = tuple(_limits(scene, answer.y))
-    if all(t.satisfied for t in targets) and all(row.satisfied for row in limits):
+    largest = MAX_ERROR if keys.max_error is None else keys.max_error
+    deviated = (
+        () if answer.robust is None else tuple(_deviated(answer.robust, targets, limits, largest))
+    )
+    met = all(t.satisfied for t in targets) and all(row.satisfied for row in limits)
+    if met and not deviated:
         # what only round-off misses contradicts nothing
         answer = replace(answer, conflict=None)
     if answer.conflict is not None:
@@ -79,23 +91,28 @@ def assignment_row(
     unproved = () if found is None else tuple(_why_unproved(scene, found))
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
-    largest = MAX_ERROR if keys.max_error is None else keys.max_error
+    aim = None if found is None else aim_row(scene, found, wanted, of_model)
     undecided = dict(_undecided(targets, exact, of_model, accepted))
     beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
     doubts = [] if trusted else [UNTRUSTED]
-    doubts += weight_doubt(scene.file, weight, {m for t in targets for m in t.judged}, largest)
+    judged = judged_modes(scene.file, targets)
+    doubts += weight_doubt(scene.file, weight, judged, largest)
     if undecided and (len(beyond) < len(unreachable) or set(conflicting) & set(undecided)):
         doubts += undecided.values() if not beyond else ()
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
+    designs = [answer.y] if found is None else found.task.designs(answer.y)
     said = verdict(
         Facts(
             targets=targets,
             merits=(initial, optimal),
             limits=limits,
+            deviated=deviated,
+            robust=answer.robust is not None,
             doubts=doubts,
             unproved=(
-                *_too_coarse(targets, exact, of_model, largest),
-                *_missed_between(scene, answer.y, targets, largest),
+                *_too_coarse(targets, exact, of_model, largest, answer.robust is not None),
+                *_missed_between(scene, designs, targets, largest),
+                *(f"{each}: {FINER}" for y in designs for each in _too_stiff(scene, y)),
                 *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=beyond,
@@ -103,11 +120,13 @@ def assignment_row(
             of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
             unfinished="" if found is None or found.best.end not in ended else found.best.end.value,
             max_error=keys.max_error,
+            aim="" if aim is None else aim.words,
+            is_optimal=found is None or aim is None or _is_first_order(found),
         )
     )
     return AssignmentRow(
         method=keys.method,
-        objective=keys.objective,
+        objective=keys.named_objective,
         objective_initial=initial[1],
         objective_optimal=optimal[1],
         optimality=optimality,
@@ -136,21 +155,64 @@ def assignment_row(
         catalogue=_catalogue(scene, answer, wanted),
         limits=limits,
         shortcoming=said.shortcoming,
+        aim=aim,
+        robust=answer.robust,
     )
 
 
-def _missed_between(
-    scene: Scene, y: Floats, targets: Sequence[TargetStudy], accepted: float
+def _is_first_order(found: Found) -> bool:
+    """True where no small change is better; of listed values where all were gone through."""
+    ended = found.chosen is not None and found.chosen.ended is not None
+    return found.best.stationarity <= OPTIMAL and not ended
+
+
+def _deviated(
+    robust: RobustRow, targets: Sequence[TargetStudy], limits: Sequence[LimitRow], largest: float
 ) -> Iterator[str]:
-    """Say which targets are missed between samples that are far apart, by how much at worst."""
-    q = scene.path.at(y)[0]
-    for one in (target.asked for target in targets if target.satisfied):
-        error = error_between(scene.model, one, q, y)
+    """Say what the design itself meets, and some deviation within the tolerances does not."""
+    met = {one.label for one in targets if one.satisfied} | {r.name for r in limits if r.satisfied}
+    for one in robust.targets:
+        if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
+            yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"
+    if robust.error > DEVIATED:
+        yield f"the random deviations are solved to {_percent(robust.error)} only"
+
+
+def _missed_between(
+    scene: Scene, designs: Sequence[Floats], targets: Sequence[TargetStudy], accepted: float
+) -> Iterator[str]:
+    """Say which targets are missed between samples that are far apart, by how much at worst.
+
+    The first of the designs is the answer, others are deviations.
+    """
+    y, poses = designs[0], [scene.path.at(y)[0] for y in designs]
+    statics = [one for one in scene.statics if one.violation(one.amount(y), 0.0) <= ON]
+    for one in (*(target.asked for target in targets if target.satisfied), *statics):
+        each = zip(poses, designs, strict=True)
+        error = max(error_between(scene.model, one, *design) for design in each)
+        try:
+            error = max(error, *(followed_between(scene, one, y) for y in designs))
+        except LostModeError as lost:
+            yield f"{one.label} is not known between the samples, which are far apart: {lost}"
+            continue
         if error > (accepted if one.is_goal else LIMIT):
             yield (
                 f"{one.label} is missed by {100 * error:.3g} % between the samples, which are far "
                 "apart: give the trajectory more of them"
             )
+
+
+def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
+    """Say which static targets are met by the mesh and reduced links, and missed by finer ones.
+
+    Of what twice the elements make softer, elements beyond are taken to add a third at most.
+    """
+    q = scene.path.at(y)[0]
+    for one in scene.statics if scene.model.finer is not None else ():
+        w, finer = (one.way.at(q[one.rows], y, each) for each in (False, True))
+        missed = float((finer + np.maximum(finer - w, 0.0) / 3.0).max()) / float(one.upper[0]) - 1.0
+        if one.violation(one.amount(y), 0.0) <= ON and missed > LIMIT:
+            yield f"{one.label}: twice the elements and whole links miss it by {_percent(missed)}"
 
 
 def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
@@ -196,17 +258,22 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
 
 
 def _too_coarse(
-    targets: Sequence[TargetStudy], exact: Solved, of_model: Mapping[int, float], accepted: float
+    targets: Sequence[TargetStudy],
+    exact: Solved,
+    of_model: Mapping[int, float],
+    accepted: float,
+    robust: bool,
 ) -> Iterator[str]:
     """Say which target may be missed most by as much as mesh and reduced links raise its modes.
 
-    Bands are checked for themselves, and what nothing raises is what it seems to be.
+    Bands are checked for themselves, and what nothing raises is what it seems to be. Deviations of
+    a robust design may have used up whatever room it has.
     """
     worst, label, raised = 0.0, "", 0.0
     for target in targets:
         too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
         if too_high > 0.0 and target.asked.terms:
-            stake = target.asked.stake(exact, too_high)
+            stake = too_high if robust else target.asked.stake(exact, too_high)
             worst, label, raised = max((worst, label, raised), (stake, target.label, too_high))
     if worst <= accepted:
         return
@@ -245,11 +312,10 @@ def _undecided(
 def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
     """Say which bands are not clear, and what the model leaves open where they are clear in it."""
     y = found.best.y
-    q = scene.path.at(y)[0]
     for band, row in zip(found.task.bands, found.clearances, strict=True):
         if row.clear:
             continue
-        of_model = check_clear(scene.model, band, row.below, q[band.rows], y, 0.0)
+        of_model = check_band(scene, found.task.followers, band, row.below, y, 0.0)
         if not of_model.clear:
             yield row.label
             continue
@@ -272,22 +338,48 @@ def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> C
     if found is not None and found.chosen is not None:
         search = found.chosen.search
         of_rows = found.chosen.rows
-        worth = [(o.y, o.objective, o.seen.violation) for o in found.chosen.optima]
+        worth = [(o.y, o.objective, o.seen) for o in found.chosen.optima]
+        asked = found.variant.requirements
     elif found is None and one_shot is not None and one_shot.search is not None:
         search = one_shot.search
         of_rows = tuple(one.rows for one in search.best)
-        exact = variant_of(Task(scene, tuple(wanted)), ()).problem
-        worth = [(one.y, exact(one.y, exact.appraise(one.y)), 0.0) for one in search.best]
+        variant = variant_of(Task(scene, tuple(wanted)), ())
+        exact, asked = variant.problem, variant.requirements
+        each = ((one.y, exact.appraise(one.y)) for one in search.best)
+        worth = [(y, exact(y, seen), seen) for y, seen in each]
     else:
         return None
     best = tuple(
-        CombinationRow({c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}, *each)
+        _combination(scene, asked, {c.name: c.choices[k] for c, k in zip(own, rows, strict=True)},
+                     *each)
         for rows, each in zip(of_rows, worth, strict=True)
-    )
+    )  # fmt: skip
     if search is None:
         return CatalogueRow(None, None, best)
     gap = search.relative_gap if found is None else 0.0 if _is_settled(found) else None
     return CatalogueRow(search.nodes, gap, best)
+
+
+def _combination(
+    scene: Scene,
+    asked: Requirements,
+    choices: Mapping[str, str],
+    y: Floats,
+    objective: float,
+    seen: Appraisal,
+) -> CombinationRow:
+    """One combination with what it is worth; one that was solved for ``asked``."""
+    curves = ((one, hz) for one, hz, _ in asked.curves(seen) if one.is_goal)
+    errors = [float(one.outside(hz, hz).max()) for one, hz in curves]
+    return CombinationRow(
+        choices=choices,
+        design=y,
+        objective=objective,
+        violation=0.0 if scene.file.assignment.method == "one_shot" else seen.violation,
+        error=max(errors, default=None),
+        mass=scene.model.mass(y),
+        price=cost(scene, y),
+    )
 
 
 def _merits(
@@ -347,7 +439,7 @@ def _of_starts(found: Found) -> str:
     many = f"{tally.starts} start{'s' * (tally.starts > 1)}"
     which = f"best of {tally.optima} local optima" if tally.optima > 1 else "only local optimum"
     words = f"the {which} that {many} found"
-    exact = found.variant.problem.prices is None and best.seen.violation <= MET
+    exact = found.variant.problem.is_error and best.seen.violation <= MET
     if exact and best.objective <= NOTHING:
         return f"{words}; nothing that is asked is missed, so that no design is better"
     if not np.isfinite(tally.unseen):
@@ -369,7 +461,7 @@ def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> Opt
             words += f"; {equal} more in the list of the best are as good"
         return OptimalityRow("proved", best.stationarity, 0.0, words)
     how = f"by branch and bound in {search.nodes} nodes"
-    if chosen.count <= MOST:
+    if chosen.each:
         how = "each as far as it may be better, its other parameters from two starts"
     words = f"the best found of {among}, {how}: others may be better"
     return OptimalityRow("local", best.stationarity, None, words)

@@ -27,7 +27,9 @@ from eigassign.study.design.conclusions import (
 )
 from eigassign.study.design.followed import require_one_shape
 from eigassign.study.design.one_shot import assign_design, catalogues
-from eigassign.study.design.optimum import Found, find_optimum
+from eigassign.study.design.robust import robust_optimum
+from eigassign.study.design.search.optimum import Found, find_optimum
+from eigassign.study.results import RobustRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -36,11 +38,14 @@ MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 
 def require_assignable(file: CaseFile) -> None:
-    """Raise CaseError naming every key that an assignment needs and the case lacks."""
+    """Raise CaseError naming every key that an assignment needs and the case lacks.
+
+    Targets, but where the objective makes something light or high.
+    """
     needs = {
         "trajectory": (file.trajectory is not None, "along which the frequencies are assigned"),
         "design": (bool(file.design.parameters), "at least one parameter that may change"),
-        "targets": (bool(file.targets), "at least one target"),
+        "targets": (file.has_question, "at least one target"),
     }
     file.require("optimize", needs)
 
@@ -59,6 +64,7 @@ class Answer:
     found: Found | None
     notes: tuple[str, ...]
     conflict: Conflict | None = None
+    robust: RobustRow | None = None
 
     @property
     def modes(self) -> int:
@@ -95,7 +101,11 @@ def find_answer(
     if one_shot is not None:  # of catalogues the best few combinations
         search = one_shot.search
         starts = [one_shot.y] if search is None else [one.y for one in search.best]
-    found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
+    robust = None
+    if scene.file.assignment.robust:
+        found, robust = robust_optimum(scene, wanted, starts, progress)
+    else:
+        found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
     steps = scene.file.assignment.steps
     contradiction = conflict(found, catalogues(scene.file), steps, scene.limits)
     notes += idle_notes(scene.model.y_names, found, scene.initial)
@@ -103,7 +113,7 @@ def find_answer(
     if found.lost:
         notes.append(f"{len(found.lost)} designs were passed over, for {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
-    return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
+    return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction, robust)
 
 
 def _band_notes(found: Found) -> Iterator[str]:
@@ -120,7 +130,8 @@ def _band_notes(found: Found) -> Iterator[str]:
         below = ((band, k) for band, k in one.variant.below if k is not None)
         choice = ", ".join(f"{band} with {k} below it" for band, k in below)
         best, missed = one.optima[0], one.optima[0].seen.violation
-        how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {best.objective:.6g}"
+        value = -best.objective if one.variant.problem.is_one_sided else best.objective
+        how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {value:.6g}"
         yield f"{choice}: {how}"
 
 

@@ -19,7 +19,7 @@ the model has no mode k + 1, which the beams themselves have, nothing is clear.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,17 +28,23 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.requirement import Requirement, Solved
-from eigassign.errors import MissingMassError
+from eigassign.assignment.requirements.static_limit import StaticLimit
+from eigassign.errors import LostModeError, MissingMassError
+from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.accuracy import judged_poses
+from eigassign.study.design.followed import Follower, follow_all, followers
 from eigassign.study.results import ClearanceRow
+from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 # Between two points, which are halved once at least: of a four-bar whose crank turns, mode 2 has a
 # dip of 0.24 % that points 15° apart have missed, and rises by 5 % within 10° beside it.
 TURN = np.radians(10.0)
 SHARE = 0.05  # of the way of a coordinate, which may be a slide
+WITHIN = 1e-4  # of a least frequency or room that is stated: what four digits show
 STILL = (
     1e-6  # rad or m: over less no frequency changes; a coordinate may be still but for round-off
 )
@@ -57,10 +63,27 @@ def check_clear(
     ``below`` is k; e is ``raised``, or else what can be proved of it. Raises what the exact solves
     raise.
     """
-    motion = _Motion(model, band, below, q, y, raised)
-    counted, room = motion.counted(), motion.least_room()
-    raised = motion.raised if np.isfinite(motion.raised) else None
-    return ClearanceRow(band.label, below, counted and room > 0.0, room, counted, raised)
+    return _Motion(model, band, below, q, y, raised).judged()
+
+
+def check_band(
+    scene: Scene,
+    own: Sequence[Follower],
+    band: ForbiddenBand,
+    below: int,
+    y: Floats,
+    raised: float | None = None,
+) -> ClearanceRow:
+    """The same along the trajectories of a scene, also of a band of one of the followed modes.
+
+    A band is not clear where the shape of its mode is lost between samples.
+    """
+    q = scene.path.at(y)[0][band.rows]
+    shapes = (_Shape(band, scene.path, one, y) for one in own if one.mode in band.followed)
+    try:
+        return _Motion(scene.model, band, below, q, y, raised, next(shapes, None)).judged()
+    except LostModeError:
+        return ClearanceRow(band.label, below, False, 0.0, False, None)
 
 
 def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Floats) -> int | None:
@@ -80,6 +103,37 @@ def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Flo
 
 
 @dataclass(frozen=True, eq=False)
+class _Shape:
+    """The mode of a band that is followed by its shape, at a design."""
+
+    band: ForbiddenBand
+    path: Trajectories
+    follower: Follower
+    y: Floats
+
+    def at(self, places: Floats) -> tuple[Floats, Ints]:
+        """Its frequency (n,) and number at places along the samples of the band."""
+        path, at = _refined(self.path, self.band.rows, places)
+        needed = np.isin(np.arange(len(path.q)), at)
+        follower = replace(self.follower, path=path, needed=needed)
+        found = follow_all(follower.model, path, [follower], self.y, 1)
+        return found.solved.followed[at, 0], found.numbers[at, 0]
+
+
+def _refined(path: Trajectories, rows: slice, at: Floats) -> tuple[Trajectories, Ints]:
+    """One trajectory with instants at places along some of its rows, and their numbers (n,) in it.
+
+    From sample to sample q is linear in time for any design.
+    """
+    name = path.name_of(rows.start)
+    time_s = _between(at, path.time_s[rows, None])[:, 0]
+    fine = path.with_instants([time_s if one.name == name else () for one in path.parts])
+    own = fine.rows_of(name)
+    fine = fine.chosen(np.arange(own.start, own.stop))
+    return fine, np.searchsorted(fine.time_s, time_s)
+
+
+@dataclass(frozen=True, eq=False)
 class _Motion:
     """A band, k, and the poses and the design at which it is looked at."""
 
@@ -89,6 +143,14 @@ class _Motion:
     q: Floats
     y: Floats
     given: float | None = None  # e
+    shape: _Shape | None = None
+
+    def judged(self) -> ClearanceRow:
+        """What is found of it."""
+        counted, room = self.counted(), least_along(self.room, self.q)
+        raised = self.raised if np.isfinite(self.raised) else None
+        clear = counted and room > 0.0
+        return ClearanceRow(self.band.label, self.below, clear, room, counted, raised)
 
     @cached_property
     def above(self) -> int | None:
@@ -100,11 +162,13 @@ class _Motion:
         """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
         if self.given is not None:
             return self.given
-        if self.above == 0 or (self.model.meshed is None and self.model.reduced is None):
+        if self.above == 0 or self.model.is_exact:
             return 0.0
         if self.above is None:
             return float(np.inf)
         q, modes = judged_poses(self.model, self.q), (self.above,)
+        if self.shape is not None:
+            modes = tuple(set(self.shape.at(np.arange(len(self.q), dtype=np.float64))[1].tolist()))
         mesh, truncation = (
             float(error(q, self.y, modes).max())
             for error in (self.model.discretisation_error, self.model.truncation_error)
@@ -119,44 +183,52 @@ class _Motion:
         found = count_below(self.model.pencil, self.model.x(self.q, self.y), edges)
         return bool((found == self.below).all())
 
-    def least_room(self) -> float:
-        """The least g over the trajectory, less its possible deviation where not resolved."""
-        at = places(self.q)
-        g = self.room(at)
-        least = float(g.min())
-        if least <= 0.0 or len(at) < 2:
-            return least
-        start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
-        for _ in range(9):  # halvings: 512 points between two samples
-            middle = 0.5 * (start + end)
-            g_middle = self.room(middle)
-            ends = np.minimum(np.minimum(g_start, g_end), g_middle)
-            least = min(least, float(ends.min()))
-            bound = ends - _beside(0.5 * np.abs(g_start - 2.0 * g_middle + g_end), start, end)
-            open_ = bound <= 0.0
-            if least <= 0.0:
-                return least
-            least = min(least, float(bound[~open_].min(initial=np.inf)))
-            if not open_.any():
-                return least
-            halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
-            start, end, g_start, g_end = (
-                np.concatenate([half[k][open_] for half in halves]) for k in range(4)
-            )
-        return min(0.0, float(bound.min()))
-
     def room(self, at: Floats) -> Floats:
         """g (n,) at places ``at`` along the samples: 1.5 is midway between second and third."""
         k, above, q = self.below, self.above, _between(at, self.q)
         lower, upper = (_between(at, e[:, None])[:, 0] for e in (self.band.lower, self.band.upper))
-        low = self.band.counted[k - 1] if self.band.counted and k else k
-        hz = self.model.frequencies(q, self.y, max(low, above or 0, 1))
+        if self.shape is None:
+            low = self.band.counted[k - 1] if self.band.counted and k else k
+            hz = self.model.frequencies(q, self.y, max(low, above or 0, 1))
+        else:
+            low, above, hz = 1, above and 1, self.shape.at(at)[0][:, None]
         g = np.full(len(at), np.inf)
         if k:
             g = np.minimum(g, 1.0 - hz[:, low - 1] / lower)
         if above:
             g = np.minimum(g, hz[:, above - 1] / (1.0 + self.raised) / upper - 1.0)
         return g if np.isfinite(self.raised) else np.minimum(g, 0.0)
+
+
+def least_along(curve: Callable[[Floats], Floats], q: Floats, within: float | None = None) -> float:
+    """The least of a curve over the samples q (n, n_q), less its possible deviation between them.
+
+    As far as it takes to tell whether it is above 0; or ``within`` a share of itself. ``curve`` is
+    of places along the samples, as `places` returns them.
+    """
+    at = places(q)
+    g = curve(at)
+    least = low = float(g.min())
+    if (within is None and least <= 0.0) or len(at) < 2:
+        return least
+    start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
+    for _ in range(9):  # halvings: 512 points between two samples
+        middle = 0.5 * (start + end)
+        g_middle = curve(middle)
+        ends = np.minimum(np.minimum(g_start, g_end), g_middle)
+        least = min(least, float(ends.min()))
+        if within is None and least <= 0.0:
+            return least
+        bound = ends - _beside(0.5 * np.abs(g_start - 2.0 * g_middle + g_end), start, end)
+        open_ = bound <= (0.0 if within is None else least - within * abs(least))
+        low = min(low, least, float(bound[~open_].min(initial=np.inf)))
+        if not open_.any():
+            return low
+        halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
+        start, end, g_start, g_end = (
+            np.concatenate([half[k][open_] for half in halves]) for k in range(4)
+        )
+    return min(low if within is not None else 0.0, float(bound.min()))
 
 
 def places(q: Floats) -> Floats:
@@ -188,25 +260,89 @@ def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def error_between(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
-    """The largest error of a target between samples that are far apart, else 0.
+    """The largest error of a target between samples that are far apart, else 0."""
+    if isinstance(asked, StaticLimit):
+        ways = ((fine, asked.way.at(poses, y)) for fine, poses in _apart(asked, q))
+        each = (fine.outside(w, w) for fine, w in ways)
+    else:
+        each = (_errors(model, fine, poses, y) for fine, poses in _apart(asked, q))
+    return max((float(np.abs(errors).max()) for errors in each), default=0.0)
 
-    Of poses q (n, n_q) of all samples and a design y (n_y,). Bands are checked for themselves, and
-    modes that are followed by their shape are known at samples only.
+
+def _errors(model: Model, asked: Requirement, q: Floats, y: Floats) -> Floats:
+    """The errors (n,) of a target at poses q (n, n_q); 0 where it is on no modes by number.
+
+    Bands are checked for themselves, and modes that are followed by their shape are known at
+    samples only.
     """
-    worst = 0.0
-    if not asked.terms or asked.followed is not None:
-        return worst
+    if not asked.terms or asked.followed:
+        return np.zeros(1)
+    hz = model.frequencies(q, y, max(m for m, _ in asked.mode_terms))
+    nothing = np.zeros((len(hz), 0))
+    return asked.errors(Solved(hz, nothing, nothing.astype(np.intp)))
+
+
+def least_frequency(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
+    """The least of a mode's curve along its trajectories; of a gap its least room, relative.
+
+    Of poses q (n, n_q) of all samples and a design y (n_y,), within `WITHIN`.
+    """
+    parts = (asked.part(name, own) for name, own in asked.along)
+    return min(_least_of_part(model, part, q[part.rows], y) for part in parts)
+
+
+def _least_of_part(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
+    top = max(mode for mode, _ in asked.mode_terms)
+
+    def curve(at: Floats) -> Floats:
+        hz = model.frequencies(_between(at, q), y, top)
+        edge = _between(at, asked.lower[:, None])[:, 0]
+        value = np.asarray(sum(c * hz[:, mode - 1] for mode, c in asked.mode_terms))
+        return value if asked.is_aim else value / edge - 1.0
+
+    return least_along(curve, q, WITHIN)
+
+
+def least_room(model: Model, band: ForbiddenBand, row: ClearanceRow, q: Floats, y: Floats) -> float:
+    """The room of a band that was found to be clear, within `WITHIN` of itself."""
+    if not row.clear:
+        return row.room
+    return least_along(_Motion(model, band, row.below, q, y, row.raised).room, q, WITHIN)
+
+
+def _apart(asked: Requirement, q: Floats) -> Iterator[tuple[Requirement, Floats]]:
+    """Yield what is asked, and poses, at samples that are far apart and between them."""
     for name, own in asked.along:
         part = asked.part(name, own)
         poses = q[part.rows]
         at = places(poses)
-        if len(at) == len(poses):
+        if len(at) > len(poses):
+            edges = _between(at, np.column_stack([part.lower, part.upper]))
+            fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=())
+            yield replace(fine, rows=slice(0, len(at))), _between(at, poses)
+
+
+def followed_between(scene: Scene, asked: Requirement, y: Floats) -> float:
+    """The largest error of a target on followed modes between samples that are far apart, else 0.
+
+    Raises LostModeError where a shape is lost between samples.
+    """
+    q, worst = scene.path.at(y)[0], 0.0
+    for name, rows in asked.along if asked.terms and asked.followed else ():
+        part = asked.part(name, rows)
+        at = places(q[part.rows])
+        if len(at) == len(part.hz):
             continue
+        path, k = _refined(scene.path, part.rows, at)
+        needed = np.isin(np.arange(len(path.q)), k)
+        shapes = [
+            replace(one, path=path, needed=needed & one.needed.any())
+            for one in followers(scene, [asked])
+        ]
+        found = follow_all(scene.model, path, shapes, y, part.mode).solved
         edges = _between(at, np.column_stack([part.lower, part.upper]))
-        fine = replace(part, rows=slice(0, len(at)), lower=edges[:, 0], upper=edges[:, 1], along=())
-        hz = model.frequencies(_between(at, poses), y, max(m for m, _ in part.mode_terms))
-        nothing = np.zeros((len(at), 0))
-        errors = fine.errors(Solved(hz, nothing, nothing.astype(np.intp)))
+        fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=(), rows=slice(0, len(at)))
+        errors = fine.errors(Solved(found.hz[k], found.followed[k], found.numbers[k]))
         worst = max(worst, float(np.abs(errors).max()))
     return worst
 

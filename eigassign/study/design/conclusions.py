@@ -2,10 +2,11 @@
 
 **Proved.** "Mode 1 at least b" is K(y) − (2πb)² M(y) ⪰ 0 where every coordinate is held. With K and
 M affine in y that is a convex set, and so are bounds, linear limits and a mass that is affine in y;
-price and least change are convex. A local optimum is then the best there is. Where nothing meets
-the limits, λ₁ falls short most at a design from which no direction raises it: with K and M at a
-better design, φᵀ(K − λ₁M)φ > 0 for all modes φ of λ₁ here, which is the slope towards it. So a
-stationary violation proves that the limits contradict.
+an affine price and least change are convex. A local optimum is then the best there is. Where
+nothing meets the limits, λ₁ falls short most at a design from which no direction raises it: with K
+and M at a better design, φᵀ(K − λ₁M)φ > 0 for all modes φ of λ₁ here, which is the slope towards
+it. So a stationary violation proves that the limits contradict, and where mode 1 is to be as high
+as can be, a stationary design that it is nowhere higher.
 """
 
 from __future__ import annotations
@@ -19,7 +20,14 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import choose
-from eigassign.assignment.exact.design_problem import MET, ON, Appraisal, DesignProblem
+from eigassign.assignment.exact.design_problem import (
+    MET,
+    ON,
+    Appraisal,
+    Cost,
+    DesignProblem,
+    Objective,
+)
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
 from eigassign.assignment.exact.stationarity import first_order
@@ -27,8 +35,8 @@ from eigassign.assignment.feasibility import smallest
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.errors import EigassignError
-from eigassign.study.design.optimum import Found
-from eigassign.study.design.variants import lacking, variant_of
+from eigassign.study.design.search.optimum import Found
+from eigassign.study.design.search.variants import lacking, variant_of
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -54,19 +62,34 @@ def is_proved(scene: Scene, found: Found) -> bool:
     if found.variant.below:  # bands leave a choice, and what is convex is so for each alone
         return False
     if best.seen.violation <= MET:
-        return best.stationarity <= OPTIMAL and not asked.goals and _are_convex(scene, asked)
-    if not _are_convex(scene, asked):
+        return (
+            best.stationarity <= OPTIMAL
+            and _is_convex(found.variant.problem.cost, asked)
+            and _are_convex(scene, asked)
+        )
+    if not _are_convex(scene, replace(asked, aims=())):
         return False
-    limits = found.variant.of(replace(asked, asked=asked.limits, least_change=None))
-    least = minimise(replace(limits, prices=None), best.y, scene.file.assignment.steps)
+    limits = found.variant.of(replace(asked, asked=asked.limits, least_change=None, aims=()))
+    limits = replace(limits, cost=None, objective=Objective.LEAST_SQUARES)
+    least = minimise(limits, best.y, scene.file.assignment.steps)
     return least.seen.violation > MET and least.stationarity <= OPTIMAL
 
 
+def _is_convex(cost: Cost | None, asked: Requirements) -> bool:
+    """True where F is convex: an affine cost, or least change; or where only mode 1 is to be high.
+
+    Its designs above a frequency are a convex set, which says nothing of them with a cost added.
+    """
+    affine = cost is None or cost.is_affine  # of lists nothing is convex
+    return not asked.goals and affine and (cost is None or not asked.aims)
+
+
 def _are_convex(scene: Scene, asked: Requirements) -> bool:
-    """True where the limits allow a convex set of designs; prices and least change are convex."""
-    if scene.file.design.catalogues or scene.path.follows_design:
+    """True where the limits allow a convex set of designs, and aims those above any frequency."""
+    file = scene.file
+    if file.design.catalogues or file.assignment.robust or scene.path.follows_design:
         return False
-    limits = [one for one in asked.limits if one.constraint is None]
+    limits = [one for one in (*asked.limits, *asked.aims) if one.constraint is None]
     if not all(one.is_convex for one in limits):
         return False
     return not limits or (scene.model.n_rigid == 0 and scene.model.pencil.is_affine)
@@ -187,11 +210,11 @@ def _met(
 # --- What changes nothing
 
 
-def _effects(problem: DesignProblem, seen: Appraisal) -> Floats:
-    """Slopes of all that is asked per width of the bounds, columns for the parameters with room."""
+def _effects(problem: DesignProblem, y: Floats, seen: Appraisal) -> Floats:
+    """Slopes at y of all that is asked per width of the bounds, a column for each parameter."""
     width = problem.upper - problem.lower
-    prices = np.zeros((0, len(width))) if problem.prices is None else problem.prices[None]
-    return np.vstack([seen.slopes, seen.excess_slopes, prices]) * width
+    cost = () if problem.cost is None else (problem.cost_slopes(y),)
+    return np.vstack([seen.slopes, seen.excess_slopes, *cost]) * width
 
 
 def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[str]:
@@ -202,7 +225,7 @@ def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[
     problem, best = found.variant.problem, found.best
     width = problem.upper - problem.lower
     free = np.flatnonzero(width > 0.0)
-    J = _effects(problem, best.seen)[:, free]
+    J = _effects(problem, best.y, best.seen)[:, free]
     size = np.linalg.norm(J, axis=0)
     still = size <= WITHOUT * size.max(initial=0.0)
     idle = [k for k in free[still] if _changes_nothing(problem, best, np.eye(len(width))[k])]
@@ -233,7 +256,11 @@ def _changes_nothing(problem: DesignProblem, best: Optimum, d: Floats) -> bool:
             seen = problem.appraise(y)
         except EigassignError:
             return False
-        pairs = ((seen.residual, best.seen.residual), (seen.excess, best.seen.excess))
+        pairs = (
+            (seen.residual, best.seen.residual),
+            (seen.excess, best.seen.excess),
+            (np.array([problem.price(y)]), problem.price(best.y)),
+        )
         if max(np.abs(a - b).max(initial=0.0) for a, b in pairs) > ON:
             return False
     return True
@@ -259,7 +286,7 @@ def least_changed(found: Found, initial: Floats) -> Found:
         return found
     free = np.flatnonzero(problem.upper > problem.lower)
     width = (problem.upper - problem.lower)[free]
-    N = _null_space(_effects(problem, best.seen)[:, free])
+    N = _null_space(_effects(problem, best.y, best.seen)[:, free])
     d = np.zeros(len(best.y))
     d[free] = width * (N @ (N.T @ ((initial - best.y)[free] / width)))
     if np.abs(d[free] / width).max(initial=0.0) <= SAME:

@@ -144,7 +144,7 @@ def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ..
     for mode in followed_modes(file):
         needed = np.zeros(len(path.q), dtype=np.bool_)
         for one in wanted:
-            if one.followed == mode:
+            if mode in one.followed:
                 needed[one.rows] = True
         y = named_design(file, mode)
         pose = partial(named_pose, file, mode, path)
@@ -169,7 +169,9 @@ def require_one_shape(scene: Scene, wanted: Sequence[Requirement]) -> None:
         like, lam = follower.mode.like, follower.start.at.lam
         twins = np.flatnonzero(_alike(lam, lam[like - 1])) + 1
         if len(twins) > 1 and not _always(scene, follower, len(twins)):
-            places = (f"{one.place}.mode" for one in wanted if one.followed == follower.mode)
+            own = [one for one in wanted if follower.mode in one.followed]
+            keys = ("gap.between" if len(one.terms) > 1 else "mode" for one in own)
+            places = (f"{one.place}.{key}" for one, key in zip(own, keys, strict=True))
             message = (
                 f"modes {' and '.join(map(str, twins))} coincide there, so that mode {like} has "
                 "no shape of its own: name it at another pose or design"

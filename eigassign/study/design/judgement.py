@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import time_weights
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.targets import StaticTarget
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.results import (
     ErrorRow,
@@ -33,6 +35,12 @@ class SolvedDesigns:
     exact: Solved
     one_shot: Solved | None = None
     notes: tuple[str, ...] = ()  # why there are none of the one shot
+
+
+def judged_modes(file: CaseFile, targets: Sequence[TargetStudy]) -> set[int]:
+    """The modes whose error under weight counts: of statics what it does to the lowest."""
+    static = any(isinstance(target, StaticTarget) for target in file.targets)
+    return {mode for target in targets for mode in target.judged} | ({1} if static else set())
 
 
 def study_targets(
@@ -80,17 +88,15 @@ def _studied(
         along=tuple(
             TargetAlong(name, own, _summary(errors, weights, own)) for name, own in asked.along
         ),
-        followed=_followed(asked, before, after),
+        followed=tuple(_followed(asked, before, after)),
         near=_near(asked, before, after),
     )
 
 
-def _followed(asked: Requirement, before: Solved, after: Solved) -> FollowedRow | None:
-    mode = asked.followed
-    if mode is None:
-        return None
-    numbers = (solved.numbers[asked.rows, asked.mode_terms[0][0]] for solved in (before, after))
-    return FollowedRow(mode.name, mode.like, *numbers)
+def _followed(asked: Requirement, before: Solved, after: Solved) -> Iterator[FollowedRow]:
+    for mode, k in zip(asked.followed, asked.followed_numbers, strict=True):
+        numbers = (solved.numbers[asked.rows, k] for solved in (before, after))
+        yield FollowedRow(mode.name, mode.like, *numbers)
 
 
 def _near(asked: Requirement, before: Solved, after: Solved) -> OtherModes | None:
@@ -126,14 +132,14 @@ def swap_notes(path: Trajectories, targets: Sequence[TargetStudy]) -> tuple[str,
     """Say which mode each followed one is and where it swaps, if it is not always the named."""
     return tuple(
         dict.fromkeys(
-            f"with the {design} design {target.followed.name} {_runs(path, target, numbers)}"
+            f"with the {design} design {row.name} {_runs(path, target, numbers)}"
             for target in targets
-            if target.followed is not None
+            for row in target.followed
             for design, numbers in (
-                ("initial", target.followed.initial_numbers),
-                ("optimal", target.followed.exact_numbers),
+                ("initial", row.initial_numbers),
+                ("optimal", row.exact_numbers),
             )
-            if (numbers != target.followed.like).any()
+            if (numbers != row.like).any()
         )
     )
 

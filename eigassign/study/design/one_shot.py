@@ -52,11 +52,31 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
-    """The case's catalogues, as the assignment takes them."""
+    """The case's catalogues, as the assignment takes them: prices are of F."""
+    unit = price_of_one(file)
     return tuple(
-        ListedValues(own.name, own.columns, np.array(own.rows), own.choices)
+        ListedValues(
+            own.name,
+            own.columns,
+            np.array(own.rows),
+            own.choices,
+            tuple(price / unit for price in own.prices),
+        )
         for own in file.design.catalogues
     )
+
+
+def price_of_one(file: CaseFile) -> float:
+    """The price that is F = 1: beside errors prices are in %² of them, in the worst case in %.
+
+    Beside room they are in % of it too, beside a highest frequency in Hz.
+    """
+    aim = file.assignment.objective
+    if aim == "widest":
+        return 1e2
+    if not any(target.is_goal for target in file.targets):
+        return 1.0
+    return 1e2 if aim == "worst_case" else 1e4
 
 
 def _require_near(scene: Scene, l0: Floats) -> None:
@@ -80,11 +100,14 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
         scene.file.design_units,
         scene.initial,
     )
-    chosen = {k: choice for own in catalogues(scene.file) for k, choice in _chosen(own, optimal)}
+    listed = catalogues(scene.file)
+    chosen = {k: choice for own in listed for k, choice in _chosen(own, optimal)}
+    unit = price_of_one(scene.file)
+    whole = {own.columns[0]: unit * own.price(optimal) for own in listed if own.prices}
     return tuple(
         DesignRow(
             name,
-            p.parameter,
+            p.said,
             units[k],
             float(initial[k]),
             float(optimal[k]),
@@ -92,9 +115,18 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
             p.max,
             chosen.get(k),
             p.price,
+            whole.get(k),
         )
         for k, (name, p) in enumerate(parameters.items())
     )
+
+
+def cost(scene: Scene, y: Floats) -> float | None:
+    """The price of a design (n_y,), of choices and of its change; None where nothing has one."""
+    costs = [row.cost for row in design_rows(scene, y) if row.is_priced]
+    if (limits := scene.file.design.mass) is not None and limits.price is not None:
+        costs.append(limits.price * (scene.model.mass(y) - scene.model.mass(scene.initial)))
+    return sum(costs) if costs else None
 
 
 def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:

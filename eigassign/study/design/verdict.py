@@ -7,7 +7,8 @@ In this order, the first that holds:
     unreachable    a target is out of reach whatever the design
     infeasible     limits contradict, some of them on frequencies
     do_not_use     every target seems to be met, and that cannot be vouched for
-    reached        every target is met and every limit kept, to the accuracy that is accepted
+    reached        every target is met and every limit kept, to the accuracy that is accepted; what
+                   is to be light, high or wide is first-order optimal besides
     do_not_use     limits are not met
     improved       better than the initial design
     do_not_use     no better than that
@@ -22,6 +23,7 @@ from eigassign.study.design.judgement import MET
 from eigassign.study.results import LimitRow, TargetStudy
 
 IMPROVED = 0.01  # of the merit of the start
+GAINED = 1e-9  # of what is to be light, high or wide: less is round-off
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,12 @@ class Facts:
 
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
     why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
-    so; ``unreachable`` which targets are out of reach; ``conflict`` which limits contradict, and
+    so; ``unreachable`` which targets are out of reach; ``deviated`` what is met and is not within
+    the tolerances, of a ``robust`` design; ``conflict`` which limits contradict, and
     ``of_frequencies`` whether some of these are on frequencies; ``unfinished`` how a search was
     ended before it was done. ``max_error`` is the largest error accepted where the case says it.
+    ``aim`` says what an objective that is no error has come to, and ``is_optimal`` whether that is
+    first-order optimal.
     """
 
     targets: Sequence[TargetStudy]
@@ -41,10 +46,14 @@ class Facts:
     doubts: Sequence[str] = ()
     unproved: Sequence[str] = ()
     unreachable: Sequence[str] = ()
+    deviated: Sequence[str] = ()
+    robust: bool = False
     conflict: str = ""
     of_frequencies: bool = True
     unfinished: str = ""
     max_error: float | None = None
+    aim: str = ""
+    is_optimal: bool = True
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,7 @@ def _word(facts: Facts) -> tuple[str, str]:
     if facts.doubts:
         return "do_not_use", "; ".join(facts.doubts)
     worst = max(missed, key=lambda target: target.error.exact.max_relative, default=None)
-    far = [*([] if worst is None else [_far(worst)]), *broken]
+    far = [*([] if worst is None else [_far(worst)]), *broken, *facts.deviated]
     if facts.unreachable:
         return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
     if facts.conflict:
@@ -80,11 +89,17 @@ def _word(facts: Facts) -> tuple[str, str]:
     if not far:
         if facts.unproved:
             return "do_not_use", "; ".join(facts.unproved)
-        return "reached", "every target is met"
+        if facts.is_optimal:
+            checked = ", also at all deviations within the tolerances that were checked"
+            return "reached", (facts.aim or "every target is met") + checked * facts.robust
+        far = [f"{facts.aim}; not known to be first-order optimal"]
     (before_violation, before), (violation, after) = facts.merits
+    gain = IMPROVED * before
+    if facts.aim:  # all limits are kept: whatever is gained is one
+        gain = GAINED * abs(before)
     if violation > MET:
         return "do_not_use", f"no design was found that meets what is asked: {_all(far)}"
-    if before_violation > MET or after < (1.0 - IMPROVED) * before:
+    if before_violation > MET or after < before - gain:
         though = "" if worst is None else _though(worst)
         return "improved", f"better than the initial design; {_all(far)}{though}"
     return "do_not_use", f"no better than the initial design: {_all(far)}"
@@ -94,7 +109,7 @@ def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
     if word not in ("reached", "improved"):
         return f"{word.replace('_', ' ')}: {reason}"
     wanted = [target for target in facts.targets if target.asked.is_goal] or facts.targets
-    error = max(target.error.exact.max_relative for target in wanted)
+    error = max((target.error.exact.max_relative for target in wanted), default=0.0)
     if facts.max_error is None or error <= facts.max_error:
         return None
     return f"worst error {100 * error:.3g} %, over the {100 * facts.max_error:g} % of " + (

@@ -18,13 +18,14 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.optimum import Found
-from eigassign.study.design.variants import Task, variant_of
+from eigassign.study.design.search.optimum import Found
+from eigassign.study.design.search.variants import Task, variant_of
+from eigassign.study.meaning.levers import FEW, anatomies
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
-from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
+from eigassign.study.results import Meaning, ModeAnatomy, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -68,8 +69,49 @@ def study_meaning(
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
         trade_off=trade_off(scene, found) if found and studies is Studies.ALL else None,
         unreachable=beyond,
+        anatomies=_anatomies(scene, answer.y, wanted, exact, max_error, notes),
         notes=tuple(notes),
     )
+
+
+def _anatomies(
+    scene: Scene,
+    y: Floats,
+    wanted: Sequence[Requirement],
+    exact: Solved,
+    max_error: float,
+    notes: list[str],
+) -> tuple[ModeAnatomy, ...]:
+    """The modes of the targets that are missed, where they are asked for, at some samples."""
+    samples = scene.path.spread(FEW)
+    numbers: dict[str, NDArray[np.intp]] = {}
+    for one in (w for w in wanted if misses(w, exact, max_error)):
+        worst = one.rows.start + int(np.abs(one.errors(exact)).argmax())
+        samples = np.union1d(samples, [worst])
+        named = {
+            f"mode {k}": np.full(len(exact.hz), k) for k in one.near(exact, exact) or one.modes
+        }
+        if one.followed:
+            shapes = zip(one.followed, one.followed_numbers, strict=True)
+            named = {mode.name: exact.numbers[:, k] for mode, k in shapes}
+        for name, own in named.items():
+            known = numbers.setdefault(name, np.zeros(len(exact.hz), dtype=np.intp))
+            known[one.rows] = own[one.rows]
+    if not numbers:
+        return ()
+    of_samples = {name: own[samples] for name, own in numbers.items()}
+    q = scene.path.at(y)[0][samples]
+
+    def where(k: int) -> str:
+        return scene.path.where(int(samples[k]))
+
+    try:
+        found = tuple(anatomies(scene.model, q, y, of_samples, where))
+    except EigassignError as error:
+        notes.append(f"what the missed modes are is not known: {error}")
+        return ()
+    notes += (one.words for one in found)
+    return found
 
 
 def _tolerance(

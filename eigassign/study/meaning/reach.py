@@ -31,8 +31,8 @@ from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import catalogues
-from eigassign.study.design.response import DesignResponse, Glances, outlook_of, response_of
-from eigassign.study.design.variants import SPREAD, Designs
+from eigassign.study.design.search.response import DesignResponse, Glances, outlook_of, response_of
+from eigassign.study.design.search.variants import SPREAD, Designs
 from eigassign.study.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
@@ -62,7 +62,7 @@ def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
 def reach_rows(wanted: Sequence[Requirement], ranges: tuple[Solved, Solved]) -> Iterator[RangeRow]:
     """The range of each target's curve at every sample, and the least error that is left."""
     for w in wanted:
-        if w.terms and w.followed is None:
+        if w.terms and not w.followed:
             error = float(w.least_errors(*ranges).max())
             how = "proved" if len(w.terms) == 1 else "bounded"
             yield RangeRow(w.label, *w.curve_range(*ranges), how, error)
@@ -94,7 +94,9 @@ def unreachable(
         if not misses(w, exact, max_error):
             continue
         allowed, errors = _allowed(w, max_error), w.errors(exact)
-        known = ranges is not None and w.followed is None
+        known = ranges is not None and not w.followed
+        # of listed values one beyond a limit may meet it, though another is nearer to that
+        listed = bool(scene.file.design.catalogues) and not w.is_goal
         others = [*scene.limits, *(one for one in wanted if not one.is_goal)] if w.is_goal else []
         if known and ranges is not None:
             left = w.least_errors(*ranges)
@@ -107,10 +109,10 @@ def unreachable(
                 free = not (others or scene.constraints or scene.file.design.catalogues)
                 best: float | None = low if low > w.lower[k] else high
                 if not free or len(w.terms) > 1:  # the corners need not keep all limits
-                    best = _nearest(scene, w, others, k, y, allowed)
+                    best = None if listed else _nearest(scene, w, others, k, y, allowed)
                 yield _words(scene, w, k, best, how)
                 continue
-        if w.terms and (others or not known):
+        if w.terms and (others or not known) and not listed:
             yield from _searched(scene, w, others, y, errors, allowed)
 
 
@@ -169,7 +171,7 @@ def _nearest(
     elastic = [one for one in others if not one.mode_terms and one.terms and not one.constraint]
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
-    followed = followers(alone, [replace(there, followed=wanted.followed), *beside])
+    followed = followers(alone, [replace(there, followed=wanted.followed), *beside, *bands])
     listed, found = catalogues(scene.file), []
     glances: dict[int, Glances] = {}
     for below in Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]:

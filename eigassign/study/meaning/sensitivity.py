@@ -16,7 +16,7 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, 
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
-from eigassign.study.design.variants import PosedProblem
+from eigassign.study.design.search.variants import PosedProblem
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 
 Floats = NDArray[np.float64]
@@ -52,16 +52,20 @@ def _largest(values: Floats) -> float:
 
 
 def error_kind(problem: DesignProblem, asked: Requirements) -> str:
-    """The objective F in words: an error only where nothing has a price."""
-    if not asked.goals and problem.prices is not None:
-        return "price"
-    if not asked.goals or problem.prices is not None:
+    """The objective F in words: an error, room or a frequency only where nothing has a price."""
+    if asked.aims and problem.cost is None:
+        return "room" if asked.aims[0].kind != "highest" else "frequency"
+    if problem.cost is not None and not asked.goals and not asked.aims:
+        return "price" if problem.cost.free or not problem.cost.of_mass else "mass"
+    if not asked.goals or problem.cost is not None:
         return "objective"
     return "worst error" if problem.objective is Objective.WORST_CASE else "rms error"
 
 
 def as_error(kind: str, F: float) -> float:
     """F as the quantity of `error_kind`."""
+    if kind in ("room", "frequency"):
+        return -F
     return float(np.sqrt(max(F, 0.0))) if kind == "rms error" else F
 
 
@@ -78,7 +82,7 @@ def relaxed_limits(
             amount = _rounded(0.5 * amount)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
         change = f"{before:.4g} → {after:.4g}"
-        if kind.endswith("error"):
+        if kind.endswith("error") or kind == "room":
             change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
         yield RelaxedRow(
             row.name, row.kind, row.side, amount, unit, kind, before, after,

@@ -10,7 +10,6 @@ which is not proved.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,16 +17,14 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
-from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, followers, solve_design
-from eigassign.study.monotone import corners, effects
+from eigassign.study.design.search.response import reduced_about
+from eigassign.study.monotone import box_corners, corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want
-MOST_SIDES = 6  # of a box with at most as many corners as there are draws
-POINTS = 5  # poses along the trajectory about which it is made
 DOUBTFUL = 0.01  # estimate of its error, relative, with which nothing can be said
 
 Ranges = Callable[[Floats], tuple[Solved, Solved]]  # of a design: between what each mode is
@@ -41,23 +38,18 @@ def study_tolerance(
     Raises EigassignError where a design within the tolerances has no frequencies, AccuracyError
     where the reduced model cannot be trusted.
     """
-    columns = scene.file.design.parameters.values()
-    given = [column.tolerance for column in columns]
-    spread = np.array([0.0 if t is None else t.deviation(v) for t, v in zip(given, y, strict=True)])
-    if not spread.any():
+    lower, upper = scene.tolerances.box(y)
+    if not (upper > lower).any() or not wanted:
         return None
     own = followers(scene, wanted)
-    effect = effects(scene.file)
-    lower, upper = y - spread, y + spread
-    lower = np.where(effect != 0.0, np.maximum(lower, np.minimum(y, 0.0)), lower)
-    drawn = np.flatnonzero((spread > 0.0) & (effect == 0.0))
+    drawn = np.flatnonzero((upper > lower) & (effects(scene.file) == 0.0))
     designs, ranges = y[None], _exact(scene, own, exact.hz.shape[1])
     how = "followed" if own else "proved"
     if len(drawn):
         from scipy.stats import qmc  # half a second, and most runs draw nothing
 
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
-        points = np.concatenate([points, _corners(len(drawn))])
+        points = np.concatenate([points, box_corners(len(drawn))])
         designs, how = np.repeat(y[None], len(points), axis=0), "sampled"
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
         pencil = scene.model.pencil
@@ -89,27 +81,23 @@ def _rows(
         for w, error in zip(wanted, errors, strict=True)
     )
     pairs = list(zip(wanted, errors, strict=True))
-    own = [pair for pair in pairs if pair[0].is_goal] or pairs
-    before = max(float(np.abs(w.errors(exact)).max()) for w, _ in own)
-    after = max(error for _, error in own)
+    missed = [pair for pair in pairs if not pair[0].is_aim]
+    own = [pair for pair in pairs if pair[0].is_goal] or missed
+    before = max((float(np.abs(w.errors(exact)).max()) for w, _ in own), default=0.0)
+    after = max((error for _, error in own), default=0.0)
     said = "bounded" if any(row.how == "bounded" for row in rows) else how
     tried = {
         "proved": "proved",
         "bounded": "at most",
         "followed": "the worst of both corners",
     }.get(said, f"the worst of {DRAWS} draws and of corners")
-    words = (
-        f"with every tolerance at its worst: worst error {100 * before:.3g} → "
-        f"{100 * after:.3g} % ({tried})"
-    )
+    changes = [f"worst error {100 * before:.3g} → {100 * after:.3g} %"] if own else []
+    for aim, row in zip(wanted, rows, strict=True):
+        if aim.is_aim:
+            least = aim.curve(exact).min(), row.lowest_hz.min()
+            changes.insert(0, "mode {} at least {:.4g} → {:.4g} Hz".format(aim.mode, *least))
+    words = f"with every tolerance at its worst: {', '.join(changes)} ({tried})"
     return ToleranceRows(rows, before, after, words)
-
-
-def _corners(n: int) -> Floats:
-    """The corners of a box of n sides 0 to 1; of more than six those along a face or an edge."""
-    if n <= MOST_SIDES:
-        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
-    return np.concatenate([np.tri(n), 1.0 - np.tri(n), np.eye(n), 1.0 - np.eye(n)])
 
 
 def _how(wanted: Requirement, how: str) -> str:
@@ -127,12 +115,8 @@ def _exact(scene: Scene, own: Sequence[Follower], count: int) -> Ranges:
 
 def reduced_ranges(scene: Scene, y: Floats, count: int) -> Ranges:
     """Frequencies less and plus their estimated error, from a reduced model about a design."""
-    q = scene.path.at(y)[0]
-    points = np.unique(np.linspace(0, len(q) - 1, POINTS).round().astype(int))
-    about = np.repeat(y[None], len(points), axis=0)
-    reduced = reduce(scene.model.pencil, q[points], about, tuple(range(1, count + 1)))
-
-    nothing, numbers = np.zeros((len(q), 0)), np.zeros((len(q), 0), dtype=np.intp)
+    reduced, n = reduced_about(scene, y, count), len(scene.path.q)
+    nothing, numbers = np.zeros((n, 0)), np.zeros((n, 0), dtype=np.intp)
 
     def ranges(y: Floats) -> tuple[Solved, Solved]:
         q = scene.path.at(y)[0]

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import Optimum, minimise
 from eigassign.errors import EigassignError
-from eigassign.study.design.optimum import Found
+from eigassign.study.design.search.optimum import Found
+from eigassign.study.design.search.variants import cost_of
 from eigassign.study.meaning.sensitivity import as_error, error_kind
 from eigassign.study.results import TradeOff, TradeOffPoint
 from eigassign.study.scene import Scene
@@ -39,14 +40,9 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
     variant, best = found.variant, found.best
     if not variant.requirements.goals or found.chosen or best.seen.violation > MET:
         return None
-    priced = variant.problem.prices is not None
-    problem = replace(variant.problem, prices=None)
-    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
-
-    def price(y: Floats) -> tuple[float, Floats]:  # of the change, in the file's units
-        return float(prices @ (y - scene.initial)), prices
-
-    quantity: Amount = price if priced else scene.model.total_mass
+    price, problem = cost_of(scene), replace(variant.problem, cost=None)  # in the file's units
+    priced = price is not None
+    quantity: Amount = scene.model.total_mass if price is None else price
     high, first = quantity(best.y)[0], quantity(scene.initial)[0]
     low = min(first, high)
     if high - low <= SAME * abs(high):

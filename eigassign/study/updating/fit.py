@@ -33,7 +33,7 @@ from eigassign.modal.slopes import in_hz
 from eigassign.study.accuracy import judged_poses
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.design.judgement import NEAR
-from eigassign.study.design.variants import spread_designs
+from eigassign.study.design.search.variants import spread_designs
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 from eigassign.study.weight import study_weight
 
@@ -312,7 +312,7 @@ def _parameters(
         interval = found.intervals[k]
         yield UpdatedParameter(
             name=name,
-            parameter=column.parameter,
+            parameter=column.said,
             unit=file.design_units[k],
             initial=float(initial[k]),
             value=float(found.y[k]),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import (
     Appraisal,
+    Cost,
     DesignProblem,
     LinearConstraint,
     ListedValues,
@@ -20,10 +21,9 @@ from eigassign.assignment import (
 )
 from eigassign.errors import InfeasibleError
 
-pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one
-
 Floats = NDArray[np.float64]
 MET = 1e-9
+slow = pytest.mark.slow  # half a minute each; the pipeline has a short one
 
 
 def curved(rng: np.random.Generator, n: int, m: int, limit: float) -> DesignProblem:
@@ -61,6 +61,7 @@ def brute_force(
     return sorted(found)
 
 
+@slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("limit", [100.0, 1.2])
 def test_the_best_combination_is_that_of_brute_force(seed: int, limit: float) -> None:
@@ -75,6 +76,7 @@ def test_the_best_combination_is_that_of_brute_force(seed: int, limit: float) ->
     assert chosen.search.exhausted
 
 
+@slow
 def test_where_no_combination_meets_the_limits_the_one_that_misses_them_least_is_found() -> None:
     rng = np.random.default_rng(1)
     problem, catalogues = curved(rng, 5, 7, 0.01), lists(rng)
@@ -85,6 +87,7 @@ def test_where_no_combination_meets_the_limits_the_one_that_misses_them_least_is
     assert chosen.optima[0].seen.violation == pytest.approx(violation, rel=1e-7)
 
 
+@slow
 def test_combinations_keep_linear_limits() -> None:
     rng = np.random.default_rng(2)
     catalogues = lists(rng)
@@ -99,6 +102,7 @@ def test_combinations_keep_linear_limits() -> None:
         choose(replace(problem, constraints=(impossible,)), catalogues, [np.zeros(5)])
 
 
+@slow
 def test_without_time_the_nearest_combination_is_the_answer() -> None:
     rng = np.random.default_rng(3)
     problem, catalogues = curved(rng, 5, 7, 100.0), lists(rng)
@@ -108,3 +112,58 @@ def test_without_time_the_nearest_combination_is_the_answer() -> None:
     chosen = choose(problem, catalogues, [start], deadline=time.monotonic() - 1.0)
     assert chosen.search is None
     assert chosen.rows[0] == (2, 1, 3)
+
+
+# --- Prices of whole rows
+
+
+def priced_list(rng: np.random.Generator, name: str, columns: tuple[int, ...]) -> ListedValues:
+    """Nine rows whose price rises with their values, and by chance."""
+    rows = rng.uniform(-1, 1, (9, len(columns)))
+    prices = rows.sum(axis=1) + rng.normal(0.0, 0.3, 9)
+    return ListedValues(name, columns, rows, prices=tuple(prices.tolist()))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_linear_price_of_some_rows_is_above_none_of_theirs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    own = priced_list(rng, "a", tuple(range(rng.integers(1, 4))))
+    rows = tuple(rng.permutation(9)[: rng.integers(1, 10)].tolist())
+    slopes, constant = own.price_below(rows)
+    prices = np.array(own.prices)[list(rows)]
+    room = prices - own.rows[list(rows)] @ slopes - constant
+    assert room.min() == pytest.approx(0.0, abs=1e-12)
+    if len(rows) <= 1 + len(own.columns):  # a plane through all of them
+        assert np.abs(room).max() < 1e-9
+
+
+@slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("wanted", [True, False])
+def test_of_more_combinations_than_are_gone_through_the_cheapest_is_found(
+    seed: int, wanted: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    A, b, C = rng.normal(size=(3, 6)), rng.normal(size=3), rng.normal(size=(1, 6))
+    catalogues = tuple(
+        priced_list(rng, name, columns) for name, columns in
+        (("a", (0,)), ("b", (1, 2)), ("c", (3,)), ("d", (4, 5)))
+    )  # fmt: skip
+
+    def appraise(y: Floats) -> Appraisal:
+        residual, slopes = (A @ y - b, A) if wanted else (np.zeros(0), np.zeros((0, 6)))
+        return Appraisal(residual, slopes, C @ y + 0.5, C)
+
+    def price(y: Floats) -> float:
+        return sum(own.price(y) for own in catalogues)
+
+    cost = Cost(np.zeros(6), np.zeros(6), listed=price)
+    problem = DesignProblem(appraise, np.full(6, -1.0), np.full(6, 1.0), cost=cost)
+    every = np.array(list(itertools.product(range(9), repeat=4)))
+    Y = np.hstack([own.rows[k] for own, k in zip(catalogues, every.T, strict=True)])
+    F = sum(np.array(own.prices)[k] for own, k in zip(catalogues, every.T, strict=True))
+    F = F + (np.sum((Y @ A.T - b) ** 2, axis=1) if wanted else 0.0)
+    F[(Y @ C.T + 0.5).max(axis=1) > 0.0] = np.inf
+    chosen = choose(problem, catalogues, [np.zeros(6)])
+    assert chosen.count == 9**4
+    assert chosen.optima[0].objective == pytest.approx(F.min(), rel=1e-9)

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares, minimize
 
 from eigassign.assignment import (
     Appraisal,
+    Cost,
     DesignProblem,
     End,
     LinearConstraint,
@@ -148,7 +149,7 @@ def test_prices_alone_go_to_the_cheapest_design_that_meets_the_limits() -> None:
         return Appraisal(np.zeros(0), np.zeros((0, 3)), (2.2 - f) / 2.2, -slopes / 2.2)
 
     prices = np.array([3.0, 1.0, 1.5])
-    asked = problem(appraise=appraise, prices=prices, reference=np.zeros(3))
+    asked = problem(appraise=appraise, cost=Cost(prices, np.zeros(3)))
     found = minimise(asked, np.array([1.0, 0.0, 1.0]))
     assert found.seen.violation <= 1e-9
     random = np.random.default_rng(1)
@@ -175,7 +176,7 @@ def test_slopes_balance_where_the_fall_of_the_price_is_round_off(limit: float, d
 
     start, bounds = np.array([6.0, 3.0]), (np.array([0.5, 0.25]), np.array([50.0, 20.0]))
     prices = np.array([1.0, dear])
-    found = minimise(DesignProblem(appraise, *bounds, prices=prices, reference=start), start)
+    found = minimise(DesignProblem(appraise, *bounds, cost=Cost(prices, start)), start)
     assert found.end is End.OPTIMAL
     assert found.stationarity <= 1e-7
     assert found.seen.violation <= 1e-9

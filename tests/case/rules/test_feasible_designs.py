@@ -80,3 +80,25 @@ def test_an_i_profile_keeps_its_web_all_over_the_bounds(
     text = edited("rod: {shape: circle, diameter: 30 mm}\n", PROFILE)
     text = text.replace(DIAMETER, f"{{parameter: sections.rod.{key}, min: {low}, max: {high}}}")
     assert [path for path, _ in refusals(text)] == ([f"design.d.{bound}"] if bound else [])
+
+
+BOX = "rod: {shape: box, height: 60 mm, width: 40 mm, thickness: 3 mm}\n"
+
+
+@pytest.mark.parametrize(
+    ("key", "low", "high", "bound"),
+    [
+        ("thickness", 0.001, 0.017, "max"),
+        ("thickness", 0.001, 0.016, None),
+        ("width", 0.007, 0.1, "min"),
+        ("height", 0.008, 0.1, None),
+    ],
+)
+def test_a_box_keeps_a_hole_all_over_the_bounds(
+    key: str, low: float, high: float, bound: str | None
+) -> None:
+    text = edited("rod: {shape: circle, diameter: 30 mm}\n", BOX)
+    text = text.replace(DIAMETER, f"{{parameter: sections.rod.{key}, min: {low}, max: {high}}}")
+    found = refusals(text)
+    assert [path for path, _ in found] == ([f"design.d.{bound}"] if bound else [])
+    assert all("is no box whose torsion and shear are known well" in said for _, said in found)

@@ -17,8 +17,20 @@ ONE = "sections.rod.diameter: 2 cm"
 # fmt: off
 TARGETS = {
     "two kinds": ("{mode: 1, frequency: 1, ¦at_least: 3}", "at_least", "frequency is given already: write a target of its own"),
-    "no kind": ("¦{mode: 1}", "", "expected one of the keys frequency, at_least, at_most, keep_out, gap; got mode"),
+    "no kind": ("¦{mode: 1}", "", "expected one of the keys frequency, at_least, at_most, keep_out, gap, stiffness, compliance, sag; got mode"),
     "misspelt kind": ("{mode: 1, ¦frequncy: 3}", "frequncy", "did you mean 'frequency'?"),
+    "stiffness of nothing": ("{stiffness: {¦at: hand.tip, direction: [1, 0]}, at_least: 3}", "stiffness.at", "expected 'hand.start' or 'hand.end', got 'hand.tip'"),
+    "stiffness nowhere": ("{¦stiffness: {at: hand.end}, at_least: 3}", "stiffness.direction", "required key is missing"),
+    "stiffness to no side": ("{stiffness: {at: hand.end, ¦direction: [0, 0]}, at_least: 3}", "stiffness.direction", "has no direction: all components are zero"),
+    "stiffness out of the plane": ("{stiffness: {at: hand.end, ¦direction: [0, 0, 1]}, at_least: 3}", "stiffness.direction", "planar: needs 2 components (x, y), got 3"),
+    "stiffness at most": ("{stiffness: {at: hand.end, direction: [0, 1]}, ¦at_most: 3}", "at_most", "a stiffness has the limit at_least"),
+    "stiffness of any amount": ("¦{stiffness: {at: hand.end, direction: [0, 1]}}", "at_least", "required key is missing: stiffness (in N/m"),
+    "stiffness in N": ("{stiffness: {at: hand.end, direction: [0, 1]}, ¦at_least: 3 N}", "at_least", "which is force"),
+    "compliance at least": ("{compliance: {at: hand.end, direction: [0, 1]}, ¦at_least: 3}", "at_least", "a compliance has the limit at_most"),
+    "compliance as stiffness": ("{compliance: {at: hand.end, direction: [0, 1]}, ¦at_most: 3 N/um}", "at_most", "which is stiffness"),
+    "sag without weight": ("{¦sag: {at: hand.end}, at_most: 1 mm}", "sag", "nothing sags without mechanism.gravity: [0, -9.81]"),
+    "stiffness of a mode": ("{stiffness: {at: hand.end, direction: [0, 1]}, at_least: 3, ¦mode: 1}", "mode", "unknown key; allowed: weight"),
+    "stiffness and gap": ("{gap: {between: [1, 2], at_least: 2}, ¦stiffness: {at: hand.end, direction: [0, 1]}}", "stiffness", "gap is given already"),
     "no mapping": ("¦7", "", "expected a mapping, got 7"),
     "no mode": ("¦{at_least: 3}", "mode", "the number of a mode (or modes: [...])"),
     "mode and modes": ("{mode: 1, ¦modes: [2], at_most: 3}", "modes", "mode is given already"),
@@ -35,7 +47,9 @@ TARGETS = {
     "band of one number": ("{¦keep_out: 50 Hz}", "keep_out", "expected [low, high] or {harmonic"),
     "harmonic of nothing": ("{¦keep_out: {harmonic: 2, margin: 5 %}}", "keep_out.of", "required key is missing"),
     "margin of all": ("{keep_out: {harmonic: 2, of: 3, ¦margin: 100 %}}", "keep_out.margin", "must be < 1"),
-    "followed band": ("{keep_out: [1, 2], ¦mode: {like: 1, at: {time: 0}}}", "mode", "expected a whole number, got a mapping"),
+    "followed band": ("{keep_out: [1, 2], mode: {like: 1, at: {¦time: 3}}}", "mode.at.time", "3 s is outside"),
+    "gap of no mode": ("{gap: {between: [1, ¦{like: 1}], at_least: 2}}", "gap.between[1].at", "required key is missing"),
+    "gap of one shape": ("{gap: {¦between: [{like: 1, at: {time: 0}}, {like: 1, at: {time: 0}}], at_least: 2}}", "gap.between", "got the mode like mode 1 (t = 0 s) twice"),
     "gap in itself": ("{gap: {¦between: [1, 1], at_least: 2}}", "gap.between", "a gap is between two modes, got 1 twice"),
     "gap downwards": ("{gap: {¦between: [2, 1], at_least: 2}}", "gap.between", "the lower mode comes first: [1, 2]"),
     "gap of a mode": ("{gap: {between: [1, 2], at_least: 2}, ¦mode: 1}", "mode", "unknown key; allowed: weight"),
@@ -99,8 +113,24 @@ ASSIGNMENT = {
     "unknown key": ("{¦step: 3}", "step", "did you mean 'steps'"),
     "worst case in one shot": ("{method: one_shot, ¦objective: worst_case}", "objective", "is not least_squares; method: one_shot takes frequency targets"),
 }
+NOT_OF_OBJECTIVES = {
+    "highest of nothing": ("{objective: {¦highest: none}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest", "expected a whole number, got 'none'"),
+    "highest of the zeroth": ("{objective: {¦highest: 0}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest", "must be >= 1"),
+    "highest without mode": ("{objective: {¦highest: {}}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest.mode", "required key is missing"),
+    "highest nowhere": ("{objective: {highest: {mode: 1, ¦trajectory: go}}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest.trajectory", "go"),
+    "frequency for the lightest": ("{objective: lightest}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective lightest comes near to no frequency: write at_least, at_most or both"),
+    "frequency of the highest": ("{objective: {highest: 1}}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective highest comes near to no frequency"),
+    "nothing to be wide": ("{¦objective: widest}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective", "there is no keep_out or gap target"),
+    "highest in one shot": ("{method: one_shot, ¦objective: {highest: 1}}", "targets:\n" + T, "", "assignment.objective", "take method: sequential"),
+    "price in one shot": ("{method: one_shot}", D, "  ¦mass: {price: 3}\n", "design.mass", "prices the mass; method: one_shot"),
+    "price of a length": ("{}", D, "  mass: {¦price: 3 / mm}\n", "design.mass.price", "mm"),
+    "price in words": ("{}", D, "  mass: {¦price: dear}\n", "design.mass.price", "expected a number, got text 'dear'"),
+    "price of nothing": ("{}", D, "  mass: {¦price: 0}\n", "design.mass.price", "must be > 0"),
+    "mass without anything": ("{}", D, "  ¦mass: {}\n", "design.mass", "the mass needs min, max or both, or a price"),
+}
 NOT_IN_ONE_SHOT = {
     "limit": (T, "  - {mode: 1, ¦at_least: 3}\n", "targets[0].at_least"),
+    "stiffness": (T, "  - {¦stiffness: {at: hand.end, direction: [0, 1]}, at_least: 3}\n", "targets[0].stiffness"),
     "followed mode": (T, "  - {¦mode: {like: 1, at: {time: 0}}, frequency: 3}\n", "targets[0].mode"),
     "mass": (D, "  ¦mass: {max: 3}\n", "design.mass"),
     "torque": (D, "  ¦torque: {q1: {max: 3}}\n", "design.torque"),
@@ -140,6 +170,15 @@ def test_one_shot_refuses_by_name_what_its_program_cannot_take(
 ) -> None:
     text = edited(old, new) + "assignment: {method: one_shot}\n"
     check(text, path, "take method: sequential", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("keys", "old", "new", "path", "message"), NOT_OF_OBJECTIVES.values(), ids=NOT_OF_OBJECTIVES
+)
+def test_objectives_and_prices_say_what_they_cannot_take(
+    keys: str, old: str, new: str, path: str, message: str, tmp_path: Path
+) -> None:
+    check(edited(old, new or old) + f"assignment: {keys}\n", path, message, tmp_path)
 
 
 def test_a_constraint_does_not_name_choices(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -165,3 +167,85 @@ def test_the_start_may_lie_outside_bounds_and_lists_with_a_warning(
     found = [str(warning) for warning in with_entries(text).warnings]
     assert len(found) == len(messages)
     assert all(message in warning for message, warning in zip(messages, found, strict=True))
+
+
+# --- A price for each choice
+
+PRICED = """\
+  boom:
+    choices:
+      light: {sections.bar.area: 4 cm2, sections.bar.bending_inertia: 2 cm4, price: 12.5}
+      heavy: {price: 20, sections.bar.bending_inertia: 5 cm4, sections.bar.area: 6 cm2}
+"""
+TABLE = """\
+# of a supplier
+name;price;sections.bar.area [cm2];sections.bar.bending_inertia [cm4]
+light;12,5;4;2
+heavy;20;6;5
+"""
+
+
+def test_choices_have_a_price_each_that_is_no_column_of_the_design() -> None:
+    design = with_entries(PRICED).design
+    assert list(design.parameters) == ["m", "boom.area", "boom.bending_inertia"]
+    assert design.catalogues[0].prices == (12.5, 20.0)
+    assert with_entries(BOOM).design.catalogues[0].prices == ()
+
+
+def test_choices_of_a_table_are_those_of_the_case_file(tmp_path: Path) -> None:
+    (tmp_path / "bars.csv").write_text(TABLE)
+    text = edited(D, "  boom: {choices: {file: bars.csv}}\n")
+    from_file = parse(text.encode(), tmp_path / "case.yaml")
+    inline = with_entries(PRICED).design
+    assert from_file.design.catalogues == inline.catalogues
+    assert from_file.design.parameters == inline.parameters
+    assert list(from_file.files) == ["bars.csv"]
+    assert read(from_file.resolved()) == from_file
+    assert accepts(SCHEMA, read_yaml(text.encode(), "case.yaml").tree)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (", price: 12.5", "", "case.yaml:32:15: design.boom.choices.heavy.price: choice 'light'"),
+        ("price: 20, ", "", "choices.heavy: choice 'light' sets price too, and all must set"),
+        ("price: 20", "price: 20 kg", "heavy.price: expected a number without unit"),
+        (":\n    c", ":\n    price: {sections.bar.area: 3}\n    c", "each choice has a price of"),
+    ],
+)
+def test_prices_of_choices_that_make_no_sense_are_refused(
+    old: str, new: str, expected: str
+) -> None:
+    with pytest.raises(CaseError) as error:
+        with_entries(PRICED.replace(old, new))
+    assert expected in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("[cm4]", "[mm]", "column sections.bar.bending_inertia: [mm] is no unit of"),
+        ("sections.bar.area", "sections.bar.aera", "column sections.bar.aera: sections.bar has no"),
+        ("heavy", "light", "bars.csv:4: 'light' is listed already, in bars.csv:3"),
+        ("20;6", "x;6", "bars.csv:4: column price: 'x' is not a finite number"),
+        (TABLE, "name;price\na;3\n", "sets no property"),
+        (TABLE, "", "is not a text file|a header and rows are expected"),
+    ],
+)
+def test_tables_of_choices_that_make_no_sense_are_refused_with_their_line(
+    tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    (tmp_path / "bars.csv").write_text(TABLE.replace(old, new))
+    text = edited(D, "  boom: {choices: {file: bars.csv}}\n")
+    with pytest.raises(CaseError) as error:
+        parse(text.encode(), tmp_path / "case.yaml")
+    assert any(one in str(error.value) for one in expected.split("|"))
+
+
+def test_a_table_of_choices_lies_in_the_folder_of_the_case(tmp_path: Path) -> None:
+    (tmp_path / "bars.csv").write_text(TABLE)
+    (tmp_path / "cases").mkdir()
+    text = edited(D, "  boom: {choices: {file: ../bars.csv}}\n").encode()
+    with pytest.raises(CaseError, match="outside the folder of the case file"):
+        parse(text, tmp_path / "cases" / "case.yaml")
+    assert parse(text, tmp_path / "cases" / "case.yaml", allow_outside=True).design.catalogues

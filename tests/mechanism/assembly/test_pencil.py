@@ -228,6 +228,8 @@ def test_a_design_parameter_at_its_value_is_the_value_written_in_the_file(name: 
         ("tube", "outer_diameter", 0.03, {"thickness": 0.004}),
         ("rectangle", "width", 0.03, {"height": 0.01}),
         ("rectangle", "height", 0.01, {"width": 0.03}),
+        ("box", "thickness", 0.001, {"width": 0.03, "height": 0.02}),
+        ("box", "width", 0.015, {"thickness": 0.002, "height": 0.02}),
     ],
 )
 def test_every_measure_of_a_section_can_be_designed(

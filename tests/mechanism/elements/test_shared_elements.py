@@ -19,6 +19,7 @@ def tapered(shape: str, shear: bool, design: Tree) -> Tree:
     sizes: dict[str, tuple[Any, Any]] = {
         "tube": ({"outer_diameter": 0.05, "thickness": 0.004}, {"outer_diameter": 0.03}),
         "rectangle": ({"width": 0.02, "height": 0.05}, {"height": 0.03}),
+        "box": ({"width": 0.03, "height": 0.05, "thickness": 0.003}, {"height": 0.03}),
     }
     thick, change = sizes[shape]
     thick = {"shape": shape, **thick}
@@ -37,7 +38,7 @@ def tapered(shape: str, shear: bool, design: Tree) -> Tree:
 
 
 @pytest.mark.parametrize("shear", [False, True])
-@pytest.mark.parametrize("shape", ["tube", "rectangle"])
+@pytest.mark.parametrize("shape", ["tube", "rectangle", "box"])
 def test_a_taper_of_numbers_is_the_taper_of_a_design_at_its_value(shape: str, shear: bool) -> None:
     # elements one by one, as expressions in E, against all at once, as arrays
     E = {"parameter": "materials.m.youngs_modulus", "min": 6e10, "max": 8e10}

@@ -16,6 +16,7 @@ SECTIONS: dict[str, Tree] = {
     "tube": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.003},
     "bored": {"shape": "tube", "outer_diameter": 0.03, "inner_diameter": 0.02},
     "flat": {"shape": "rectangle", "width": 0.03, "height": 0.02},
+    "box": {"shape": "box", "width": 0.03, "height": 0.02, "thickness": 0.002},
     "round": {"shape": "circle", "diameter": 0.03},
     "profile": {
         "shape": "i_profile",
@@ -55,6 +56,8 @@ def varied(path: str, low: float, high: float, section: str | None = None) -> Mo
         ("sections.rod.inner_diameter", 0.01, 0.025, "bored", (0.03, 0.04)),
         ("sections.rod.height", 0.01, 0.05, "flat", (-0.03,)),
         ("sections.rod.diameter", 0.01, 0.05, "round", (-0.03,)),
+        ("sections.rod.thickness", 1e-3, 8e-3, "box", (0.0, 0.0081)),
+        ("sections.rod.width", 0.01, 0.05, "box", (0.0049,)),
         ("sections.rod.web_thickness", 1e-3, 5e-3, "profile", (0.031,)),
         ("sections.rod.flange_thickness", 1e-3, 5e-3, "profile", (0.02,)),
     ],

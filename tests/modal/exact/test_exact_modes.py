@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from chains import bar, model_of, random_chain, two_link
 from large import HELD, large_model
+from scipy import sparse
 
 from eigassign.errors import UsageError
+from eigassign.mechanism import factorise, largest_beside
 from eigassign.modal import Model, rounding_error
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
@@ -235,3 +237,15 @@ def test_a_mechanism_without_coordinates_and_design_has_modes() -> None:
     assert model.n_rigid == 0
     assert model.frequencies([], [], 2).shape == (1, 2)
     assert model.frequencies(np.zeros((3, 0)), np.zeros((3, 0)), 2).shape == (3, 2)
+
+
+def test_what_is_beside_some_of_many_equal_modes_is_another_of_them() -> None:
+    K = sparse.csc_array(np.diag(np.linspace(1.0, 5.0, 40)))
+    mu = np.append(np.full(4, 2.0), np.linspace(1.9, 0.1, 36))
+    root = np.sqrt(K.diagonal())
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((40, 40)))[0]
+    M = root[:, None] * (turn * mu) @ turn.T * root
+    W = turn[:, :3] / root[:, None]
+    largest, w = largest_beside(factorise(K), K.T, lambda v: M @ v, W, 0.0)
+    assert largest == pytest.approx(2.0, rel=1e-12)
+    np.testing.assert_allclose(W.T @ (K @ w), 0.0, atol=1e-9)

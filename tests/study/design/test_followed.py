@@ -17,7 +17,14 @@ from eigassign.assignment import Requirement, Solved, requirements_of
 from eigassign.case import parse
 from eigassign.errors import CaseError, LostModeError
 from eigassign.pipeline import Stages, prepare
-from eigassign.study import Scene, followers, require_one_shape, response_of, solve_design
+from eigassign.study import (
+    Scene,
+    find_answer,
+    followers,
+    require_one_shape,
+    response_of,
+    solve_design,
+)
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}
@@ -227,3 +234,37 @@ def test_modes_that_coincide_by_symmetry_are_followed_together() -> None:
     halfway = with_target("0.5")
     with pytest.raises(CaseError, match="modes 3 and 4 and 5 and 6 coincide there"):
         require_one_shape(halfway, asked(halfway))
+
+
+def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
+    """The rail, mode 1 or 2, goes through the band; the mast keeps out of it, above or below."""
+    band = {"keep_out": [18.0, 40.0], "mode": MAST_LIKE}
+    rail = {"mode": RAIL_LIKE, "frequency": 25.0}
+    for lamp in (0.4, 1.5, 3.0):
+        scene = scene_of(case([rail, band], design={"lamp": {**LAMP, "max": 3.0}}))
+        wanted = asked(scene)
+        y = np.array([lamp])
+        one = wanted[1]
+        found = solve_design(scene, followers(scene, wanted), y)
+        mast = halves(scene.path.q, (0.03, lamp))[:, 1]
+        np.testing.assert_allclose(one.curve(found), mast, rtol=1e-9)
+        off = np.minimum(mast / 18.0 - 1.0, 1.0 - mast / 40.0)
+        assert one.errors(found).max() == pytest.approx(max(0.0, off.max()), rel=1e-8, abs=1e-15)
+    best = find_answer(scene, wanted, lambda line: None)
+    assert best.found is not None
+    (row,) = best.found.clearances
+    mast = float(MAST.frequencies([], best.y, 1)[0, 0])
+    assert row.clear
+    above = mast / (1.0 + row.raised) / 40.0 - 1.0
+    assert row.room == pytest.approx(1.0 - mast / 18.0 if row.below else above, rel=1e-6)
+
+
+def test_the_gap_between_followed_modes_is_that_of_their_halves() -> None:
+    gap = {"gap": {"between": [RAIL_LIKE, MAST_LIKE], "at_least": 4.0}}
+    scene = scene_of(case([gap]))
+    (one,), y = asked(scene), (0.03, 0.9)
+    rail, mast = halves(scene.path.q, y).T
+    np.testing.assert_allclose(one.curve(solved(scene, y)), mast - rail, rtol=1e-8)
+    answer = find_answer(scene, asked(scene), lambda line: None)
+    rail, mast = halves(scene.path.q, answer.y).T
+    assert (mast - rail).min() >= 4.0 - 1e-6

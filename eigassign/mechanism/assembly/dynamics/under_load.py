@@ -65,7 +65,12 @@ from eigassign.mechanism.elements.profiles import SHARES, STATIONS
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
-from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
+from eigassign.mechanism.kinematics.parameters import (
+    ModelParameters,
+    is_imported,
+    link_type,
+    node_position,
+)
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply, vector
 from eigassign.mechanism.kinematics.topology import GROUND, NodeName, split
 from eigassign.series.compiler import CompiledArrays, compile_arrays
@@ -88,7 +93,7 @@ class Strut(NamedTuple):
 
     link: int
     slots: Ints  # (n_nodes, 6)
-    mass: float  # of its own, kg
+    mass: float  # of its own, kg; where ρ varies its volume
 
 
 class End(NamedTuple):
@@ -627,7 +632,7 @@ def stiffness_under_load(
         add_bilinear(K, inputs.block(), turn, turn)
     struts = []
     for name in names:
-        if link_type(case, name) == "superelement":
+        if is_imported(case, name):
             mesh = nodes.meshes[name]
             wrenches = [(node, inputs.wrench()) for node in mesh.nodes]
             terms = strut_terms(mesh, wrenches, inputs.wrench(3), nodes.space)
@@ -676,7 +681,7 @@ def stiffness_under_load(
         inner=np.concatenate([np.zeros(0, dtype=np.intp), *inner]),
         springs=patterns[1],
         bodies=patterns[2],
-        elements=[(each, strand.profiles[0][0].shear is not None) for each, strand in strands],
+        elements=[(each, strand.profiles[0][0].shear_z is not None) for each, strand in strands],
         sites=[
             Site(names.index(n), slots((n, node)), link_type(case, n) == "rigid")
             for n, node in sites
@@ -743,7 +748,7 @@ def _sites(
 
 
 def _own_mass(mesh: LinkMesh) -> float:
-    """Mass of a part that is known by its matrices, without its bodies."""
+    """Mass of a part that is known by its matrices, without bodies; where ρ varies its volume."""
     along = np.sum([t.matrix.toarray()[:, 0] for t in mesh.rigid], axis=0)
     return float(along @ (mesh.mass[0].matrix @ along))
 

@@ -44,7 +44,7 @@ from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.elements.profiles import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
-from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
+from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported
 from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects
 from eigassign.series.compiler import CompiledArrays
 
@@ -107,8 +107,8 @@ class VelocityTerms:
 
 
 def placeless(case: CaseFile) -> tuple[str, ...]:
-    """Superelements: nobody knows which way their inner dofs point, and so how they turn."""
-    return tuple(n for n in case.mechanism.links if link_type(case, n) == "superelement")
+    """Superelements and solids: which way their inner dofs point, and so turn, is not known."""
+    return tuple(n for n in case.mechanism.links if is_imported(case, n))
 
 
 def velocity_terms(

@@ -30,7 +30,10 @@ CROSSED = np.cross(AXES[:, None], AXES[None]).transpose(2, 0, 1)
 def strut_terms(
     mesh: LinkMesh, wrenches: Sequence[tuple[str, Objects]], g: Objects, space: str
 ) -> list[Term]:
-    """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes and g, m/s²."""
+    """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes and g, m/s².
+
+    g is times the coefficient of the part's own mass: the density of a solid.
+    """
     moved = {name: _motion(mesh, name) for name in mesh.nodes}
     kept = [d - 3 for d in DOFS[space] if d >= 3]
     phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)

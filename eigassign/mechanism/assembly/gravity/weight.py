@@ -50,7 +50,6 @@ from eigassign.mechanism.kinematics.rotations import (
     present,
     scaled,
     some,
-    vector,
 )
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, split
 from eigassign.series.expression import Scalar, atom_of, one_atom, parts
@@ -127,7 +126,7 @@ class Weight:
         for key, body in self.case.mechanism.bodies.items():
             at = split(body.at)
             if at[0] == link:
-                arm = vector(getattr(body, "offset", None) or (0.0,))
+                arm = self.parameters.vector(f"bodies.{key}.offset", body.offset)
                 mass = self.parameters.number(f"bodies.{key}.mass", body.mass)
                 if rigid:
                     arm, at = arm + self._place(at), (link, "@origin")
@@ -137,7 +136,8 @@ class Weight:
         data: Any = self.case.mechanism.links[link]
         turn = self.rows((link, "@origin"))[3:]
         mass = self.parameters.number(f"links.{link}.mass", data.mass)
-        add_arm(self.K, turn, scaled(g, mass), vector(getattr(data, "center", None) or (0.0,)))
+        center = self.parameters.vector(f"links.{link}.center", data.center)
+        add_arm(self.K, turn, scaled(g, mass), center)
         for node, wrench in self.statics.on_nodes[link]:
             add_arm(self.K, turn, wrench[:3], self._place((link, node)))
 
@@ -148,7 +148,7 @@ class Weight:
         written, wrench = edge.written, self.statics.through[edge.joint]
         own = self.motion.tree.of_joint(edge.joint)
         values = [self.parameters.freedom(k) for k in own]
-        joint = walked(self.case.mechanism.joints[edge.joint], False, values)
+        joint = walked(self.case, self.parameters, edge.joint, False, values)
         if edge.turned:
             back = joint.rotation
             wrench = handed(wrench * -1.0, back, joint.translation)
@@ -220,8 +220,8 @@ class Weight:
             case "frame":
                 terms = self._frame(name, whole)
             case _:
-                acting, g = self._on_nodes(name), self.statics.g[name]
-                return strut_terms(mesh, acting, g, self.nodes.space)
+                own = scaled(self.statics.g[name], whole.mass[0].coefficient)
+                return strut_terms(mesh, self._on_nodes(name), own, self.nodes.space)
         if mesh.reduction is None:
             return terms
         T = mesh.reduction.basis
@@ -300,7 +300,7 @@ class Weight:
             if link == name:
                 mass = self.parameters.number(f"bodies.{key}.mass", body.mass)
                 F = scaled(self.statics.g[name], mass)
-                arm = vector(getattr(body, "offset", None) or (0.0,))
+                arm = self.parameters.vector(f"bodies.{key}.offset", body.offset)
                 acting.append((node, np.concatenate([F, cross(arm, F)])))
         return acting
 

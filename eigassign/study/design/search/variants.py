@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Collection, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,20 +18,24 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import (
     Appraisal,
+    Cost,
     DesignProblem,
     Objective,
     best_first,
 )
 from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.exact.scenarios import Appraise, with_scenarios
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import ForbiddenBand, Margin
-from eigassign.assignment.requirements.requirement import Frequencies, Requirement
+from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
-from eigassign.study.design.followed import Follower, followers
-from eigassign.study.design.response import (
+from eigassign.study.design.followed import Follower, follow_all, followers, unfollowed
+from eigassign.study.design.one_shot import catalogues, price_of_one
+from eigassign.study.design.search.response import (
     DesignResponse,
     Glances,
     Outlook,
@@ -52,6 +55,7 @@ MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them
 class PosedProblem:
     """One choice of the number of modes below some bands, with the problem that it makes."""
 
+    task: Task
     below: tuple[tuple[str, int | None], ...]  # the band in words, and k; None of one left out
     requirements: Requirements
     problem: DesignProblem
@@ -68,9 +72,8 @@ class PosedProblem:
         least = self.problem.least
         if isinstance(least, Outlook):
             least = replace(least, requirements=some)
-        return replace(
-            self.problem, appraise=lambda y: some.appraise(y, self.response(y)), least=least
-        )
+        appraise = _appraise(self.task, some, self.response)
+        return replace(self.problem, appraise=appraise, least=least)
 
     def with_limits(self, names: Collection[str]) -> DesignProblem:
         """The problem with those limits only that are named."""
@@ -92,11 +95,16 @@ class Task:
     wanted: tuple[Requirement, ...]
     margins: tuple[Margin, ...] = ()  # by which modes keep off each band; none without bands
     models: ReducedModels | None = None  # that stand for exact solves
+    scenarios: tuple[Floats, ...] = ()  # in which it is asked too
+
+    def designs(self, y: Floats) -> list[Floats]:
+        """A design, and what it is in each scenario."""
+        return [y, *(self.scene.tolerances.deviated(y, sigma)[0] for sigma in self.scenarios)]
 
     @cached_property
     def bands(self) -> tuple[ForbiddenBand, ...]:
         """The bands along each trajectory for itself."""
-        return tuple(band for one in self.wanted for band in one.bands)
+        return tuple(_bands(self.wanted))
 
     @cached_property
     def glances(self) -> dict[int, Glances]:
@@ -144,74 +152,121 @@ def variant_of(task: Task, below: Sequence[int | None], missed: bool = False) ->
     """
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
-    has_goals = any(one.is_goal for one in wanted)
-    objective = Objective(scene.file.assignment.objective)
-    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
-    if has_goals:  # F is errors, and prices are in %² of them, in the worst case in %
-        prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
-    asked = [one for one in wanted if not one.bands]
+    aim = scene.file.assignment.named_objective
+    asked = [one for one in wanted if not one.bands and not one.is_aim]
+    aims = [one for one in wanted if one.is_aim]
+    aims += (one for one in asked if aim == "widest" and isinstance(one, ModeGap))
     for band, k, margin in zip(task.bands, below, task.margins, strict=True):
         if k is None:
             continue
         q = scene.path.at(scene.initial)[0][band.rows]
         above = mode_above(scene.model, k, band.counted, q, scene.initial)
         asked += band.kept_clear(k, above, margin)
+        aims += band.kept_clear(k, above, Margin()) if aim == "widest" else ()
     # linear limits are kept by every step; where they contradict, they are missed least
-    kept = not missed and constraints_agree(scene.constraints, Bounds(lower, upper))
+    kept = not (missed or task.scenarios)
+    kept = kept and constraints_agree(scene.constraints, Bounds(lower, upper))
     asked += (one for one in scene.limits if not kept or one.constraint is None)
     width = np.where(upper > lower, upper - lower, 1.0)
+    has_goals = any(one.is_goal for one in asked)
+    objective = Objective.LARGEST if aims else Objective.LEAST_SQUARES
+    objective = Objective(aim) if has_goals else objective
+    cost = cost_of(scene, 1.0 / price_of_one(scene.file))
     requirements = Requirements(
         asked=tuple(asked),
         time_weights=time_weights(scene.path),
         objective=objective,
-        least_change=(scene.initial, width) if not has_goals and not prices.any() else None,
+        least_change=None if has_goals or aims or cost else (scene.initial, width),
+        aims=tuple(aims),
     )
     response = response_of(scene, requirements.modes, task.followers, task.models)
     problem = DesignProblem(
-        appraise=lambda y: requirements.appraise(y, response(y)),
+        appraise=_appraise(task, requirements, response),
         lower=lower,
         upper=upper,
         constraints=scene.constraints if kept else (),
-        prices=prices if prices.any() else None,
-        reference=scene.initial,
+        cost=cost,
         least=outlook_of(scene, requirements, task.followers, task.glances),
-        objective=objective if has_goals else Objective.LEAST_SQUARES,
+        objective=objective,
     )
     named = zip((band.label for band in task.bands), below, strict=True)
-    return PosedProblem(tuple(named), requirements, problem, response)
+    return PosedProblem(task, tuple(named), requirements, problem, response)
+
+
+def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appraise:
+    """What sees a design by what is asked, in all scenarios of the task, by aims too."""
+
+    def nominal(y: Floats) -> Appraisal:
+        return asked.appraise(y, response(y))
+
+    largest = bool(asked.goals or asked.aims) and asked.objective is not Objective.LEAST_SQUARES
+    return with_scenarios(nominal, task.scene.tolerances, task.scenarios, largest)
+
+
+def cost_of(scene: Scene, unit: float = 1.0) -> Cost | None:
+    """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing.
+
+    What is chosen of lists with a price each counts in full. Of the lightest design the mass is
+    all that counts, in kg.
+    """
+    design, mass, n = scene.file.design, scene.model.total_mass, len(scene.initial)
+    if scene.file.assignment.objective == "lightest":
+        return Cost(np.zeros(n), scene.initial, 1.0, mass, is_affine=mass.is_affine)
+    prices = np.array([column.price or 0.0 for column in design.parameters.values()])
+    listed = [own for own in catalogues(scene.file) if own.prices]
+    of_mass = (design.mass and design.mass.price) or 0.0
+    if not of_mass and not prices.any() and not listed:
+        return None
+    return Cost(
+        prices=unit * prices,
+        reference=scene.initial,
+        of_mass=unit * of_mass,
+        mass=mass if of_mass else None,
+        free=mass(scene.initial)[0] if of_mass else 0.0,
+        is_affine=not of_mass or mass.is_affine,
+        listed=lambda y: sum(own.price(y) for own in listed),
+    )
 
 
 @dataclass(frozen=True)
 class Designs:
     """Designs all over the bounds with their frequencies, and what these say of bands.
 
-    ``hz`` are the lowest frequencies (n, count) of each on the samples of ``scene``, as many as
-    reach beyond every band; ``y`` (m, n_y) are the designs.
+    ``solved`` are the lowest frequencies of each on the samples of ``scene``, as many as reach
+    beyond every band, and those followed; ``y`` (m, n_y) are the designs.
     """
 
     scene: Scene
     bands: Sequence[ForbiddenBand]
     y: Floats
-    hz: Sequence[Floats]
+    solved: Sequence[Solved]
 
     @classmethod
-    def all_over(cls, scene: Scene, bands: Sequence[ForbiddenBand], count: int) -> Designs:
-        """The initial design, corners and the middle, and ``count`` spread ones."""
+    def all_over(cls, scene: Scene, wanted: Sequence[Requirement], count: int) -> Designs:
+        """The initial design, corners and the middle, and ``count`` spread ones.
+
+        Raises LostModeError where a followed mode is lost at all of them.
+        """
+        bands, own = tuple(_bands(wanted)), followers(scene, wanted)
         lower, upper = scene.bounds
         extremes = corners(scene.file, scene.initial, lower, upper)
         designs = [scene.initial, lower, upper, 0.5 * (lower + upper), *extremes]
         if len(lower):
             designs += list(spread_designs(scene.bounds, count, 1))
-        found = []
+        found: list[tuple[Floats, Solved]] = []
         for y in designs:
-            with suppress(EigassignError):
-                found.append((y, all_below(scene, bands, scene.path.at(y)[0], y)))
-        return cls(scene, bands, np.array([y for y, _ in found]), [hz for _, hz in found])
+            try:
+                found.append((y, solved_below(scene, bands, own, y)))
+            except EigassignError as error:
+                lost = error
+        if not found:
+            raise lost
+        return cls(scene, bands, *(np.array([y for y, _ in found]), [each for _, each in found]))
 
     @cached_property
     def counts(self) -> tuple[range, ...]:
         """The numbers of modes below each band, from the fewest to the most of any design."""
-        below = [[band.below(hz[band.rows]) for hz in self.hz] for band in self.bands]
+        below = [[band.below(each) for each in self.solved] for band in self.bands]
         return tuple(
             range(int(min(k.min() for k in own)), int(max(k.max() for k in own)) + 1)
             for own in below
@@ -224,7 +279,7 @@ class Designs:
         Of more than `MOST_CHOICES` not all are listed.
         """
         near = np.array(
-            [[int(np.median(b.below(hz[b.rows]))) for b in self.bands] for hz in self.hz]
+            [[int(np.median(b.below(each))) for b in self.bands] for each in self.solved]
         )
         listed = itertools.islice(itertools.product(*self.counts), MOST_CHOICES)
         return sorted(
@@ -235,8 +290,10 @@ class Designs:
     def best_of(self, variant: PosedProblem, most: int) -> list[Floats]:
         """The designs that a variant promises most from."""
         asked, modes, worths = variant.requirements, variant.requirements.modes, []
-        for y, hz in zip(self.y, self.hz, strict=True):
-            lowest = np.pad(hz, ((0, 0), (0, max(modes - hz.shape[1], 0))), constant_values=np.inf)
+        for y, each in zip(self.y, self.solved, strict=True):
+            lacking = ((0, 0), (0, max(modes - each.hz.shape[1], 0)))
+            lowest = np.pad(each.hz, lacking, constant_values=np.inf)
+            lowest = np.hstack([lowest, each.followed])
             seen = asked.appraise(y, Frequencies(lowest, np.zeros((*lowest.shape, len(y)))))
             worths.append((seen.violation, variant.problem(y, seen)))
         order = best_first(range(len(worths)), lambda k: worths[k])
@@ -255,8 +312,9 @@ def counts_of(
         each = []
         for band in bands:
             lower, upper = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
-            first = replace(band, lower=lower, upper=upper)
-            each.append(first.below(all_below(scene, [first], q[:, band.rows.start], designs)))
+            first = replace(band, lower=lower, upper=upper, rows=slice(0, len(designs)))
+            hz = all_below(scene, [first], q[:, band.rows.start], designs)
+            each.append(first.below(unfollowed(hz)))
     except EigassignError:
         alone = designs[:, None] if len(designs) > 1 else ()
         return list(dict.fromkeys(found for y in alone for found in counts_of(scene, bands, y)))
@@ -285,13 +343,35 @@ def all_below(scene: Scene, bands: Sequence[ForbiddenBand], q: Floats, y: Floats
         count = min(2 * count, available)
 
 
+def solved_below(
+    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
+) -> Solved:
+    """The same of a design (n_y,) at all samples, with the modes that are followed."""
+    alone = unfollowed(all_below(scene, bands, scene.path.at(y)[0], y))
+    if not own:
+        return alone
+    return replace(follow_all(scene.model, scene.path, own, y, 1).solved, hz=alone.hz)
+
+
+def _bands(wanted: Sequence[Requirement]) -> Iterator[ForbiddenBand]:
+    return (band for one in wanted for band in one.bands)
+
+
 def lacking(task: Task, y: Floats) -> list[Floats]:
     """What a design lacks to be clear of each band, by the number of modes below it from 0."""
     if not task.bands:
         return []
-    hz = all_below(task.scene, task.bands, task.scene.path.at(y)[0], y)
-    each = zip(task.bands, task.margins, strict=True)
-    return [band.errors_by_count(hz[band.rows], margin) for band, margin in each]
+    each = []
+    for one in task.designs(y):
+        solved = solved_below(task.scene, task.bands, task.followers, one)
+        both = zip(task.bands, task.margins, strict=True)
+        each.append([band.errors_by_count(solved, margin) for band, margin in both])
+    return [_worst_by_count(own) for own in zip(*each, strict=True)]
+
+
+def _worst_by_count(errors: Sequence[Floats]) -> Floats:
+    """The largest of each number of modes below, of those that all designs know."""
+    return np.asarray(np.max([one[: min(map(len, errors))] for one in errors], axis=0))
 
 
 def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING, SLIDING
 from eigassign.mechanism.elements.sections import section_values
-from eigassign.mechanism.kinematics.joints import mounting, sliding_axis
+from eigassign.mechanism.kinematics.joints import sliding_axis
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.parameters import link_type
-from eigassign.mechanism.kinematics.rotations import multiply
+from eigassign.mechanism.kinematics.rotations import mounting, multiply
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
 from eigassign.modal.model import Model, ModeShapes
@@ -176,8 +176,7 @@ def _symbols(
     file: CaseFile, model: Model, y: Floats, at: At, axes: Sequence[Floats]
 ) -> dict[str, Any]:
     """The joints, bodies and springs of poses."""
-    paths = [p.parameter for p in file.design.parameters.values()]
-    design = dict(zip(paths, y.tolist(), strict=True))
+    design = {path: f * y[k] for path, ((k, f),) in file.design.varied.items()}
     poses = model.poses
     return {
         "link_names": poses.links,
@@ -245,7 +244,8 @@ def _axis(file: CaseFile, poses: LinkFrames, edge: JointEdge) -> NDArray[np.obje
         ahead = -1.0 if edge.follower[1] == "end" else 1.0
         return np.asarray(multiply(R, ahead * _ALONG))
     axis = _ALONG if joint.type in RIDING else sliding_axis(joint)
-    turned = multiply(np.eye(3) if joint.type in RIDING else mounting(joint), axis)
+    mount = mounting(poses.parameters.angles(f"joints.{edge.joint}", joint))
+    turned = multiply(np.eye(3) if joint.type in RIDING else mount, axis)
     if edge.base == GROUND:
         return np.asarray(turned)
     return np.asarray(multiply(poses.motion.placement(edge.base[0]).world_rotation, turned))

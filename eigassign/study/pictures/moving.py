@@ -15,7 +15,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model, ModeShapes
-from eigassign.study.drawing import AMPLITUDE, extent_of, largest_of, spread_samples
+from eigassign.study.pictures.drawing import AMPLITUDE, extent_of, largest_of, spread_samples
 from eigassign.study.results import MovingMode, frozen
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import KEEP, ListedValues
-from eigassign.assignment.catalogues.choosing import MOST, RELAXED, Chosen, choose, combinations
+from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, are_few, choose, combinations
 from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.optima import NOTHING, SAME, Tally
@@ -22,18 +22,19 @@ from eigassign.assignment.exact.sequential import Optimum, minimise, worth
 from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import InfeasibleError
-from eigassign.study.design.clearance import check_clear, wanting
+from eigassign.study.design.clearance import check_band, wanting
 from eigassign.study.design.one_shot import catalogues
-from eigassign.study.design.response import reduced_models
-from eigassign.study.design.starts import (
+from eigassign.study.design.search.response import reduced_models
+from eigassign.study.design.search.starts import (
     Searched,
     coarse_to_fine,
     continued,
     most_starts,
     search_starts,
 )
-from eigassign.study.design.variants import (
+from eigassign.study.design.search.variants import (
     SPREAD,
     Designs,
     PosedProblem,
@@ -92,16 +93,28 @@ def find_optimum(
     wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
+    before: Found | None = None,
+    scenarios: Sequence[Floats] = (),
+    deadline: float | None = None,
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
+
+    In these ``scenarios`` too: first from the optima found ``before`` without some of them.
+    ``deadline`` is a time of `time.monotonic`, that of the case from now on unless given.
 
     No design is returned that is worse than the initial one. Where none meets all limits, it is the
     one that misses them least, relative to the limits.
     """
-    seconds = scene.file.assignment.seconds
-    deadline = np.inf if seconds is None else monotonic() + seconds
-    designs = [scene.initial, *starts][: most_starts(scene.file)]
-    return _Tree(scene, wanted, designs, deadline, progress).found()
+    deadline = deadline_of(scene.file) if deadline is None else deadline
+    near = () if before is None else [one.y for one in before.optima[:FEW]]
+    designs = [*near, scene.initial, *starts][: most_starts(scene.file)]
+    return _Tree(scene, wanted, designs, deadline, progress, scenarios).found()
+
+
+def deadline_of(file: CaseFile) -> float:
+    """The time of `time.monotonic` when a search that begins now has to end."""
+    seconds = file.assignment.seconds
+    return np.inf if seconds is None else monotonic() + seconds
 
 
 @dataclass(frozen=True)
@@ -140,9 +153,11 @@ class _Tree:
         starts: Sequence[Floats],
         deadline: float,
         progress: Callable[[str], None],
+        scenarios: Sequence[Floats] = (),
     ) -> None:
         bands = sum(len(one.bands) for one in wanted)
-        self.task = Task(scene, tuple(wanted), (Margin(MARGIN),) * bands)
+        margins = (Margin(MARGIN),) * bands
+        self.task = Task(scene, tuple(wanted), margins, scenarios=tuple(scenarios))
         models = None if followed_modes(scene.file) else reduced_models(scene)
         self.levels: dict[tuple[Margin, ...], tuple[Task, ...]] = {
             self.task.margins: coarse_to_fine(self.task, models)
@@ -150,7 +165,7 @@ class _Tree:
         self.listed = catalogues(scene.file)
         self.starts, self.deadline, self.progress = starts, deadline, progress
         few = self.at(self.task.margins)[0]
-        self.designs = Designs.all_over(few.scene, few.bands, SPREAD) if few.bands else None
+        self.designs = Designs.all_over(few.scene, few.wanted, SPREAD) if few.bands else None
         self.counts: tuple[Sequence[int], ...] = ()
         self.every: list[tuple[int, ...]] = []  # choices that combinations of catalogues have
         if self.designs is not None:
@@ -200,15 +215,27 @@ class _Tree:
         return self.account(answer, others)
 
     def roots(self) -> Iterator[_Branch]:
-        """Yield the branch without bands; or every choice that combinations of catalogues have."""
+        """Yield the branch without bands; or every choice that combinations of catalogues have.
+
+        Where none of these can be met, the others too: one may be missed by less.
+        """
         none: Counts = (None,) * len(self.counts)
         if not self.every:
             yield self.branch(none, self.starts, was=None if none else none)
-        for k, below in enumerate(self.every):
+        known, missed = self.every, True
+        likely = self.designs.choices if self.designs is not None and known else ()
+        others = [one for one in likely if one not in known]
+        for k, below in enumerate([*known, *others]):
+            if k == len(known):
+                if not missed:
+                    return
+                self.every = [*known, *others]
             if k == SEARCHES or (k and self.stopped):
                 self.untried = len(self.every) - k
                 return
-            yield self.branch(below, self.starts, was=below)
+            root = self.branch(below, self.starts, was=below)
+            missed = missed and root.best.seen.violation > MET
+            yield root
 
     def at(self, margins: tuple[Margin, ...]) -> tuple[Task, ...]:
         """The levels with limits drawn in so far."""
@@ -277,9 +304,14 @@ class _Tree:
     def divided(self, branch: _Branch) -> Iterator[_Branch]:
         """Yield the parts of a branch by the number of modes below the band that it is in most.
 
-        Or the branch settled, where it is in no band by more than it misses anyway.
+        Or the branch settled, where it is in no band by more than it misses anyway; where the room
+        is to be wide, where every band leaves as much as there is.
         """
         errors, missed = self.lacking(branch), max(branch.best.seen.violation, MET)
+        if self.task.scene.file.assignment.objective == "widest" and missed <= MET:
+            found = branch.searched.variant
+            has_rows = len(found.requirements.aims) > 0
+            missed = found.problem.measure(branch.best.seen.residual) + MET if has_rows else -np.inf
         nearest = [int(own.argmin()) for own in errors]
         open_ = [k for k, n in enumerate(branch.below) if n is None and errors[k].min() > missed]
         if not open_:
@@ -382,7 +414,7 @@ def _search_catalogues(
     """
     steps, near = task.scene.file.assignment.steps, starts[: KEEP + 1]
     relaxed = Searched(variant_of(task, below))
-    if prod(len(own.rows) for own in listed) > MOST:
+    if not are_few(listed, *task.scene.bounds):
         relaxed = search_starts(levels, below, starts, 0, deadline, progress)
         near = [*(found.y for found in relaxed.optima[:RELAXED]), *near]
 
@@ -411,17 +443,20 @@ def _search_catalogues(
 
 def _of_combinations(task: Task, listed: Sequence[ListedValues]) -> list[tuple[int, ...]]:
     """The choices that all combinations of catalogues have, where they are all that is designed."""
-    if not listed or prod(len(own.rows) for own in listed) > MOST:
+    are_followed = any(band.followed for band in task.bands)
+    if not listed or are_followed or not are_few(listed, *task.scene.bounds):
         return []
     _, lower, upper = combinations(listed, *task.scene.bounds)
     return counts_of(task.scene, task.bands, lower) if np.array_equal(lower, upper) else []
 
 
 def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...]:
-    """The bands that are not left out, checked at a design."""
-    q = task.scene.path.at(y)[0]
+    """The bands that are not left out, checked at a design, in the scenario of least room."""
     return tuple(
-        check_clear(task.scene.model, band, k, q[band.rows], y)
+        min(
+            (check_band(task.scene, task.followers, band, k, one) for one in task.designs(y)),
+            key=lambda row: (row.clear, row.room),
+        )
         for band, k in zip(task.bands, below, strict=True)
         if k is not None
     )

@@ -113,7 +113,10 @@ def response_of(
     lower, upper = scene.bounds
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
     moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
-    wanted = np.append(moving, upper > lower)
+    free = upper > lower
+    if scene.file.assignment.robust:  # what deviates has slopes, though it may have no choice
+        free = free | scene.tolerances.given
+    wanted = np.append(moving, free)
     own = scene.model, scene.path, wanted, count, followers, models
     return DesignResponse(*own, initial=scene.initial)
 
@@ -226,6 +229,7 @@ def outlook_of(
 
 # --- Reduced models
 
+POINTS = 5  # poses along the trajectory about which deviations are looked at
 TRUSTED = 1e-3  # relative, of the estimate; the errors themselves were below 1e-5
 
 
@@ -266,6 +270,14 @@ class ReducedModels:
             return bool(reduced.error_estimate(q, y).max() <= TRUSTED)
         except EigassignError:
             return False
+
+
+def reduced_about(scene: Scene, y: Floats, count: int) -> ReducedModel:
+    """The reduced model of the lowest ``count`` modes about a design (n_y,)."""
+    q = scene.path.at(y)[0]
+    points = np.unique(np.linspace(0, len(q) - 1, POINTS).round().astype(int))
+    about = np.repeat(y[None], len(points), axis=0)
+    return reduce(scene.model.pencil, q[points], about, tuple(range(1, count + 1)))
 
 
 def reduced_models(scene: Scene) -> ReducedModels | None:

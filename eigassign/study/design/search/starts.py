@@ -19,8 +19,8 @@ from eigassign.assignment.exact.optima import FINISHED, NOTHING, Tally, with_end
 from eigassign.assignment.exact.sequential import PAYS, End, Optimum, minimise, worth
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
-from eigassign.study.design.response import ReducedModels
-from eigassign.study.design.variants import (
+from eigassign.study.design.search.response import ReducedModels
+from eigassign.study.design.search.variants import (
     PosedProblem,
     Task,
     spread_designs,
@@ -162,12 +162,12 @@ def continued(before: Optimum, found: Optimum) -> Optimum:
 def _is_enough(search: Searched) -> bool:
     """True where more starts are not expected to lead to more optima, or exact solves are used up.
 
-    No errors at all cannot be improved; a price, which may be negative, can.
+    No errors at all cannot be improved; what is no error, such as a price, can.
     """
     if search.tally is None:
         return False
     violation, value = worth(search.optima[0])
-    if search.variant.problem.prices is None and violation <= MET and value <= NOTHING:
+    if search.variant.problem.is_error and violation <= MET and value <= NOTHING:
         return True
     return search.tally.unseen <= PAYS or search.variant.response.exact_solves > SOLVES
 

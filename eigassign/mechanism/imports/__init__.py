@@ -1,0 +1,14 @@
+"""Parts from other programs: their matrices, their nodes and their units.
+
+Read in this order; each imports only from those above it:
+
+    entries         what readers share: limits, places of entries, columns of one width
+    matrix_file     Matrix Market and NumPy
+    matlab          MATLAB's .mat
+    nastran         Nastran's DMIG cards and grid points
+    op4             Nastran's OUTPUT4, text and binary
+    harwell_boeing  Harwell–Boeing, as Ansys writes it
+    keyword_lists   Abaqus, CalculiX, Ansys: entries, freedoms of rows, nodes
+    reading         a file of any of them, told by its content
+    parts           K, M, rows and places of a link's nodes, in SI
+"""

@@ -1,0 +1,122 @@
+"""Lists of Abaqus, CalculiX and Ansys: entries of matrices, freedoms of rows, places of nodes.
+
+Each kind is told by its first lines:
+
+    1,1, 2,3, 1.5e+05   *MATRIX GENERATE of Abaqus: node, freedom, node, freedom, value
+    1 6  1.5e+05        .sti and .mas of CalculiX, COORDINATE of Abaqus: row, column, value
+    12.3                .dof of CalculiX: node.freedom of each row
+    7  12  ROTX         .mapping of Ansys: row, node, freedom
+    *MATRIX,TYPE=MASS   substructures: the lower triangle row by row, behind nodes and freedoms
+    *NODE               input files: node, x, y, z
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from functools import partial
+
+import numpy as np
+
+from eigassign.mechanism.imports import entries
+from eigassign.mechanism.imports.entries import LABEL, Contents, Floats, Ints, Matrix, UnfitError
+
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_COMMENTS = rb"\A(?:[ \t]*(?:\*[^\n]*)?\r?\n)*"
+_NEXT = rb"[ \t]*[, \t][ \t]*"
+_ENTRY = re.compile(
+    _COMMENTS + rb"[ \t]*-?\d+((?:" + _NEXT + rb"-?\d+){1,3})" + _NEXT + _NUMBER + rb"\s"
+)
+_DOFS = re.compile(rb"\A(?:[ \t]*\d+\.\d{1,2}[ \t]*\r?\n)+\Z")
+_FREEDOMS = (b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ")
+_MAPPED = re.compile(rb"^[ \t]*(\d+)[ \t]+(\d+)[ \t]+(U[XYZ]|ROT[XYZ])[ \t]*\r?$", re.MULTILINE)
+_BLOCK = re.compile(rb"^\*MATRIX, *TYPE *= *(STIFFNESS|MASS)[^\n]*\n([^*]*)", re.M | re.I)
+_ELEMENT = re.compile(
+    rb"^\*USER ELEMENT[^\n]*\n\*\* *ELEMENT NODES[^\n]*\n((?:\*\*[^\n]*\n)+)([^*]*)", re.M | re.I
+)
+_NODES = re.compile(rb"^\*NODE\b(?! *(?:FILE|PRINT|OUTPUT))[^\n]*\n([^*]*)", re.M | re.I)
+
+
+def read_entries(data: bytes) -> Contents | None:
+    """The one matrix of a list of entries, whose nodes are named or its rows counted from 1."""
+    entry = _ENTRY.match(data)
+    places = 1 + len(entry.group(1).replace(b",", b" ").split()) if entry else 0
+
+    def matrix() -> Matrix:
+        kinds = [*((f"i{k}", np.int64) for k in range(places)), ("value", np.float64)]
+        lines = io.BytesIO(data.replace(b",", b" "))
+        read = np.loadtxt(lines, dtype=kinds, comments="*", ndmin=1)
+        at = [read[f"i{k}"] for k in range(places)]
+        if places == 4:
+            return entries.labelled(
+                at[0] * LABEL + at[1], at[2] * LABEL + at[3], read["value"], True
+            )
+        n = int(max(at[0].max(), at[1].max()))
+        A = entries.assembled(n, at[0] - 1, at[1] - 1, read["value"], True)
+        return Matrix(A, grows=True)
+
+    return Contents({"": matrix}) if places in (2, 4) else None
+
+
+def read_substructure(data: bytes) -> Contents | None:
+    """The matrices of one user element; None of files without."""
+    heads, blocks = list(_ELEMENT.finditer(data)), list(_BLOCK.finditer(data))
+    if not blocks:
+        return None
+    names = [block.group(1)[:1].decode().upper().replace("S", "K") for block in blocks]
+    if len(heads) != 1 or len(set(names)) < len(names):
+        raise UnfitError("holds the matrices of several elements: write those of one substructure")
+    nodes = [int(word) for word in re.findall(rb"\d+", heads[0].group(1))]
+    freedoms = list[list[int]]()
+    for line in heads[0].group(2).split(b"\n"):
+        if numbers := [int(word) for word in line.replace(b",", b" ").split()]:
+            if freedoms:  # where they change
+                if numbers[0] > len(nodes):
+                    raise ValueError("a node too many")
+                freedoms += [freedoms[-1]] * (numbers[0] - 1 - len(freedoms))
+                numbers = numbers[1:]
+            freedoms.append(numbers)
+    freedoms += freedoms[-1:] * (len(nodes) - len(freedoms))
+    pairs = zip(nodes, freedoms, strict=True)
+    labels = np.array([LABEL * node + k for node, own in pairs for k in own], dtype=np.int64)
+    made = {n: partial(_triangle, b.group(2), labels) for n, b in zip(names, blocks, strict=True)}
+    return Contents(made)
+
+
+def _triangle(body: bytes, labels: Ints) -> Matrix:
+    n = len(labels)
+    entries.require_few(n, n * n // 2)
+    if len(body) > 100 * (n * n + 1):
+        raise ValueError("more values than rows")
+    words = body.replace(b",", b" ").split()
+    if len(words) not in (n * n, n * (n + 1) // 2) or len(np.unique(labels)) < n:
+        raise ValueError("other values than rows")
+    values = np.array(words, dtype=np.bytes_).astype(np.float64)
+    rows, columns = np.tril_indices(n) if len(words) != n * n else np.indices((n, n)).reshape(2, -1)
+    return Matrix(entries.assembled(n, rows, columns, values, half=True), labels)
+
+
+def read_labels(data: bytes) -> Contents | None:
+    """The labels of the rows of a matrix, in their order; None of other files."""
+    if _DOFS.match(data):
+        pairs = [word.split(b".") for word in data.split()]
+        return Contents(labels=np.array([LABEL * int(n) + int(k) for n, k in pairs]))
+    found = [(int(r), int(n), _FREEDOMS.index(k) + 1) for r, n, k in _MAPPED.findall(data)]
+    if [row for row, *_ in found] != list(range(1, len(found) + 1)):
+        raise ValueError("rows that are missing")
+    labels = np.array([LABEL * node + freedom for _, node, freedom in found])
+    return Contents(labels=labels) if found else None
+
+
+def read_nodes(data: bytes) -> Contents | None:
+    """The places of nodes; those of assemblies of instances are not known."""
+    blocks = list(_NODES.finditer(data))
+    if blocks and re.search(rb"^\*INSTANCE\b", data, re.M | re.I):
+        raise UnfitError("moves parts (*INSTANCE): write an input file without parts, or a CSV")
+    places: dict[int, Floats] = {}
+    for block in blocks:
+        for line in block.group(1).split(b"\n"):
+            if words := line.replace(b",", b" ").split():
+                place = np.array([*map(float, words[1:4]), *[0.0] * (4 - len(words))])
+                places[int(words[0])] = place
+    return Contents(places=places) if blocks else None

@@ -1,0 +1,417 @@
+"""A mesh of solid elements from a file: gmsh (.msh), Abaqus and CalculiX (.inp), Nastran (.bdf).
+
+The format is recognised by its content. Elements of lines and surfaces name nodes and do nothing
+else; solid ones of other kinds than `KINDS` are refused by name. Such files come from anywhere:
+their size is bounded before they are read, and messages quote names of formats only.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import MechanismError, UsageError
+from eigassign.files import MESH, how_to_raise, raised, read_bytes
+from eigassign.mechanism.solids.elements import KINDS
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
+
+_MESH_WITH = "; mesh with tetrahedra of 10 nodes (or of 4), or hexahedra of 20"
+_EDGES = {  # of each kind, where a format has another order than Abaqus
+    ("gmsh", 10): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+    ("gmsh", 20): (
+        *((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3)),
+        *((2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
+    ),
+    ("Nastran", 20): (
+        *((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7)),
+        *((4, 5), (5, 6), (6, 7), (7, 4)),
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SolidMesh:
+    """Nodes in the file's unit of length, solid elements by their number of nodes, sets of nodes.
+
+    Nodes within elements are in the order of `KINDS`; those of no element are left out.
+    """
+
+    x: Floats  # (n, 3)
+    elements: dict[int, Ints]  # (m, number of nodes)
+    sets: dict[str, Ints]
+
+
+class _UnfitError(Exception):
+    """The file is readable but its content is not what is wanted; begins with a verb."""
+
+
+@dataclass
+class _Raw:
+    """What is collected while a file is read: nodes and elements by id, sets of node ids."""
+
+    nodes: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    elements: dict[int, list[int]] = field(default_factory=dict)
+    sets: dict[str, set[int]] = field(default_factory=dict)
+
+    def add(self, name: str, nodes: Iterable[int]) -> None:
+        self.sets.setdefault(name, set()).update(nodes)
+
+
+def read_mesh(file: Path, key: str) -> SolidMesh:
+    """The mesh in a file; raises MechanismError at ``key`` for what is none, or has other elements.
+
+    The sets are gmsh's physical groups, Abaqus' node sets, element sets and surfaces, Nastran's
+    sets, and ``pid N`` of its surface elements of property N.
+    """
+    try:
+        return _read(read_bytes(file, MESH))
+    except (_UnfitError, UsageError) as error:
+        raise MechanismError(key, f"{file.name} {error}") from error
+    except (OSError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or "too large for this memory"
+        raise MechanismError(key, f"cannot read {file.name}: {reason}") from error
+    except (ValueError, IndexError, KeyError, StopIteration, OverflowError) as error:
+        message = f"cannot read {file.name}: it is damaged, or breaks off"
+        raise MechanismError(key, message) from error
+
+
+@lru_cache(maxsize=4)  # a case reads its meshes for each model anew
+def _read(data: bytes) -> SolidMesh:
+    head = data[:100_000].upper()
+    if data.lstrip().startswith(b"$MeshFormat"):
+        if b" 1 " in data.split(b"\n", 2)[1]:
+            raise _UnfitError("is binary: save it as ASCII (Mesh.Binary = 0)")
+        raw, program = _gmsh(data.decode("utf-8", "replace")), "gmsh"
+    elif re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
+        raw, program = _abaqus(data.decode("utf-8", "replace")), "Abaqus"
+    elif re.search(rb"^(BEGIN\s+BULK|GRID[ *,])", head, re.MULTILINE):
+        raw, program = _nastran(data.decode("utf-8", "replace")), "Nastran"
+    else:
+        raise _UnfitError(
+            "is no mesh that is known: expected gmsh's .msh (ASCII, 2.2 or 4.1), Abaqus' or "
+            "CalculiX's .inp, or Nastran bulk data (.bdf)"
+        )
+    return _numbered(raw, program)
+
+
+def _numbered(raw: _Raw, program: str) -> SolidMesh:
+    """Nodes by place instead of id, and those within elements in one order."""
+    if not raw.elements:
+        raise _UnfitError("has no solid elements" + _MESH_WITH)
+    used = sorted({node for nodes in raw.elements.values() for node in nodes})
+    if len(used) > raised(MOST):
+        most = f"more than {raised(MOST):g} are not read; {how_to_raise(len(used), MOST)}"
+        raise _UnfitError(f"has {len(used)} nodes: {most}")
+    place = {node: k for k, node in enumerate(used)}
+    if missing := place.keys() - raw.nodes.keys():
+        raise _UnfitError(f"has elements with nodes that it does not define, as {min(missing)}")
+    x = np.array([raw.nodes[node] for node in used], dtype=np.float64)
+    if not np.isfinite(x).all():
+        raise _UnfitError("has nodes at infinite places")
+    found = {}
+    for count, kind in KINDS.items():
+        own = {key: nodes for key, nodes in raw.elements.items() if len(nodes) == count}
+        if own:
+            order = list(range(count))
+            if (edges := _EDGES.get((program, count))) is not None:
+                given = {frozenset(edge): k for k, edge in enumerate(edges, len(kind.corners))}
+                order[len(kind.corners) :] = [given[frozenset(edge)] for edge in kind.edges]
+            rows = np.array([[place[node] for node in nodes] for nodes in own.values()])
+            found[count] = _checked(x, rows[:, order], count, list(own))
+    sets = {
+        name: np.array(sorted(place[node] for node in nodes if node in place), dtype=np.intp)
+        for name, nodes in raw.sets.items()
+    }
+    return SolidMesh(x, found, {name: nodes for name, nodes in sets.items() if len(nodes)})
+
+
+def _checked(x: Floats, elements: Ints, count: int, ids: Sequence[int]) -> Ints:
+    """Elements with their nodes outside in where they were inside out."""
+    kind, n = KINDS[count], len(KINDS[count].corners)
+    for k, (a, b) in enumerate(kind.edges, n):
+        ends = x[elements[:, a]], x[elements[:, b]]
+        off = np.linalg.norm(x[elements[:, k]] - 0.5 * (ends[0] + ends[1]), axis=1)
+        # an arc of a half circle bulges by half its chord; in a wrong order it is far more
+        far = off > 0.6 * np.linalg.norm(ends[1] - ends[0], axis=1)
+        if far.any():
+            raise _UnfitError(
+                f"has an element, {ids[int(far.argmax())]}, whose middle nodes are not between "
+                "its corners: they are missing, or in another order than its format has"
+            )
+    beside = (1, 3, 4) if count == 20 else (1, 2, 3)  # the first one, along ξ, η and ζ
+    corners = x[elements[:, (0, *beside)]]
+    volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    return np.where((volume < 0.0)[:, None], elements[:, kind.turned()], elements)
+
+
+# --- gmsh
+
+_GMSH = {4: 4, 11: 10, 17: 20}
+_GMSH_NODES = {15: 1, 1: 2, 8: 3, 2: 3, 9: 6, 3: 4, 10: 9, 16: 8, 20: 9, 21: 10, 26: 4, 27: 5}
+_GMSH_OTHER = {
+    5: "hexahedra of 8 nodes",
+    6: "wedges of 6 nodes",
+    7: "pyramids of 5 nodes",
+    12: "hexahedra of 27 nodes (save with Mesh.SecondOrderIncomplete = 1)",
+    13: "wedges of 18 nodes",
+    14: "pyramids of 14 nodes",
+    18: "wedges of 15 nodes",
+    19: "pyramids of 13 nodes",
+}
+
+
+def _gmsh(text: str) -> _Raw:
+    sections = dict(re.findall(r"^\$(\w+)\s*\n(.*?)^\$End\1", text, re.MULTILINE | re.DOTALL))
+    version = sections["MeshFormat"].split()[0]
+    if version not in ("2.2", "4.1"):
+        raise _UnfitError("is of a version of gmsh's format that is not read: save as 4.1 or 2.2")
+    named = re.findall(r'^\s*(\d+)\s+(\d+)\s+"(.*)"', sections.get("PhysicalNames", ""), re.M)
+    names = {(int(dim), int(tag)): name for dim, tag, name in named}
+    raw = _Raw()
+
+    def add(dim: int, tags: Iterable[int], kind: int, key: int, nodes: list[int]) -> None:
+        if kind in _GMSH:
+            raw.elements[key] = nodes
+        elif kind not in _GMSH_NODES:
+            raise _UnfitError(f"has {_GMSH_OTHER.get(kind, 'elements of high order')}{_MESH_WITH}")
+        for tag in tags:
+            raw.add(names.get((dim, tag), str(tag)) if dim < 3 else "", nodes)
+
+    if version == "2.2":
+        for row in sections["Nodes"].splitlines()[1:]:
+            tag, *x = row.split()
+            raw.nodes[int(tag)] = tuple(map(float, x))
+        for row in sections["Elements"].splitlines()[1:]:
+            key, kind, count, physical, *rest = map(int, row.split())
+            dim = 0 if kind == 15 else 1 if kind in (1, 8, 26, 27) else 2
+            nodes = rest[count - 1 :]
+            add(3 if kind in _GMSH else dim, [physical] if physical else [], kind, key, nodes)
+    else:
+        _gmsh_4(sections, raw, add)
+    raw.sets.pop("", None)
+    return raw
+
+
+def _gmsh_4(
+    sections: dict[str, str],
+    raw: _Raw,
+    add: Callable[[int, Iterable[int], int, int, list[int]], None],
+) -> None:
+    physical: dict[tuple[int, int], list[int]] = {}
+    rows = iter(sections.get("Entities", "0 0 0 0").splitlines())
+    for dim, count in enumerate(map(int, next(rows).split())):
+        for _ in range(count):
+            entity = next(rows).split()
+            first = 4 if dim == 0 else 7
+            own = entity[first + 1 : first + 1 + int(entity[first])]
+            physical[dim, int(entity[0])] = [abs(int(tag)) for tag in own]
+    rows = iter(sections["Nodes"].splitlines()[1:])
+    for row in rows:
+        count = int(row.split()[3])
+        tags = [int(next(rows)) for _ in range(count)]
+        for tag in tags:
+            raw.nodes[tag] = tuple(map(float, next(rows).split()[:3]))
+    rows = iter(sections["Elements"].splitlines()[1:])
+    for row in rows:
+        dim, tag, kind, count = map(int, row.split())
+        for _ in range(count):
+            key, *nodes = map(int, next(rows).split())
+            add(dim, physical.get((dim, tag), ()), kind, key, nodes)
+
+
+# --- Abaqus and CalculiX
+
+_ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
+_FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
+
+
+def _abaqus(text: str) -> _Raw:
+    raw, groups = _Raw(), _Raw()
+    blocks = list(_keywords(text))
+    if sum(word == "PART" for word, _, _ in blocks) > 1:
+        raise _UnfitError("holds several parts: save the one part alone")
+    for word, options, lines in blocks:
+        rows = [[entry.strip() for entry in line.split(",")] for line in lines]
+        if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
+            raise _UnfitError("includes other files: save the mesh in one")
+        if word == "INSTANCE" and lines:
+            raise _UnfitError("moves or turns its part as an instance: save the part alone")
+        if word == "NODE":
+            for row in rows:
+                raw.nodes[int(row[0])] = (*(float(v or 0.0) for v in row[1:4]), 0.0, 0.0)[:3]
+            raw.add(options.get("NSET", ""), (int(row[0]) for row in rows))
+        elif word == "ELEMENT":
+            _abaqus_elements(raw, groups, options, rows)
+        elif word in ("NSET", "ELSET"):
+            target = raw if word == "NSET" else groups
+            target.add(options[word], _members(target, rows, "GENERATE" in options))
+        elif word == "SURFACE":
+            raw.add(options["NAME"], _surface(raw, groups, options, rows))
+    for name, elements in groups.sets.items():  # of elements, where no set of nodes has the name
+        if name not in raw.sets:
+            both = (raw.elements.get(key) or groups.elements.get(key, []) for key in elements)
+            raw.add(name, (node for nodes in both for node in nodes))
+    raw.sets.pop("", None)
+    return raw
+
+
+def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
+    """Each keyword with its options and the lines of data below it; names in capitals."""
+    lines = [line.strip() for line in text.splitlines()]
+    lines = [line for line in lines if line and not line.startswith("**")]
+    starts = [k for k, line in enumerate(lines) if line.startswith("*")]
+    for k, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+        head, first = lines[k], k + 1
+        while head.endswith(",") and first < end:
+            head, first = head + lines[first], first + 1
+        word, *given = (part.strip() for part in head[1:].split(","))
+        pairs = [part.partition("=") for part in given]
+        options = {key.strip().upper(): value.strip().strip('"').upper() for key, _, value in pairs}
+        yield word.upper(), options, lines[first:end]
+
+
+def _abaqus_elements(
+    raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[str]]
+) -> None:
+    kind = options["TYPE"]
+    count = next((n for name, n in _ABAQUS.items() if re.fullmatch(f"{name}[A-Z]*", kind)), 0)
+    if not count and not _FLAT.match(kind):
+        named = "wedges" if kind.startswith(("C3D6", "C3D15")) else "elements"
+        raise _UnfitError(f"has {named} of type {kind[:12]!r}{_MESH_WITH}")
+    entries = [[int(entry) for entry in row if entry] for row in rows]
+    if count:
+        flat = np.array([n for row in entries for n in row])  # an element may take several lines
+        for key, *nodes in flat.reshape(-1, count + 1).tolist():
+            raw.elements[key] = nodes
+            groups.add(options.get("ELSET", ""), [key])
+        return
+    for key, *nodes in entries:
+        groups.elements[key] = nodes
+        groups.add(options.get("ELSET", ""), [key])
+
+
+def _members(groups: _Raw, rows: list[list[str]], generate: bool) -> set[int]:
+    """Ids of a set: numbers, ranges, or other sets."""
+    found: set[int] = set()
+    for row in rows:
+        given = [entry for entry in row if entry]
+        if generate:
+            first, last, step = (*map(int, given), 1)[:3]
+            _require_few((last - first) // max(step, 1))
+            found.update(range(first, last + 1, step))
+        else:
+            for entry in given:
+                known = groups.sets.get(entry.upper(), ())
+                found.update([int(entry)] if entry.lstrip("-").isdigit() else known)
+    return found
+
+
+def _require_few(count: int) -> None:
+    if count > 10 * raised(MOST):
+        raise _UnfitError(f"has a set of {count} members, more than it can have nodes")
+
+
+def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[str]]) -> set[int]:
+    """Nodes of a surface: of faces of elements, or by themselves."""
+    found: set[int] = set()
+    for name, *side in rows:
+        if options.get("TYPE", "ELEMENT") == "NODE":
+            found |= _members(raw, [[name]], False)
+            continue
+        face = re.fullmatch(r"S(\d)", (side or [""])[0].upper())
+        for key in _members(groups, [[name]], False):
+            nodes = raw.elements.get(key)
+            if nodes is None:
+                found.update(groups.elements.get(key, ()))
+            elif face is not None:
+                found.update(nodes[k] for k in KINDS[len(nodes)].face(int(face[1]) - 1))
+    return found
+
+
+# --- Nastran bulk data
+
+_NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
+_SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
+
+
+def _nastran(text: str) -> _Raw:
+    start = re.search(r"^BEGIN\s+BULK.*$", text, re.MULTILINE | re.IGNORECASE)
+    control, bulk = ("", text) if start is None else (text[: start.start()], text[start.end() :])
+    raw = _Raw()
+    for number, members in re.findall(
+        r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", control, re.MULTILINE | re.IGNORECASE
+    ):
+        raw.add(number, _listed(re.split(r"[,\s]+", members.strip())))
+    for name, values in _cards(bulk):
+        if name == "INCLUDE":
+            raise _UnfitError("includes other files: save the mesh in one")
+        if name == "GRID":
+            if values[1] not in ("", "0"):
+                raise _UnfitError("has nodes in a coordinate system of their own (CP): save in 0")
+            x = [_real(value) for value in (*values[2:5], "", "", "")[:3]]
+            raw.nodes[int(values[0])] = tuple(x)
+        elif name in _NASTRAN:
+            nodes = [int(value) for value in values[2:] if value]
+            if (name, len(nodes)) not in (("CTETRA", 4), ("CTETRA", 10), ("CHEXA", 20)):
+                raise _UnfitError(f"has {name} of {len(nodes)} nodes{_MESH_WITH}")
+            raw.elements[int(values[0])] = nodes
+        elif name in _SURFACES:
+            n = (4 if "QUAD" in name else 3) * (2 if name in ("CTRIA6", "CQUAD8") else 1)
+            raw.add(f"pid {int(values[1])}", (int(v) for v in values[2 : 2 + n] if v))
+        elif name == "SET1":
+            raw.add(values[0], _listed(values[1:]))
+    return raw
+
+
+def _listed(entries: Iterable[str]) -> set[int]:
+    """Ids, with THRU between two for all from one to the other."""
+    found: set[int] = set()
+    last, through = 0, False
+    for entry in entries:
+        if entry.upper() == "THRU":
+            through = True
+        elif entry:
+            first, last = last + 1 if through else int(entry), int(entry)
+            _require_few(last - first)
+            found.update(range(first, last + 1))
+            through = False
+    return found
+
+
+def _cards(bulk: str) -> Iterator[tuple[str, list[str]]]:
+    """Name and fields of each card, continuations joined; small, large and free fields."""
+    name, fields, wide = "", list[str](), False
+    for line in bulk.splitlines():
+        line = line.split("$", 1)[0].expandtabs(8).rstrip()
+        if not line or line.upper().startswith("ENDDATA"):
+            continue
+        if "," in line:
+            parts = [part.strip() for part in line.split(",")]
+            head, own = parts[0], parts[1:9]
+            own += [""] * (8 - len(own))
+        else:
+            head, wide = line[:8].strip(), "*" in line[:8]
+            width = 16 if wide else 8
+            own = [line[k : k + width].strip() for k in range(8, 72, width)]
+        if head and head[0] not in "+*":
+            if name:
+                yield name, fields
+            name, fields = head.rstrip("*").upper(), own
+        else:
+            fields += own
+    if name:
+        yield name, fields
+
+
+def _real(value: str) -> float:
+    """A number as Nastran writes it: 1.5-3 is 1.5e-3."""
+    return float(re.sub(r"(?<=[\d.])([-+]\d)", r"e\1", value.replace("D", "E"))) if value else 0.0

@@ -1,0 +1,245 @@
+"""A design that holds for every deviation within its tolerances, by cutting planes.
+
+The optimum of the problem alone is the first. Of each thing that is asked the worst deviation is
+sought, from corners of the box of tolerances and from the design itself; where it is worse than all
+scenarios so far, it is one more (`assignment.exact.scenarios`), and the design is sought anew.
+A scenario less leaves more designs, so that each objective is a bound of that of the robust design,
+as far as a search finds optima. At last random deviations are solved, where least room is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import monotonic
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.exact.sequential import End, minimise
+from eigassign.assignment.requirements.quantity import LimitedQuantity
+from eigassign.assignment.requirements.requirement import EdgeRows, Requirement
+from eigassign.errors import AccuracyError, EigassignError
+from eigassign.study.design.conclusions import least_changed
+from eigassign.study.design.one_shot import cost
+from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
+from eigassign.study.design.search.response import reduced_about
+from eigassign.study.design.search.variants import variant_of
+from eigassign.study.monotone import box_corners
+from eigassign.study.results import RobustRow, RobustTarget
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+ROUNDS = 12  # of scenarios: known cases took at most 4
+STEPS = 20  # to the worst deviation: from the best corner mostly none
+CUT = 1e-5  # relative: a deviation that is worse by more is a scenario
+DRAWS = 10_000  # random deviations
+AT = 6  # samples at which they are solved
+ESTIMATED = 64  # of the draws, for which the reduced model's error is estimated; of followed modes
+#                 as many are drawn
+
+
+@dataclass(frozen=True)
+class WorstDeviation:
+    """The worst found for one edge: what is missed, at which sample, with which design."""
+
+    rows: EdgeRows
+    missed: float
+    sample: int
+    design: Floats
+
+
+def robust_optimum(
+    scene: Scene,
+    wanted: Sequence[Requirement],
+    starts: Sequence[Floats],
+    progress: Callable[[str], None],
+) -> tuple[Found, RobustRow]:
+    """The best design that keeps what is asked in the box of tolerances about it, and at what cost.
+
+    Raises AccuracyError where a deviation of an optimum has no answer.
+    """
+    deadline, search = deadline_of(scene.file), (scene, wanted, starts, progress)
+    scenarios: list[Floats] = []
+    seen: list[tuple[Found, tuple[WorstDeviation, ...]]] = []
+    last, solves = None, 0
+    for _ in range(ROUNDS):
+        found = find_optimum(*search, last, scenarios, deadline)
+        last = found = least_changed(found, scene.initial)
+        look = _Deviations(found)
+        try:
+            worst = look.worst()
+        except EigassignError as why:
+            message = f"a deviation within the tolerances has no answer: {why}"
+            raise AccuracyError(message) from why
+        seen.append((found, worst))
+        solves += found.exact_solves + look.response.exact_solves
+        more = list(look.cuts(worst))
+        ended = found.best.end in (End.SECONDS, End.INTERRUPTED) or monotonic() > deadline
+        if not more or ended:
+            break
+        scenarios += more
+        progress(f"robust: what is asked shall hold for {len(scenarios)} deviations too")
+    (nominal, before), found = seen[0], replace(found, exact_solves=solves)
+    progress(f"robust: {look.draws} random deviations")
+    drawn, error = look.drawn(worst)
+    row = RobustRow(
+        scenarios=len(found.task.scenarios),
+        draws=look.draws,
+        error=error,
+        nominal=nominal.best.y,
+        objective_nominal=nominal.best.objective,
+        objective=found.best.objective,
+        mass_nominal=scene.model.mass(nominal.best.y),
+        mass=scene.model.mass(found.best.y),
+        price_nominal=cost(scene, nominal.best.y),
+        price=cost(scene, found.best.y),
+        targets=tuple(look.rows(worst, _by_name(before), drawn, nominal.best.y)),
+    )
+    return found, row
+
+
+class _Deviations:
+    """The deviations about an optimum, and what is missed there, relative.
+
+    Of goals that is their error, of limits their violation, of what shall be high or wide what it
+    is short of what the optimum has in all its scenarios.
+    """
+
+    def __init__(self, found: Found) -> None:
+        below = tuple(k for _, k in found.variant.below)
+        self.found, self.task, self.y = found, found.task, found.best.y
+        self.scene = found.task.scene
+        variant = variant_of(replace(self.task, scenarios=()), below, missed=True)
+        self.asked = replace(variant.requirements, objective=Objective.WORST_CASE)
+        self.response = variant.response
+        self.edges = (*self.asked.residuals, *self.asked.excesses)
+        self.had = found.variant.problem.measure(found.best.seen.residual)
+        self.lower, self.upper = self.scene.tolerances.box(self.y)
+        self.draws = ESTIMATED if self.task.followers else DRAWS
+
+    def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
+        """What is missed where rows have some values, and the slopes of that in these."""
+        if rows.of.is_goal:
+            return np.abs(value) / rows.of.weight, np.sign(value) / rows.of.weight
+        if rows not in self.asked.residuals:
+            return value, np.ones_like(value)
+        unit = 1.0 if rows.edge.any() else 1.0 / abs(self.had)
+        return unit * (value - self.had), np.full_like(value, unit)
+
+    def worst_at(self, rows: EdgeRows, y: Floats) -> tuple[float, int, Floats]:
+        """What is missed most at a design, the sample, and the slopes (n_y,) there."""
+        value, slopes = rows.at(y, self.response(y))
+        missed, unit = self.missed(rows, value)
+        k = int(missed.argmax())
+        return float(missed[k]), rows.of.rows.start + k, unit[k] * slopes[k]
+
+    def worst(self) -> tuple[WorstDeviation, ...]:
+        """The worst found of each edge: from the worst corner, and from the design itself."""
+        moving = self.upper > self.lower
+        sides = box_corners(int(moving.sum()))
+        corners = np.repeat(self.y[None], len(sides), axis=0)
+        corners[:, moving] = np.where(sides > 0.5, self.upper[moving], self.lower[moving])
+        box, none, found = (self.lower, self.upper), (np.zeros(0), np.zeros((0, moving.size))), []
+        for rows in self.edges:
+
+            def appraise(y: Floats, rows: EdgeRows = rows) -> Appraisal:
+                missed, _, slopes = self.worst_at(rows, y)
+                return Appraisal(np.array([-missed]), -slopes[None], *none)
+
+            problem = DesignProblem(appraise, *box, objective=Objective.LARGEST)
+            corner = max(corners, key=lambda one: self.worst_at(rows, one)[0])
+            ends = (minimise(problem, start, STEPS).y for start in (corner, self.y))
+            design = max(ends, key=lambda one: self.worst_at(rows, one)[0])
+            found.append(WorstDeviation(rows, *self.worst_at(rows, design)[:2], design))
+        return tuple(found)
+
+    def cuts(self, worst: Sequence[WorstDeviation]) -> Iterator[Floats]:
+        """Yield the deviations that miss more than is known of the scenarios.
+
+        Of goals, where the largest error is what is made small.
+        """
+        made, squared = list[Floats](), self.found.variant.problem.is_squared
+        designs = self.task.designs(self.y)
+        for one in worst:
+            known = max(0.0, *(self.worst_at(one.rows, design)[0] for design in designs))
+            if one.rows.of.is_goal:
+                known = np.inf if squared else self.had / one.rows.of.weight
+            sigma = self.scene.tolerances.scenario(self.y, one.design)
+            if one.missed > known + CUT and not any(np.allclose(sigma, s) for s in made):
+                made.append(sigma)
+                yield sigma
+
+    def drawn(self, worst: Sequence[WorstDeviation]) -> tuple[dict[str, float], float]:
+        """The worst of random deviations by name, and the error of the frequencies, relative.
+
+        At those samples where what is asked of frequencies has least room; of followed modes, which
+        are followed all along, at all samples.
+        """
+        scene, path, n, count = self.scene, self.scene.path, self.draws, self.asked.modes
+        least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
+        at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
+        drawn = np.random.default_rng(0).uniform(self.lower, self.upper, (n, len(self.y)))
+        reduced = None if scene.model.pencil.is_dense else reduced_about(scene, self.y, count)
+        found: dict[str, float] = {}
+        error = 0.0
+        for k in range(0, n if len(at) else 0, ESTIMATED):
+            designs = drawn[k : k + ESTIMATED]
+            if self.task.followers:
+                hz = np.array([self.response(y).hz for y in designs])
+            else:
+                follows = path.follows_design
+                q = np.array([(path.at(y)[0] if follows else path.q)[at] for y in designs])
+                x = q.reshape(-1, q.shape[2]), np.repeat(designs, len(at), axis=0)
+                few = scene.model.frequencies(*x, count) if reduced is None else (
+                    reduced.frequencies(*x)
+                )  # fmt: skip
+                if reduced is not None and k == 0:
+                    error = float(reduced.error_estimate(*x).max())
+                hz = np.full((len(designs), len(path.q), count), np.nan)
+                hz[:, at] = few.reshape(len(designs), len(at), count)
+            for rows in self.edges:
+                of = rows.of
+                if of.mode_terms:
+                    own = (c * hz[:, of.rows, m - 1 if m > 0 else m] for m, c in of.mode_terms)
+                    missed, _ = self.missed(rows, rows.scale * (sum(own) - rows.edge))
+                    most = float(np.nanmax(missed, initial=0.0))
+                    found[of.name] = max(found.get(of.name, 0.0), most)
+        return found, error
+
+    def rows(
+        self,
+        worst: Sequence[WorstDeviation],
+        before: Mapping[str, float],
+        drawn: Mapping[str, float],
+        nominal: Floats,
+    ) -> Iterator[RobustTarget]:
+        """Yield what deviations do to each thing that is asked, where that is worst."""
+        after, first = _by_name(worst), self.response(nominal)
+        for name in after:
+            one = max((w for w in worst if w.rows.of.name == name), key=lambda w: w.missed)
+            of, k = one.rows.of, one.sample - one.rows.of.rows.start
+            both = (nominal, first), (self.y, self.response(self.y))
+            amounts = [float(of.value(*design)[0][k]) for design in both]
+            if isinstance(of, LimitedQuantity):
+                amounts = [of.amount_of(value) for value in amounts]
+            yield RobustTarget(
+                label=name,
+                unit=of.unit if isinstance(of, LimitedQuantity) else "Hz",
+                is_goal=of.is_goal,
+                nominal=amounts[0],
+                robust=amounts[1],
+                nominal_worst=before[name],
+                worst=after[name],
+                drawn=drawn.get(name),
+            )
+
+
+def _by_name(worst: Sequence[WorstDeviation]) -> dict[str, float]:
+    """The worst of each thing that is asked, 0 at least."""
+    found: dict[str, float] = {}
+    for one in worst:
+        name = one.rows.of.name
+        found[name] = max(found.get(name, 0.0), one.missed)
+    return found

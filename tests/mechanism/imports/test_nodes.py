@@ -1,0 +1,366 @@
+"""Nodes by number, units, and what is said where these or the files are wrong."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported
+from spatial_cases import built, case_of
+from spatial_oracle import Tree
+from test_formats import (
+    BY_ID,
+    IDS,
+    PLACES,
+    labels_of,
+    lam,
+    of_abaqus,
+    of_calculix,
+    of_dmig,
+    of_matlab,
+    of_substructure,
+    texts,
+)
+from writers import coordinate, dmig, dofs, grids, matlab, op4_binary, op4_text
+
+from eigassign.errors import CaseError, MechanismError
+from eigassign.mechanism import part_lines, read_matrix
+
+CCX = Path(__file__).parent / "calculix"
+PRINTED_HZ = [6634.938, 8549.826, 11988.96, 18453.90, 21866.74, 22228.68]  # by CalculiX
+
+
+def lines(folder: Path, link: Tree, space: str = "spatial") -> list[str]:
+    tree = arm(space, {"part": {"type": "superelement", **link}})
+    return list(part_lines(case_of(tree, folder / "case.yaml")))
+
+
+def refusal(folder: Path, link: Tree, space: str = "spatial") -> str:
+    with pytest.raises(MechanismError) as caught:
+        lines(folder, link, space)
+    return str(caught.value)
+
+
+def in_units(space: str, length: float, mass: float, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """K and M of the beam as a program with such units would have them."""
+    K, M = exported(space)
+    turning = [f > 3 for _, f in labels_of(space)]
+    D = np.diag(np.where(turning, 1.0, length))  # u = D u_file
+    energy = mass * (length / time) ** 2
+    return D @ K @ D / energy, D @ M @ D / (energy * time**2)
+
+
+SYSTEMS: dict[str, tuple[float, float, float]] = {
+    "m-kg-s": (1.0, 1.0, 1.0),
+    "mm-t-s": (1e-3, 1e3, 1.0),
+    "mm-kg-ms": (1e-3, 1.0, 1e-3),
+    "in-lbf-s": (0.0254, 175.12683524647636, 1.0),
+}
+
+
+@pytest.mark.parametrize("units", SYSTEMS)
+@pytest.mark.parametrize("write", [of_dmig, of_abaqus, of_calculix, of_matlab])
+def test_files_in_any_units_are_the_same_part(tmp_path: Path, units: str, write: Any) -> None:
+    """Places are written in the case: in m, or with their units."""
+    K, M = in_units("spatial", *SYSTEMS[units])
+    link = write(tmp_path, K, M, labels_of("spatial"))
+    ends = {"start": {"position": [0, 0, 0]}, "end": {"position": ["600 mm", 0, 0]}}
+    nodes = {name: {**node, **ends[name]} for name, node in link["nodes"].items()}
+    found = lam(tmp_path, {**link, "nodes": nodes, "units": units})
+    digits = 2e-5 if write is of_dmig else 1e-8  # ten digits of K are fewer of its lowest modes
+    np.testing.assert_allclose(found, built(beam_arm("spatial")).lam([0.4, 0.9], 6), rtol=digits)
+
+
+@pytest.mark.parametrize("header", ["id, x, y, z", "id, x [mm], y [mm], z [mm]"])
+def test_places_of_files_are_in_their_units_too(tmp_path: Path, header: str) -> None:
+    K, M = in_units("spatial", *SYSTEMS["mm-t-s"])
+    link = of_substructure(tmp_path, K, M, labels_of("spatial"))
+    rows = "".join(f"{n}, {1e3 * x!r}, 0, 0\n" for n, (x, *_) in PLACES.items())
+    texts(tmp_path, nodes_csv=f"{header}\n{rows}")
+    found = lam(tmp_path, {**link, "units": "mm-t-s"})
+    np.testing.assert_allclose(found, built(beam_arm("spatial")).lam([0.4, 0.9], 6), rtol=1e-7)
+
+
+@pytest.mark.parametrize("units", SYSTEMS)
+@pytest.mark.parametrize("written", ["m-kg-s", "mm-kg-ms", "in-lbf-s"])
+def test_the_error_says_which_units_would_fit(tmp_path: Path, units: str, written: str) -> None:
+    link = of_dmig(tmp_path, *in_units("spatial", *SYSTEMS[units]), labels_of("spatial"))
+    nodes = {"start": {"id": IDS[0]}, "end": {"id": IDS[-1], "position": [LENGTH, 0, 0]}}
+    if SYSTEMS[units][0] == SYSTEMS[written][0]:
+        return
+    message = refusal(tmp_path, {**link, "nodes": nodes, "units": written})
+    assert "strains under rigid motion" in message
+    assert re.search(f"write units: .*{units}", message)
+
+
+def test_a_position_that_lacks_its_unit_is_told(tmp_path: Path) -> None:
+    link = of_dmig(tmp_path, *exported("spatial"), labels_of("spatial"))
+    nodes = {"start": {"id": IDS[0]}, "end": {"id": IDS[-1], "position": [600.0, 0, 0]}}
+    assert "positions a thousandth as large" in refusal(tmp_path, {**link, "nodes": nodes})
+
+
+@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms"])
+def test_a_part_of_half_a_kilometre_and_grams_is_doubted(tmp_path: Path, units: str) -> None:
+    """All of its files are in mm, so that nothing strains."""
+    link = of_substructure(tmp_path, *in_units("planar", *SYSTEMS[units]), labels_of("planar"))
+    rows = "".join(f"{n},{1e3 * x!r},0\n" for n, (x, *_) in PLACES.items())
+    texts(tmp_path, nodes_csv=f"id,x,y\n{rows}")
+    assert "write units: mm-t-s or mm-kg-ms" in lines(tmp_path, link, "planar")[-1]
+    assert "write units" not in "".join(lines(tmp_path, {**link, "units": units}, "planar"))
+
+
+# What check says
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_check_says_what_the_part_is(tmp_path: Path, space: str) -> None:
+    first, second = lines(tmp_path, of_dmig(tmp_path, *exported(space), labels_of(space)), space)
+    assert "0.972 kg, centre of mass at (0.3, 0" in first
+    across = 0.972 * LENGTH**2 / 12
+    about = [float(v) for v in re.search("about it (.*) kg m2", first)[1].split(",")]
+    assert about[-1] == pytest.approx(across, rel=2e-3)  # thick, and of lumped turning
+    hz = [float(v) for v in re.search("modes, then (.*) Hz", second)[1].split(",")]
+    wide, high = 22.3733 / (2 * np.pi) * np.sqrt(70e9 / 2700 / 12) * np.array([0.02, 0.03]) / 0.36
+    assert f"free-free {3 if space == 'planar' else 6} rigid modes" in second
+    assert hz[0] == pytest.approx(high if space == "planar" else wide, rel=2e-3)
+    assert float(re.search("strains it by (.*?) ", second)[1]) < 1e-8
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_free_frequencies_need_no_certain_stiffness(tmp_path: Path, scale: float) -> None:
+    K, M = exported("planar")
+    link = of_calculix(tmp_path, scale * K, M, labels_of("planar"))
+    found = float(re.search("modes, then (.*?),", lines(tmp_path, link, "planar")[1])[1])
+    link = of_calculix(tmp_path, K, M, labels_of("planar"))
+    exact = float(re.search("modes, then (.*?),", lines(tmp_path, link, "planar")[1])[1])
+    assert found == pytest.approx(exact * np.sqrt(scale), rel=1e-4)
+
+
+@pytest.mark.parametrize("lumped", [True, False])
+def test_a_part_of_few_masses_has_as_few_modes(tmp_path: Path, lumped: bool) -> None:
+    """One element with masses at its ends alone: three rigid modes, one of its length."""
+    K, M = (A[:6, :6].copy() for A in exported("planar"))
+    K[3:, 3:] = np.abs(K[:3, :3]) * [[1, 1, 1], [1, 1, -1], [1, -1, 1]]
+    M = np.diag([0.5, 0.5, 0.0] * 2) if lumped else np.diag([0.5, 0.5, 1e-5] * 2)
+    texts(tmp_path, p_sti=coordinate(K), p_mas=coordinate(M))
+    h = LENGTH / ELEMENTS
+    nodes = {"start": {"position": [0, 0], "dofs": [0, 1, 2]},
+             "end": {"position": [h, 0], "dofs": [3, 4, 5]}}  # fmt: skip
+    link = {"stiffness": "p.sti", "mass": "p.mas", "nodes": nodes}
+    along = np.sqrt(2 * K[0, 0] / 0.5) / (2 * np.pi)
+    found = lines(tmp_path, link, "planar")[1]
+    assert "3 rigid modes, then" in found
+    if lumped:
+        assert f"then {along:.5g} Hz;" in found
+
+
+# What CalculiX 2.20 wrote
+
+
+CALCULIX = {
+    "stiffness": "rig.sti", "mass": "rig.mas", "nodes_file": ["rig.dof", "rig.inp"],
+    "units": "mm-t-s", "nodes": {"start": {"id": [101, 103]}, "end": {"id": [102, 104]}},
+}  # fmt: skip
+
+
+def test_a_part_of_calculix_has_the_frequencies_that_it_printed(tmp_path: Path) -> None:
+    """Free-free, of the matrices; and of the part between soft springs, as check says them."""
+    for file in CCX.glob("rig.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    first, second = lines(tmp_path, CALCULIX)
+    hz = [float(v) for v in re.search("6 rigid modes, then (.*) Hz", second)[1].split(",")]
+    np.testing.assert_allclose(hz, PRINTED_HZ[:3], rtol=1e-5)  # five digits are shown
+    assert f"{7850 * 0.12 * 0.012 * 0.02:.4g} kg, centre of mass at (0.06, 0, 0) m" in first
+    K, M = (read_matrix(tmp_path / f"rig.{kind}", "key").toarray() for kind in ("sti", "mas"))
+    turned = np.linalg.inv(np.linalg.cholesky(M))
+    found = np.sqrt(np.linalg.eigvalsh(turned @ K @ turned.T)[6:12]) / (2 * np.pi)
+    np.testing.assert_allclose(found, PRINTED_HZ, rtol=5e-7)  # it printed seven digits
+
+
+def test_nodes_of_solids_do_not_rotate(tmp_path: Path) -> None:
+    for file in CCX.glob("rig.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    nodes = {"start": {"id": 101}, "end": {"id": [102, 104]}}
+    message = refusal(tmp_path, {**CALCULIX, "nodes": nodes})
+    assert "nodes.start.id: node 101 has no freedom 4, 5, 6: nodes of solid" in message
+    assert "RBE2" in message
+
+
+# Wrong ones
+
+
+def test_a_node_that_is_not_there_is_told(tmp_path: Path) -> None:
+    link = of_abaqus(tmp_path, *exported("spatial"), labels_of("spatial"))
+    message = refusal(tmp_path, {**link, "nodes": {"start": {"id": 3}, "end": {"id": IDS[-1]}}})
+    assert f"the {ELEMENTS + 1} nodes of the matrices have numbers from 1000 to" in message
+
+
+def test_a_node_without_a_place_is_told(tmp_path: Path) -> None:
+    link = of_abaqus(tmp_path, *exported("spatial"), labels_of("spatial"))
+    link.pop("nodes_file")
+    assert "no place of node 1000 is in the files: write its position" in refusal(tmp_path, link)
+
+
+@pytest.mark.parametrize("field", [1, 5])
+def test_a_grid_point_with_axes_of_its_own_is_told(tmp_path: Path, field: int) -> None:
+    of_dmig(tmp_path, *exported("spatial"), labels_of("spatial"))
+    text = (tmp_path / "part.pch").read_text().splitlines()
+    text[1] = text[1].ljust(56)
+    text[1] = text[1][: 8 + 8 * field] + f"{4:8d}" + text[1][16 + 8 * field :]
+    (tmp_path / "part.pch").write_text("\n".join(text))
+    message = refusal(tmp_path, {"file": "part.pch", "nodes": BY_ID})
+    assert "node 1000 stands at several places, or in a coordinate system of its own" in message
+
+
+def test_rows_that_nobody_names_are_told(tmp_path: Path) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    message = refusal(tmp_path, {**link, "nodes_file": "nodes.csv"})
+    assert "do not say whose their rows are: write dofs" in message
+    texts(tmp_path, p_dof=dofs(labels_of("spatial")[:-1]))
+    assert "names 53 rows; the matrices have 54" in refusal(tmp_path, link)
+
+
+@pytest.mark.parametrize("named", ["part.pch", "part.op4", "part.bin", "part.mtx"])
+def test_a_missing_mass_is_told(tmp_path: Path, named: str) -> None:
+    K, M = exported("spatial")
+    of_substructure(tmp_path, K, M, labels_of("spatial"))
+    half = (tmp_path / "part.mtx").read_text().partition("*MATRIX,TYPE=MASS")[0]
+    texts(tmp_path, part_pch=grids(PLACES) + dmig("KAAX", K, labels_of("spatial")),
+          part_op4=op4_text("KAA", K, "sparse"), part_mtx=half)  # fmt: skip
+    (tmp_path / "part.bin").write_bytes(op4_binary("KAA", K, "dense"))
+    message = refusal(tmp_path, {"file": named, "nodes": BY_ID})
+    assert f"{named} holds stiffness, no mass: export MAAX too" in message
+
+
+def test_two_files_that_are_exchanged_are_told(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    for name, A in (("KAAX", K), ("MAAX", M)):
+        (tmp_path / f"{name}.pch").write_text(dmig(name, A, labels_of("spatial")))
+    link = {"stiffness": "MAAX.pch", "mass": "KAAX.pch", "nodes": BY_ID}
+    assert "MAAX.pch holds mass, no stiffness" in refusal(tmp_path, link)
+
+
+def test_one_of_several_matrices_is_named(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    matlab(tmp_path / "part.mat", {"K1": K, "K2": K, "M": M}, "5")
+    link = {"file": "part.mat", "nodes": BY_ID}
+    assert "holds 3 matrices: name one, as parts.mat:K does" in refusal(tmp_path, link)
+    link = {"stiffness": "part.mat:K3", "mass": "part.mat:M", "nodes": BY_ID}
+    assert "has no matrix 'K3'" in refusal(tmp_path, link)
+
+
+def test_labels_of_one_of_both_are_told(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    texts(tmp_path, K_pch=dmig("K", K, labels_of("spatial")), M_mas=coordinate(M))
+    link = {"stiffness": "K.pch", "mass": "M.mas", "nodes": BY_ID}
+    assert "only one of stiffness and mass says whose its rows are" in refusal(tmp_path, link)
+
+
+def test_a_matrix_that_stands_twice_in_a_file_is_told(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    text = dmig("KAAX", K, labels_of("spatial"))
+    texts(tmp_path, part_pch=text + text + dmig("MAAX", M, labels_of("spatial")))
+    message = refusal(tmp_path, {"file": "part.pch", "nodes": BY_ID})
+    assert "2 headers" in message
+    texts(tmp_path, K_mtx=2 * coordinate(K), M_mtx=coordinate(M))
+    link = {"stiffness": "K.mtx", "mass": "M.mtx", "nodes": BY_ID}
+    assert "gives an entry twice" in refusal(tmp_path, link)
+
+
+@pytest.mark.parametrize("write", [of_dmig, of_abaqus, of_calculix])
+def test_an_asymmetric_matrix_is_told(tmp_path: Path, write: Any) -> None:
+    K, M = exported("spatial")
+    link = write(tmp_path, K, M, labels_of("spatial"))
+    file = tmp_path / link.get("stiffness", link.get("file"))
+    more = {
+        "part.pch": "DMIG,KAAX,1007,2,,1000,2,9.0\n",
+        "K.mtx": "1000,2, 1007,2, 9.0\n",
+        "p.sti": "8 2 9.0\n",
+    }
+    with open(file, "a") as stream:
+        stream.write(more[file.name])
+    assert "is not symmetric: entries differ by" in refusal(tmp_path, link)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("DMIG,KAAX,0,6,4,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "complex"),
+        ("DMIG,KAAX,0,9,2,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "square"),
+        ("DMIG,KAAX,0,6,2,0,,,1\nDMIG,KAAX,1,1,,1,1,two\n", "cannot read"),
+        ("   2   2   6   4KAA     1P,3E23.16\n   3   1   1\n", "complex"),
+        ("   2   3   2   2KAA     1P,3E23.16\n   3   1   1\n", "square"),
+        ("  999999  999999       6       2KAA     1P,3E23.16\n", "cannot read"),
+        ("99999999999999       6       2KAA     1P,3E23.16\n", "cannot read"),
+        (" 9999999 9999999       6       2KAA     1P,3E23.16\n", "up to 2000000 are supported"),
+        ("9999999 9999999 1.0\n", "up to 2000000 are supported"),
+        ("-5 1 1.0\n", "cannot read"),
+        ("1 1 one\n", "cannot read"),
+        ("1,1, 1,1\n", "cannot read"),
+        ("t\n  3  1  1  1\nCSA  2 2 2\n(8I10) (8I10) (3E26.18)\n", "complex"),
+        ("t\n  3  1  1  1\nPSA  2 2 2\n(8I10) (8I10) (3E26.18)\n", "pattern"),
+        ("t\n  3  1  1  1\nRZA  2 2 2\n(8I10) (8I10) (3E26.18)\n", "RSA or RUA"),
+        ("t\n  3  1  1  1\nRSA  2 3 2\n(8I10) (8I10) (3E26.18)\n", "square"),
+        ("t\n  3  1  1  1\nRSA  2 2 999999999\n(8I10) (8I10) (3E26.18)\n", "entries: more than"),
+        ("t\n  3  1  1  1\nRSA  2 2 9\n(8I999) (8I10) (3E26.18)\n", "cannot read"),
+        ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "'-v7'"),
+        ("MATLAB 5.0 MAT-file" + 109 * " ", "cannot read"),
+        ("hello\n", "cannot read"),
+        ("", "cannot read"),
+    ],
+)  # fmt: skip
+def test_what_is_no_matrix_of_a_part_is_told(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "K.mtx").write_text(text)
+    with pytest.raises(MechanismError, match=re.escape(message)) as caught:
+        read_matrix(tmp_path / "K.mtx", "key")
+    assert "K.mtx" in str(caught.value)
+    assert "hello" not in str(caught.value)
+
+
+def test_what_unpacks_to_more_than_the_limit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    matlab(tmp_path / "K.mat", {"K": np.ones((800, 800))}, "full")
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "1e-3")
+    with pytest.raises(MechanismError, match="unpacks to more than 1 MB: the environment variable"):
+        read_matrix(tmp_path / "K.mat", "key")
+
+
+# Files are part of what a case is
+
+
+@pytest.mark.parametrize("file", ["part.op4", "part.dof", "nodes.csv"])
+def test_every_file_of_a_part_is_named_and_counts(tmp_path: Path, file: str) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    texts(tmp_path, part_op4=op4_text("K", np.eye(2), "dense") + op4_text("M", np.eye(2), "dense"))
+    (tmp_path / "p.dof").rename(tmp_path / "part.dof")
+    part = {"file": "part.op4", "nodes_file": ["nodes.csv", "part.dof"], "nodes": link["nodes"]}
+    tree = arm("spatial", {"part": {"type": "superelement", **part}})
+    before = case_of(tree, tmp_path / "case.yaml").files[file]
+    (tmp_path / file).write_text((tmp_path / file).read_text() + "\n")
+    assert case_of(tree, tmp_path / "case.yaml").files[file] != before
+    (tmp_path / file).unlink()
+    with pytest.raises(CaseError, match=f"no such file.*{file}"):
+        case_of(tree, tmp_path / "case.yaml")
+    (tmp_path / file).symlink_to("/etc/hostname")
+    with pytest.raises(CaseError, match="lies outside the folder"):
+        case_of(tree, tmp_path / "case.yaml")
+
+
+def test_a_matrix_named_in_a_file_is_read_back_from_a_resolved_case(tmp_path: Path) -> None:
+    link = of_matlab(tmp_path, *exported("spatial"), labels_of("spatial"))
+    tree = arm("spatial", {"part": {"type": "superelement", **link}})
+    case = case_of(tree, tmp_path / "case.yaml")
+    assert case.mechanism.links["part"].stiffness == f"{tmp_path}/part.mat:Kff"
+    assert set(case.files) == {"part.mat", "nodes.csv", "p.dof"}
+
+
+def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    link = of_dmig(tmp_path, K, M, labels_of("spatial"))
+    one = lam(tmp_path, link)
+    two = lam(tmp_path, of_dmig(tmp_path, 4 * K, M, labels_of("spatial")))
+    assert (two > 1.001 * one).all()
