@@ -110,12 +110,12 @@ def capital(text: str) -> str:
 
 
 def number(value: float) -> str:
-    """Six significant digits: ``0.228713``; no sign on a zero."""
-    return f"{value + 0.0:.6g}"
+    """Four significant digits: ``0.2287``, and 15430 rather than 1.543e+04; no sign on a zero."""
+    return f"{float(f'{value:.4g}') + 0.0:.7g}"
 
 
 def listed(amounts: Mapping[str, float]) -> str:
-    """``a: 0.228713, b: 2``."""
+    """``a: 0.2287, b: 2``."""
     return ", ".join(f"{name}: {number(value)}" for name, value in amounts.items())
 
 
@@ -123,7 +123,20 @@ def percent(fraction: float) -> str:
     """Three significant digits: ``1.55 %`` for 0.0155; ``n/a`` where there is no number."""
     if not math.isfinite(fraction):
         return "n/a"
+    if fraction == 0.0:
+        return "0 %"
     return f"{100.0 * fraction:#.3g}".rstrip(".") + " %"
+
+
+def at_most(fraction: float) -> str:
+    """A bound, rounded up to two digits: ``0.031 %``, ``below 0.001 %``."""
+    if not math.isfinite(fraction):
+        return "an unknown amount"
+    if fraction < 1e-5:
+        return "below 0.001 %"
+    digits = 1 - math.floor(math.log10(100.0 * fraction))
+    step = 10.0**-digits
+    return f"{math.ceil(100.0 * fraction / step - 1e-9) * step:.{max(digits, 0)}f} %"
 
 
 def seconds(value: float) -> str:
@@ -156,8 +169,8 @@ def positive_percent(fraction: float) -> str:
 
 Key = Annotated[str, Fact(is_key=True)]
 Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
-Hertz = Annotated[float, Fact(unit="Hz", digits=".6g")]
+Hertz = Annotated[float, Fact(unit="Hz", digits=number)]
 Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]
-Residual = Annotated[float, Fact(digits=".1e")]
-InUnit = Annotated[float, Fact(unit=OF_ROW, digits=".6g")]
+Residual = Annotated[float, Fact(digits=lambda left: f"{left:.1e}" if left else "0")]
+InUnit = Annotated[float, Fact(unit=OF_ROW, digits=number)]
 Curve = Annotated[NDArray[np.float64], Fact(unit="Hz")]

@@ -61,6 +61,7 @@ class CaseFile:
     """
 
     title: str
+    author: str | None
     reference: str | None
     mechanism: Mechanism
     coordinates: Mapping[str, Coordinate]
@@ -78,6 +79,7 @@ class CaseFile:
     marks: Mark = field(compare=False, repr=False)
     files: Mapping[str, str] = field(compare=False, default_factory=dict)  # SHA-256 by name
     variant: Mapping[str, object] = field(compare=False, default_factory=dict)  # by dotted key
+    in_degrees: bool = field(compare=False, default=False)  # it writes angles so
 
     def __repr__(self) -> str:
         q, y = named(tuple(self.coordinates)), named(tuple(self.design.parameters))

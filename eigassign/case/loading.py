@@ -12,6 +12,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -101,6 +102,9 @@ def read(path: str | Path) -> Unchecked:
     return _parsed(data, path)
 
 
+_DEGREES = re.compile(rb"\d\s*(deg\b|\xc2\xb0|\\u00b0)")  # as YAML has them, and JSON
+
+
 def _parsed(data: bytes, path: Path) -> Unchecked:
     try:
         return Unchecked(path, data, read_yaml(data, str(path)))
@@ -183,7 +187,16 @@ def _case_file(
         marks=source.marks,
         files=_digests(named, path.parent),
         variant=values,
+        in_degrees=_in_degrees(source, written.data),
     )
+
+
+def _in_degrees(source: Source, data: bytes) -> bool:
+    """True of a case that writes angles so: its point of expansion, or any other."""
+    expansion = source.tree.get("expansion")
+    q = expansion.get("q") if isinstance(expansion, Mapping) else None
+    bare = isinstance(q, tuple) and any(not isinstance(each, str) and each for each in q)
+    return not bare and _DEGREES.search(data) is not None
 
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:

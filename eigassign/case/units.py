@@ -138,10 +138,15 @@ def handy_unit(unit: str, *values: float) -> tuple[str, float]:
     return next(((n, size) for n, size in units.items() if most >= size), [*units.items()][-1])
 
 
+def angle_unit(unit: str, in_degrees: bool) -> tuple[str, float]:
+    """``unit`` and 1, but of angles degrees, and their size in rad, where a case has these."""
+    return ("deg", math.pi / 180.0) if unit == "rad" and in_degrees else (unit, 1.0)
+
+
 def handy(amount: float, unit: str) -> str:
     """An amount in SI ``unit`` to three digits, in its handy unit: ``2 kN m/rad``."""
     name, size = handy_unit(unit, amount)
-    return f"{amount / size:.3g} {name}".rstrip()
+    return f"{float(f'{amount / size:.3g}'):g} {name}".rstrip()  # 1000, not 1e+03
 
 
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}

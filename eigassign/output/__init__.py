@@ -36,6 +36,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "figures.paper": "draw render",
         "figures.run": "run_figures",
+        "figures.scene": "scale_words",
         "figures.screen": "screen_figures screen_table",
         "previous": "EarlierResult Known",
         "reports.chart": "chart_tables write_chart",

@@ -58,6 +58,7 @@ class CaseDocument:
 
     name: Annotated[str, Fact("of the case file, without its ending")]
     title: str
+    author: str | None
     reference: Annotated[str | None, Fact("source of the case")]
     sha256: Annotated[str, Fact("of the case file")]
     files: Annotated[Mapping[str, str], Fact("SHA-256 of each file that it names")]
@@ -257,8 +258,9 @@ def run_document(results: RunResults) -> RunDocument:
 
 def beginning(results: RunResults | UpdateResults) -> OriginDocument:
     """The version and the case, by its hash, that the numbers are of."""
-    name, title, reference = results.case_name, results.title, results.reference
-    case = CaseDocument(name, title, reference, results.case_sha256, results.case_files)
+    name, title, author = results.case_name, results.title, results.author
+    origin = results.reference, results.case_sha256, results.case_files
+    case = CaseDocument(name, title, author, *origin)
     return OriginDocument(SCHEMA, results.version, case)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +14,17 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 TEMPLATES = Path(__file__).parent / "templates"
+
+
+def today() -> str:
+    """The date as people write it, ``26 November 2026``; that of SOURCE_DATE_EPOCH if it is set."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    day = (
+        datetime.fromtimestamp(int(given), UTC)
+        if given.isdecimal()
+        else datetime.now().astimezone()
+    )
+    return f"{day.day} {day:%B %Y}"
 
 
 def page_of(name: str, **shown: Any) -> bytes:

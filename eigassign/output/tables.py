@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import is_bare
-from eigassign.facts import OF_ROW, Fact, capital, fact, number, percent, seconds
+from eigassign.facts import OF_ROW, Fact, at_most, capital, fact, number, percent, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     SEEN,
@@ -42,12 +42,16 @@ STAGES = {  # of a run, as they are named in results.json
 
 @dataclass(frozen=True)
 class Table:
-    """A table of finished text; the first column names the row."""
+    """A table of finished text; the first column names the row.
+
+    ``section`` is that of the page that it stands in.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
+    section: str = "appendix"
 
     @property
     def numeric(self) -> tuple[bool, ...]:
@@ -58,7 +62,7 @@ class Table:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell.removesuffix("ms").rstrip("s% "))
+        float(cell.removeprefix("below ").removesuffix("ms").rstrip("s% "))
     except ValueError:
         return False
     return True
@@ -89,16 +93,13 @@ def _value(row: Any, name: str, one: Fact) -> Any:
 
 
 def run_tables(results: RunResults) -> tuple[Table, ...]:
-    """Design, distances, limits, drives, local optima, meaning, approximation, solver, time.
-
-    Those that there is something to show in.
-    """
-    kinds = (
-        design, objective, errors, required, drives, weight, clearances, combinations, optima,
-        sensitivity, limits, anatomy, helps, reach, tolerance, robust, trade_off, approximation,
-        solver, timing,
-    )  # fmt: skip
-    return tuple(table for table in (kind(results) for kind in kinds) if table.rows)
+    """What there is something to show of, section by section of `SECTIONS`."""
+    made = (
+        replace(kind(results), section=section)
+        for section, kinds in _KINDS.items()
+        for kind in kinds
+    )
+    return tuple(table for table in made if table.rows)
 
 
 def headline(results: RunResults) -> str | None:
@@ -279,8 +280,8 @@ def clearances(results: RunResults) -> Table:
     rows = results.assignment.clearances if results.assignment else ()
     caption = (
         "Of all modes at every sample, and between the samples. Room is the distance to the "
-        "nearest edge, relative to it. Mesh and reduced links put the mode above the band too "
-        "high, by no more than stated: the room counts from there."
+        "nearest edge, relative to it. The model puts the mode above the band too high, by no "
+        "more than stated: the room counts from there."
     )
     return facts_table("Clearance", rows, "label below room raised clear", caption)
 
@@ -465,6 +466,23 @@ def weight(results: RunResults) -> Table:
     return facts_table("Sag under the weight", rows, "node sag most", f"{caption}.")
 
 
+SECTIONS = {  # of a page, with their headings; what is in none is in the appendix
+    "requirements": "Requirements",
+    "design": "Design",
+    "depends": "What it hangs on",
+    "robustness": "Robustness",
+    "motion": "Motion",
+}
+_KINDS: dict[str, tuple[Callable[[RunResults], Table], ...]] = {
+    "design": (design, combinations),
+    "requirements": (objective, errors, required),
+    "depends": (sensitivity, limits, anatomy, helps, reach, trade_off),
+    "robustness": (clearances, tolerance, robust, weight),
+    "motion": (drives,),
+    "appendix": (optima, approximation, solver, timing),
+}
+
+
 def validation_table(rows: Sequence[ValidationRow]) -> Table:
     """Errors of both expansions, and whether the full one is within the case's tolerance."""
     names = "case mode where points order worst_taylor worst_linearised limit passed"
@@ -491,14 +509,14 @@ def modes_table(
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
-        "frequency [Hz]": [f"{hz:.10g}" for hz in frequencies_hz],
+        "frequency [Hz]": [f"{hz:#.6g}".rstrip(".") for hz in frequencies_hz],
     }
     weighed = weight is not None and weight.gravity is not None
     of_mesh = ("mesh", discretisation, "about" if weighed or estimated else "at most")
     for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
         if errors is not None:
             columns[f"{cause}: too high by {about}"] = [
-                f"{100 * e:.2g} %" if math.isfinite(e) else "cannot be bounded" for e in errors
+                at_most(e) if math.isfinite(e) else "cannot be bounded" for e in errors
             ]
     if weight is not None:
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [

@@ -182,7 +182,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         hz.tolist(),
         tuple(zip(model.q_names, q.tolist(), strict=True)),
         tuple(zip(model.y_names, y.tolist(), strict=True)),
-        ", ".join(shown_point(*point) for point in named if point[0]),
+        ", ".join(shown_point(*point, file.in_degrees) for point in named if point[0]),
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),

@@ -46,12 +46,13 @@ from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, requir
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
-from eigassign.study.pictures.moving import moving_modes
+from eigassign.study.pictures.moving import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
-from eigassign.study.results import MovingMode, RunResults, TargetStudy
+from eigassign.study.results import Motion, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
+SHOWN = 6  # modes of which a page shows the shapes
 
 
 @dataclass(frozen=True)
@@ -180,19 +181,20 @@ def _solved(
 
 def _moving(
     scene: Scene, y: Floats, targets: Sequence[TargetStudy], options: Options
-) -> tuple[MovingMode, ...]:
-    """The first wanted mode at design y, if a report shows it; of no targets the first expanded."""
+) -> tuple[Motion, ...]:
+    """Modes at design y, if a report shows them: first that of the first target, or expanded."""
     if options.report != "full" or scene.trajectory is None:
         return ()
-    numbers = np.full(len(scene.path.q), np.nan)
+    ones = np.ones(len(scene.path.q))
+    numbers = {f"mode {k}": k * ones for k in range(1, min(scene.shown_modes(), SHOWN) + 1)}
     target = next((t for t in targets if t.asked.is_goal), next(iter(targets), None))
-    if target is None:
-        name, numbers[:] = f"mode {scene.modes[0]}", scene.modes[0]
-    else:
+    name, first = f"mode {scene.modes[0]}", scene.modes[0] * ones
+    if target is not None:
         asked, row = target.asked, target.followed
-        name = asked.curve_name
-        numbers[asked.rows] = row[0].exact_numbers if row else asked.mode
-    return moving_modes(scene.file, scene.model, scene.path, y, name, numbers)
+        name, first = asked.curve_name, np.full_like(ones, np.nan)
+        first[asked.rows] = row[0].exact_numbers if row else asked.mode
+    numbers = {name: first, **numbers} | {name: first}
+    return tuple(motions(scene.file, scene.model, scene.path, y, numbers))
 
 
 def prepare(

@@ -16,6 +16,7 @@ Reading order:
     meaning     what the answer means, as far as the user asks for it
     pictures    what is drawn of a mechanism, as plain lines and numbers
     updating    parameters from measured frequencies
+    given       the inputs of a case in three lines
     collect     all of it put together as the results of a run
 """
 

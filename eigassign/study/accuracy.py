@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
+from eigassign.facts import at_most
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,
@@ -155,7 +156,7 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
     about = "at most" if model.has_bounds else "estimated at"
     finer = ", and solids a finer mesh" * (model.solids is not None)
     return [
-        f"mode {mode}: discretisation error {about} {100 * error:.2g} % (too high), {where} of "
+        f"mode {mode}: discretisation error {about} {at_most(error)} (too high), {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
         else f"mode {mode}: discretisation error not known, {where} of the {found.design} design: "
@@ -213,7 +214,7 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
                 "raise reduce_to"
             )
     return [
-        f"mode {mode}: truncation error of the reduced links at most {100 * worst:.2g} % (too "
+        f"mode {mode}: truncation error of the reduced links at most {at_most(worst)} (too "
         f"high), over {where}"
         for mode, worst in zip(modes, error, strict=True)
     ]

@@ -19,6 +19,7 @@ from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
+from eigassign.study.given import given
 from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
@@ -28,7 +29,7 @@ from eigassign.study.results import (
     DriveRow,
     MassRow,
     Meaning,
-    MovingMode,
+    Motion,
     OtherModes,
     RunResults,
     StaticRow,
@@ -57,7 +58,7 @@ def collect_results(
     studies: ModeStudies,
     accuracy: Accuracy,
     assigned: VerifiedAssignment | None,
-    moving: tuple[MovingMode, ...],
+    moving: tuple[Motion, ...],
     timing_s: Mapping[str, float],
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
@@ -67,6 +68,10 @@ def collect_results(
     results = RunResults(
         title=file.title,
         reference=file.reference,
+        author=file.author,
+        given=given(file, trajectory),
+        in_degrees=file.in_degrees,
+        reduced=scene.model.reduced is not None,
         case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
         case_sha256=file.sha256,
         case_files=file.files,
@@ -211,10 +216,8 @@ def _others(assigned: VerifiedAssignment) -> OtherModes | None:
 
 
 def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
-    """The modes from the lowest to the one above the highest that a target names."""
-    highest = max((mode for target in assigned.targets for mode in target.numbers), default=1)
-    solved = assigned.solved
-    before, after = (each.hz[:, : highest + 1] for each in (solved.initial, solved.exact))
+    """All modes that were solved, those above what targets name too."""
+    before, after = assigned.solved.initial.hz, assigned.solved.exact.hz
     return OtherModes(tuple(range(1, before.shape[1] + 1)), before, after)
 
 

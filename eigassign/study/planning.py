@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.units import angle_unit
 from eigassign.errors import (
     AccuracyError,
     CaseError,
@@ -106,7 +107,8 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
             raise _wrong(file, "expansion.q", f"{len(given)} values for {n} coordinates")
         q0 = with_middle_loads(file, given)
         why = f"from the case file{of_loads}"
-        return q0, f"expansion point: {shown_point(model.q_names, q0, file.q_units)}, {why}"
+        point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
+        return q0, f"expansion point: {point}, {why}"
     if trajectory is None:
         if n == 0:
             return np.zeros(0), ""
@@ -116,7 +118,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     poses[:, n:] = 0.0
     k = central_sample(poses @ joint_map(model).T)
     q0 = with_middle_loads(file, trajectory.q[k, :n])
-    point = shown_point(model.q_names, q0, file.q_units)
+    point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
     few = len(poses[:: 1 + len(poses) // MANY_SAMPLES])
     seen = "" if few == len(poses) else f" (of {few})"
     why = f"the most central: no other sample is nearer to its farthest one{seen}{of_loads}"
@@ -169,7 +171,7 @@ def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
 
 
 def _design(file: CaseFile, model: Model, y0: Floats) -> str:
-    return f"expansion design: {shown_point(model.y_names, y0, file.design_units)}"
+    return f"expansion design: {shown_point(model.y_names, y0, file.design_units, file.in_degrees)}"
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
@@ -217,10 +219,13 @@ def _outside(
     return notes
 
 
-def shown_point(names: Sequence[str], values: Floats, units: Iterable[str] = ()) -> str:
+def shown_point(
+    names: Sequence[str], values: Floats, units: Iterable[str] = (), in_degrees: bool = False
+) -> str:
     """``"q1 = 1.817 rad, q2 = 5.312 rad"``, with units where they are given; of many the first."""
-    own = zip(names, values, chain(units, repeat("")), strict=False)  # as many as names
-    shown = [f"{name} = {value:.6g} {unit}".rstrip() for name, value, unit in own]
+    said = (angle_unit(unit, in_degrees) for unit in chain(units, repeat("")))
+    own = zip(names, values, said, strict=False)  # as many as names
+    shown = [f"{name} = {value / size:.6g} {unit}".rstrip() for name, value, (unit, size) in own]
     rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
     return (", ".join(shown[:SHOWN]) or "none") + rest
 

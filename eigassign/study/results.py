@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
-from eigassign.case.units import handy_unit, is_bare
+from eigassign.case.units import angle_unit, handy_unit, is_bare
 from eigassign.facts import (
     OF_ROW,
     Curve,
@@ -36,9 +36,13 @@ _DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Row = TypeVar("Row")
-Kilograms = Annotated[float, Fact(unit="kg", digits=".6g")]
+Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
+EnergyShare = Annotated[
+    float, Fact(unit="fraction", digits=lambda s: f"{100 * s + 0.0:.1f} %", says_unit=True)
+]
+PerCent = Annotated[float, Fact(unit="% per %", digits=".3g")]
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
 
@@ -47,6 +51,14 @@ def frozen(array: Floats) -> Floats:
     array = np.ascontiguousarray(array)
     array.setflags(write=False)
     return array
+
+
+def _lowest(hz: Floats) -> str:
+    return number(float(hz.min()))
+
+
+def _highest(hz: Floats) -> str:
+    return number(float(hz.max()))
 
 
 def _metres(along: Floats) -> str:
@@ -152,10 +164,13 @@ class DesignRow:
     choice: Annotated[str | None, Fact("name or value chosen of its catalogue")] = None
     price: Annotated[float | None, Fact("of one SI unit")] = None
     choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
+    in_degrees: Annotated[bool, Fact(is_key=True)] = False  # people read angles so
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
         """The unit that people read it in, and the size of that in SI."""
+        if self.unit == "rad":
+            return angle_unit(self.unit, self.in_degrees)
         return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 
     @property
@@ -610,11 +625,11 @@ class PartRow:
 
     mode: Key
     part: str
-    strain: Annotated[Share, Fact("of what drives, springs, links and the weight hold")]
-    strain_largest: Share
+    strain: Annotated[EnergyShare, Fact("of what drives, springs, links and the weight hold")]
+    strain_largest: EnergyShare
     strain_at: str
-    kinetic: Annotated[Share, Fact("of what links, bodies and drives move with")]
-    kinetic_largest: Share
+    kinetic: Annotated[EnergyShare, Fact("of what links, bodies and drives move with")]
+    kinetic_largest: EnergyShare
     kinetic_at: str
 
 
@@ -624,8 +639,8 @@ class EffectRow:
 
     mode: Key
     property: str
-    percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
-    percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]
+    percent_per_percent: Annotated[PerCent, Fact(heading="mean")]
+    percent_per_percent_largest: Annotated[PerCent, Fact(heading="largest")]
     at: Annotated[str, Fact("the sample of the largest")]
 
 
@@ -684,8 +699,8 @@ class RangeRow:
     """
 
     label: Annotated[str, Fact("the target in words", "target")]
-    lowest_hz: Annotated[Curve, Fact(digits=lambda hz: f"{hz.min():.6g}")]
-    highest_hz: Annotated[Curve, Fact(digits=lambda hz: f"{hz.max():.6g}")]
+    lowest_hz: Annotated[Curve, Fact(digits=_lowest)]
+    highest_hz: Annotated[Curve, Fact(digits=_highest)]
     how: str
     error: Share
 
@@ -790,8 +805,8 @@ class DrawnPoses(Brief):
     of: tuple[str, ...] = ()  # of several trajectories the one that each pose belongs to
     joints: tuple[DrawnJoint, ...] = ()
     springs: tuple[DrawnSpring, ...] = ()
-    # per line: its section's largest radius of gyration at start and end; 0 without a section
-    sizes: tuple[tuple[float, float], ...] = ()
+    # per line: the depth of its section at start and end, m; 0 without a section
+    depths: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -812,24 +827,22 @@ class ModePictures(Brief):
     deformed: DrawnPoses  # a pose a mode
 
 
-@dataclass(frozen=True)
-class MovingMode:
-    """One mode at n poses along a trajectory, its largest displacement alike in all of them.
-
-    Lines of ``rest`` (n, n_points, d) with ``motions`` of the same shapes, half a period apart from
-    − to +; ``marks`` are joints and bodies by name and type, at ``mark_places`` (n, n_marks, d).
-    """
+@dataclass(frozen=True, repr=False)
+class MovingMode(Brief):
+    """One mode in n poses, its largest displacement alike in all: half a period takes it to −."""
 
     name: str  # "mode 1"
-    trajectory: str
-    time_s: Floats  # (n,)
     hz: Floats  # (n,)
-    rest: tuple[Floats, ...]
-    motions: tuple[Floats, ...]
-    marks: tuple[tuple[str, str], ...]  # name; the type of the joint, or body
-    mark_places: Floats
-    mark_motions: Floats
-    tip_path: Floats | None = None  # (…, d)
+    deformed: DrawnPoses
+
+
+@dataclass(frozen=True, repr=False)
+class Motion(Brief):
+    """The mechanism in n poses along a trajectory, and modes in each of them."""
+
+    trajectory: str
+    rest: DrawnPoses
+    modes: tuple[MovingMode, ...]  # what is asked for first
 
 
 # --- Everything together
@@ -909,6 +922,10 @@ class RunResults(Brief):
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
+    author: str | None = None
+    reduced: bool = False  # links are
+    in_degrees: bool = False  # people read angles so
+    given: tuple[str, ...] = ()  # links, drives, what it carries where: a line each
     # of an answer:
     design: tuple[DesignRow, ...] = ()
     targets: tuple[TargetStudy, ...] = ()
@@ -923,7 +940,7 @@ class RunResults(Brief):
     only: str | None = None  # of several trajectories the one that these are results of
     meaning: Meaning = field(default_factory=Meaning)
     spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for
-    moving: tuple[MovingMode, ...] = ()  # of every trajectory, where a report shows it
+    moving: tuple[Motion, ...] = ()  # of every trajectory, where a report shows it
     drives: tuple[DriveRow, ...] = ()  # of every coordinate, where anything loads them
     statics: tuple[StaticRow, ...] = ()  # of every static target
 

@@ -139,7 +139,7 @@ def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool)
             DrawnSpring("gear", True, True, ends[0], ends[0]),
             DrawnSpring("stay", False, False, ends[0], ends[2]),
         ),
-        sizes=((2e-3, 1e-3),) * n_links,
+        depths=((2e-2 * scale, 1e-2 * scale),) * n_links,
     )
 
 

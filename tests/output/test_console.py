@@ -162,10 +162,10 @@ def test_long_lines_end_between_words_and_go_on_indented():
 def test_modes_are_numbered_from_the_first_elastic_one():
     found = modes_table([202.21961234567, 513.2], rigid_modes=2, where="q1 = 1.8 rad")
     assert found.title == "Modes at q1 = 1.8 rad"
-    assert found.rows == (("1", "202.2196123"), ("2", "513.2"))
+    assert found.rows == (("1", "202.220"), ("2", "513.200"))
     assert found.caption == "2 rigid-body modes not counted."
     bounded = modes_table([200.0], rigid_modes=1, where="", truncation=[math.inf], note="so it is")
-    assert bounded.rows == (("1", "200", "cannot be bounded"),)
+    assert bounded.rows == (("1", "200.000", "cannot be bounded"),)
     assert bounded.caption == "1 rigid-body mode not counted. So it is."
 
 

@@ -67,13 +67,11 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
     assert [plan.name for plan in run_figures(paper)] == [
         "frequencies",
         "mechanism",
-        "assignment_mode_1",
-        "other_modes",
+        "coordinates",
         "progress",
         "approximation_mode_1_time",
         "approximation_mode_1_q",
         "approximation_mode_1_design",
-        "coordinates",
     ]
 
 
@@ -82,7 +80,7 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
 )
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
     files = render(run_figures(studied(make_results(**EVERY[name]))))
-    assert len(files) >= 11
+    assert len(files) >= 9
     for name, data in files.items():
         image = pixels(data)
         assert image.shape[1] == 880, name
@@ -93,27 +91,40 @@ def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
         assert not any(edge.any() for edge in edges), f"{name} runs over its edge"
 
 
-def test_the_assignment_shows_requirements_of_and_distances(paper):
-    figure, target = drawn(paper, "assignment_mode_1"), paper.targets[0]
-    assert figure.get_suptitle() == "Mode 1: assigned frequency"
+def curves_of(axes) -> list[np.ndarray]:
+    return [line.get_ydata() for line in axes.get_lines()]
+
+
+def test_what_was_asked_is_drawn_with_the_modes_around_it_and_its_distance(paper):
+    figure, target = drawn(paper, "frequencies"), paper.targets[0]
+    assert figure.get_suptitle() == "Frequencies before and after"
     above, below = figure.axes
-    curves = (target.initial_hz, target.exact_hz, target.predicted_hz, target.one_shot_hz)
-    for line, hz in zip(above.get_lines(), (target.target_hz, *curves), strict=True):
-        np.testing.assert_array_equal(line.get_xydata(), np.column_stack([paper.time_s, hz]))
-    off = below.get_lines()[2].get_ydata()
+    for hz in (target.target_hz, target.initial_hz, target.exact_hz):
+        assert any(np.array_equal(curve, hz) for curve in curves_of(above))
+    low, high = above.get_ylim()
+    asked = np.concatenate([target.target_hz, target.initial_hz, target.exact_hz])
+    assert low < asked.min() < asked.max() < high < paper.spectrum.optimal_hz[:, 1].min()
+    assert [text.get_text() for text in above.texts] == ["mode 1"]  # mode 2 is far above
+    (plan,) = plans_of(paper, "frequencies")
+    assert plan.shows.panels[0].whole[1] > paper.spectrum.initial_hz.max()
+    off = curves_of(below)[-1]
     np.testing.assert_allclose(off, 100.0 * (target.exact_hz / target.target_hz - 1.0))
     assert (above.get_ylabel(), below.get_ylabel()) == ("frequency [Hz]", "off target [%]")
     assert below.get_xlabel() == "time [s]"
-    assert legend(figure) == [
-        "target",
-        "initial (worst 6.00 %)",
-        "optimal, exact (worst 1.00 %)",
-        "optimal, predicted (worst 1.00 %)",
-        "one shot (worst 2.00 %)",
-    ]
+    assert set(legend(figure)) == {"Mode 1 at 190 Hz", "initial design", "optimal design"}
 
 
-def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(paper):
+def test_targets_far_apart_have_panels_of_their_own(paper):
+    results = make_results(n_targets=3)
+    (plan,) = plans_of(results, "frequencies")
+    panels = [panel for panel in plan.shows.panels if panel.label == "frequency [Hz]"]
+    assert len(panels) == 3
+    for panel, target in zip(panels, results.targets, strict=True):
+        assert panel.limits[0] < target.exact_hz.min() < target.exact_hz.max() < panel.limits[1]
+    assert len([p for p in run_figures(results) if p.section == "answer"]) == 2
+
+
+def test_all_that_is_forbidden_is_shaded(paper):
     lower, upper = paper.targets[0].asked.lower, paper.targets[0].asked.upper
     endless = np.full(lower.size, np.inf)
     found = with_limits(
@@ -124,18 +135,15 @@ def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(pape
         ("keep_out", 0.9 * lower, 0.95 * lower),
         ("gap", lower, endless),
     )
-    names = [f"{t.asked.kind}_mode_1" for t in found.targets]
-    names[3] += "_2"
-    assert [plan.name for plan in run_figures(found) if plan.name in names] == names
-    for name, limit in zip(names, found.targets, strict=True):
-        figure = drawn(found, name)
-        (shade,) = figure.axes[0].collections
-        heights = shade.get_paths()[0].get_extents()
-        for edge in (
-            hz[0] for hz in (limit.asked.lower, limit.asked.upper) if np.isfinite(hz).all()
-        ):
-            assert min(abs(edge - heights.y0), abs(edge - heights.y1)) < 1e-9
-        assert legend(figure)[0] == "forbidden"
+    frequencies, gap = drawn(found, "frequencies").axes
+    edges = [s.get_paths()[0].get_extents() for s in frequencies.collections]
+    for limit in found.targets[:4]:
+        for edge in (limit.asked.lower[0], limit.asked.upper[0]):
+            if np.isfinite(edge):
+                assert min(min(abs(edge - e.y0), abs(edge - e.y1)) for e in edges) < 1e-9
+    (shade,) = gap.collections
+    assert shade.get_paths()[0].get_extents().y1 == pytest.approx(lower[0])
+    assert "distance" in gap.get_ylabel()
 
 
 def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
@@ -172,16 +180,14 @@ def test_steps_that_miss_limits_say_by_how_much(paper):
     assert above.get_ylabel() == "rms error [%]"
 
 
-def test_a_band_is_drawn_with_all_modes_near_it(paper):
-    near = OtherModes((2, 3), np.full((152, 2), [160.0, 230.0]), np.full((152, 2), [170.0, 240.0]))
+def test_a_band_is_shown_with_the_modes_near_it(paper):
     found = with_limits(paper, ("keep_out", np.full(152, 180.0), np.full(152, 220.0)))
-    band = dataclasses.replace(found.targets[0], near=near)
-    figure = drawn(dataclasses.replace(found, targets=(band,)), "keep_out_mode_1")
-    (axes,) = figure.axes
-    shown = {line.get_ydata()[0] for line in axes.get_lines()}
-    assert shown == {180.0, 220.0, 160.0, 170.0, 230.0, 240.0}
-    assert {text.get_text() for text in axes.texts} >= {"mode 2", "mode 3"}
-    assert legend(figure) == ["forbidden", "initial design", "optimal design"]
+    near, far = np.full((152, 3), [160.0, 230.0, 700.0]), np.full((152, 3), [165.0, 240.0, 710.0])
+    found = dataclasses.replace(found, spectrum=OtherModes((1, 2, 3), near, far))
+    (axes,) = drawn(found, "frequencies").axes
+    low, high = axes.get_ylim()
+    assert low < 160.0 < 240.0 < high < 400.0
+    assert [text.get_text() for text in axes.texts] == ["mode 1", "mode 2"]
 
 
 def test_sensitivities_are_bars_of_the_largest():
@@ -246,15 +252,6 @@ def test_the_coordinates_have_a_panel_for_each_unit_and_no_two_neighbours_are_al
     assert all(first.dash != second.dash for first, second in itertools.pairwise(ordered))
 
 
-def test_next_modes_are_named_at_the_end_of_their_curves(paper):
-    (axes,) = drawn(paper, "other_modes").axes
-    assert [text.get_text() for text in axes.texts] == ["mode 2", "mode 3", "mode 4"]
-    solid = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
-    for line, text, hz in zip(solid, axes.texts, paper.others.optimal_hz.T, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), hz)
-        assert text.get_color() == line.get_color()
-
-
 def test_maps_stand_side_by_side_with_the_expansion_point(paper):
     figure = drawn(paper, "approximation_mode_1_design")
     maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
@@ -288,7 +285,8 @@ def test_the_mechanism_is_drawn_whole_at_one_scale_in_all_directions(spatial):
     assert legend(figure)[:3] == ["tip path", "elbow_mass", "tool_mass"]
     assert len(legend(figure)) == 3 + len(found.poses.lines)
     links = [c for c in axes.collections if hasattr(c, "get_segments")]
-    assert len(links) == len(found.poses.lines)
+    links = [c for c in links if c.get_color()[0][:3].min() < 1.0]  # not the gaps around them
+    assert len(links) == len(found.poses.lines) * len(found.poses.lines[0])
     for points in (piece for pose in links for piece in pose.get_segments()):
         assert ((points >= low) & (points <= high)).all()
     if not spatial:
@@ -300,7 +298,7 @@ def test_the_mechanism_is_drawn_whole_at_one_scale_in_all_directions(spatial):
 
 
 def test_figures_are_written_in_several_formats_the_same_every_time(paper):
-    plans, kinds = plans_of(paper, "mechanism", "other_modes"), ("png", "svg", "pdf")
+    plans, kinds = plans_of(paper, "mechanism", "coordinates"), ("png", "svg", "pdf")
     files = render(plans, kinds)
     assert list(files) == [f"{plan.name}.{kind}" for plan in plans for kind in kinds]
     assert files["mechanism.png"].startswith(b"\x89PNG")
@@ -313,7 +311,7 @@ def test_figures_are_written_in_several_formats_the_same_every_time(paper):
 
 
 def test_the_user_s_matplotlib_settings_change_nothing_and_are_left_alone(paper):
-    plans = plans_of(paper, "assignment_mode_1")
+    plans = plans_of(paper, "frequencies")
     before, files = dict(matplotlib.rcParams), render(plans)
     assert dict(matplotlib.rcParams) == before
     theirs = {"font.size": 30, "font.family": "monospace", "path.simplify": False}
@@ -323,12 +321,12 @@ def test_the_user_s_matplotlib_settings_change_nothing_and_are_left_alone(paper)
 
 def test_another_answer_gives_another_picture(paper):
     moved = dataclasses.replace(paper.targets[0], exact_hz=paper.targets[0].exact_hz * 1.01)
-    names = ("assignment_mode_1", "other_modes")
+    names = ("frequencies", "coordinates")
     before, after = (
         render(plans_of(results, *names))
         for results in (paper, dataclasses.replace(paper, targets=(moved,)))
     )
-    assert [name for name in before if before[name] != after[name]] == ["assignment_mode_1.png"]
+    assert [name for name in before if before[name] != after[name]] == ["frequencies.png"]
 
 
 def test_results_without_a_trajectory_plan_only_what_they_have():
@@ -344,11 +342,9 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     broken[:3] = np.nan
     holes = dataclasses.replace(values, linearised_hz=broken)
     over = dataclasses.replace(study.over_design, values=holes)
-    target = dataclasses.replace(paper.targets[0], predicted_hz=np.full(paper.time_s.size, np.nan))
     studies = (dataclasses.replace(study, over_design=over),)
-    found = dataclasses.replace(paper, studies=studies, targets=(target,))
-    for name in ("assignment_mode_1", "approximation_mode_1_design"):
-        drawn(found, name).canvas.draw()
+    found = dataclasses.replace(paper, studies=studies)
+    drawn(found, "approximation_mode_1_design").canvas.draw()
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():

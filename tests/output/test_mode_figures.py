@@ -18,6 +18,7 @@ from eigassign.output import (
     mechanism_plan,
     mode_figures,
     render,
+    scale_words,
     thumbnail,
     write_modes,
 )
@@ -68,7 +69,7 @@ def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it()
     found = pictures("four_bar")
     figure = draw(mode_figures(found)[1])
     assert figure.get_suptitle().endswith(f"mode 2, {found.frequencies_hz[1]:.5g} Hz")
-    for drawn, line in zip(segments(figure, "#c4c4c4"), found.rest.lines[0], strict=True):
+    for drawn, line in zip(segments(figure, "#d4d4d4"), found.rest.lines[0], strict=True):
         np.testing.assert_allclose(drawn, line)
     for drawn, line in zip(segments(figure, BLUE), found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn, line)
@@ -112,6 +113,7 @@ def test_the_shapes_are_left_as_numbers_too(tmp_path: Path) -> None:
 
 def poses(*lines: list[list[float]], **more: object) -> DrawnPoses:
     """One pose of these lines."""
+    more = {"line_links": ("a",) * len(lines), **more}
     return DrawnPoses(np.zeros(1), (tuple(np.array(line) for line in lines),), ("a",), **more)
 
 
@@ -144,8 +146,8 @@ def test_a_mechanism_in_the_plane_of_sight_is_seen_from_another_side() -> None:
 
 def test_a_taper_is_drawn_in_pieces_that_grow_thinner() -> None:
     line = [[0.0, 0.0], [1.0, 0.0]]
-    figure = draw(mechanism_plan("", poses(line, sizes=((0.01, 0.0025),))))
-    (links,) = figure.axes[0].collections
+    figure = draw(mechanism_plan("", poses(line, depths=((0.1, 0.025),))))
+    _, links = figure.axes[0].collections  # over a gap around it
     widths = np.array(links.get_linewidths())
     assert len(widths) > 4
     assert (np.diff(widths) < 0.0).all()
@@ -153,17 +155,31 @@ def test_a_taper_is_drawn_in_pieces_that_grow_thinner() -> None:
     np.testing.assert_allclose(links.get_segments()[-1][-1], line[1], atol=1e-12)
 
 
-def test_thick_sections_are_drawn_thick_and_heavy_bodies_large() -> None:
-    lines = [[[0.0, float(k)], [1.0, float(k)]] for k in range(3)]
-    sizes = ((0.01, 0.01), (0.0025, 0.0025), (0.0, 0.0))
+def test_sections_are_drawn_to_scale_or_so_many_times_as_thick() -> None:
+    lines = [[[0.0, float(k)], [2.0, float(k)]] for k in range(3)]
+    for depth, times, words in (
+        (0.2, 1, "to scale"),
+        (0.01, 10, "10 times"),
+        (5.0, None, "thinner"),
+    ):
+        depths = ((depth, depth), (depth / 2, depth / 2), (0.0, 0.0))
+        shown = poses(*lines, depths=depths)
+        axes = draw(mechanism_plan("", shown)).axes[0]
+        points_per_metre = np.diff(axes.transData.transform([[0, 0], [1, 0]])[:, 0])[0]
+        points_per_metre *= 72.0 / axes.figure.dpi
+        thick, thin, plain = (c.get_linewidths()[0] for c in axes.collections[1::2])
+        assert thin == pytest.approx(thick / 2)
+        assert plain >= 1.3
+        if times:
+            assert thick == pytest.approx(times * depth * points_per_metre, rel=1e-6)
+        assert words in scale_words(shown)
+
+
+def test_heavy_bodies_are_large() -> None:
+    line = [[0.0, 0.0], [1.0, 0.0]]
     bodies = tuple(DrawnBody(f"{m}", m, np.zeros((1, 2))) for m in (8.0, 1.0, 0.0))
-    (axes, _) = draw(mechanism_plan("", poses(*lines, sizes=sizes, bodies=bodies))).axes
-    thick, thin, plain = axes.collections[0].get_linewidths()
-    assert 1.3 < thin < thick
-    assert plain < thick
+    axes = draw(mechanism_plan("", poses(line, bodies=bodies))).axes[0]
     assert [dot.get_markersize() for dot in axes.get_lines()] == [12.0, 9.0, 6.0]
-    weightless = draw(mechanism_plan("", poses(*lines, bodies=bodies[2:])))
-    assert [dot.get_markersize() for dot in weightless.axes[0].get_lines()] == [8.0]
 
 
 @pytest.mark.parametrize(

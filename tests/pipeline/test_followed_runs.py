@@ -184,4 +184,4 @@ def test_other_commands_work_on_such_a_case(tmp_path: Path) -> None:
     assert expand_case(file, quick).results.shortcoming is None
     assert {row.mode for row in validate(file).rows} == {1, 2}
     outcome = optimize(file, Options(out=tmp_path / "o", use_cache=False, figures=("png",)))
-    assert (outcome.folder / "figures" / "assignment_mode_like_1.png").is_file()
+    assert (outcome.folder / "figures" / "frequencies.png").is_file()

@@ -339,7 +339,7 @@ def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> 
     how = Options(out=tmp_path / "run", use_cache=False, figures=("svg",), report="light")
     optimize(written(tmp_path, PAIR), how)
     names = {p.relative_to(tmp_path / "run").as_posix() for p in (tmp_path / "run").rglob("*.*")}
-    for stem in ("coordinates", "assignment_mode_1", "approximation_mode_1_time", "other_modes"):
+    for stem in ("frequencies", "coordinates", "approximation_mode_1_time"):
         assert {f"figures/{stem}_pick.svg", f"figures/{stem}_return.svg"} <= names
         assert f"figures/{stem}.svg" not in names
     assert {"trajectory_pick.csv", "trajectory_return.csv", "frequencies.csv"} <= names

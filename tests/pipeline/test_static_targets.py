@@ -81,7 +81,7 @@ def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
     card = verdict_of(results)
     assert card is not None
     assert any(
-        "Compliance of forearm.end along [0, 1] at most 5.5 um/N" in one for one in card.asked
+        "Compliance of forearm.end along [0, 1] at most 5.5 um/N" in f.label for f in card.findings
     )
     assert [one.tone for one in card.findings] == ["good"] * 4
 

@@ -151,10 +151,13 @@ def test_masses_and_thicknesses_are_those_of_the_design() -> None:
     (carriage,) = found.rest.bodies
     assert (carriage.name, carriage.mass) == ("carriage", 4.5)
     _, arm = pictures("arm_6r")
-    sizes = dict(zip(arm.rest.line_links, arm.rest.sizes, strict=True))
-    # √(I/A) = √(D² + d²)/4 of a tube
-    assert sizes["forearm"] == pytest.approx([np.hypot(0.09, 0.082) / 4, np.hypot(0.07, 0.062) / 4])
-    assert sizes["hand"] == (0.0, 0.0)
+    depths = dict(zip(arm.rest.line_links, arm.rest.depths, strict=True))
+    assert depths["forearm"] == pytest.approx([0.09, 0.07])  # a taper
+    assert depths["hand"] == (0.0, 0.0)
+    assert found.rest.depths[0] == (0.05, 0.05)
+    y[0] = 0.06
+    thicker = draw_modes(case.file, case.model(), q, y, 1).rest
+    assert (0.06, 0.06) in thicker.depths
 
 
 def test_without_a_tip_the_path_is_that_of_the_point_that_travels_farthest() -> None:

@@ -33,6 +33,7 @@ class Document(Part):
 
     Keys:
         title: name of the case
+        author: whose case it is; the report names them
         reference: source of the case
         mechanism: materials, sections, links, joints, bodies and springs
         coordinates: which joints make up q, in this order, and how each is held
@@ -47,6 +48,7 @@ class Document(Part):
     """
 
     title: Annotated[str, Field(min_length=1, max_length=200), _ONE_LINE]
+    author: Annotated[str, Field(min_length=1, max_length=200), _ONE_LINE] | None = None
     reference: Annotated[str, Field(max_length=1000), _ONE_LINE] | None = None
     mechanism: Mechanism
     coordinates: Named[Coordinate] = FrozenDict()

@@ -5,11 +5,12 @@ In reading order; each imports from those above it only:
     graph          what a graph shows, whoever draws it: curves, shades, bars, maps; its limits
     style          matplotlib: the style sheet, an empty figure, file formats
     paper          descriptions drawn with matplotlib, and figures as files
-    screen         descriptions as Plotly's data, their tables, a mode that moves
-    curves         curves over time: coordinates, assignment, other modes; the steps of the search
+    curves         curves over time: what was asked, coordinates, drives; the steps of the search
     approximation  expansion against exact over time and over entries of q or y
     meaning        sensitivities, reach and tolerance, error against mass
-    mechanism      links, joints, bodies and springs; poses along the trajectory
+    scene          the mechanism as parts at places: links as thick as their sections, symbols
+    mechanism      the parts drawn with matplotlib; poses along the trajectory
+    screen         descriptions as Plotly's data, their tables; the scene for a page
     motion         mode shapes, the mechanism by itself, and both in motion
     run            which figures a run has
     update         measured frequencies against the model, parameters with intervals

@@ -6,15 +6,15 @@ in Hz, errors in % of the frequency in Hz.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.case.units import handy_unit
-from eigassign.facts import capital, number, percent
+from eigassign.case.units import angle_unit, handy_unit
+from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
     Curve,
@@ -34,10 +34,8 @@ from eigassign.study.results import AssignmentRow, OtherModes, RunResults, Targe
 Floats = NDArray[np.float64]
 
 TARGET = Look(graph.BLACK, 1.6, "dotted")
-INITIAL = Look(graph.ORANGE, 1.8, "dash-dotted")
 ONE_SHOT = Look(graph.PURPLE, 0.9)
 OPTIMAL = Look(graph.SKY, 3.2)
-PREDICTED = Look(graph.BLUE, 1.3, "dashed")
 LEVEL = Look(graph.BLACK, 0.8)
 EDGE = Look(graph.VERMILLION, 1.0)
 _BEFORE, _AFTER = Look(graph.BLACK, 1.3, "dashed"), Look(graph.BLACK, 1.8)
@@ -61,17 +59,19 @@ def coordinates(results: RunResults) -> FigurePlan:
     panels = []
     for unit in units:
         own = [i for i, each in enumerate(results.q_units) if each == unit]
-        curves = (Curve(results.q[:, i], series(i), short(results.q_names[i])) for i in own)
+        said, size = angle_unit(unit, results.in_degrees)
+        curves = (Curve(results.q[:, i] / size, series(i), short(results.q_names[i])) for i in own)
         quantity = {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate")
         height = 2.6 if len(units) == 1 else 1.8
-        panels.append(Panel(labelled(quantity, unit), tuple(curves), height))
+        panels.append(Panel(labelled(quantity, said), tuple(curves), height))
     title = f"Coordinates along {results.along}"
     return FigurePlan(
         f"coordinates{suffix(results)}",
         f"Coordinates{where(results)}",
         f"{names} along {results.along}, {results.time_s.size} samples.",
         f"Curves of {names} over time.",
-        Graph(title, "time [s]", results.time_s, tuple(panels)),
+        _over_time(title, results, panels),
+        "motion",
     )
 
 
@@ -93,7 +93,8 @@ def drives(results: RunResults) -> FigurePlan:
         f"{title}{where(results)}",
         f"Torques and forces of {names} along {results.along}, of {results.drives[0].of}.",
         f"Torques and forces of {names} over time before and after.",
-        Graph(f"{title}{where(results)}", "time [s]", results.time_s, tuple(panels)),
+        _over_time(f"{title}{where(results)}", results, panels),
+        "motion",
     )
 
 
@@ -115,78 +116,137 @@ def statics(results: RunResults) -> FigurePlan:
         f"{title}{where(results)}",
         f"{capital(names)}, along {results.along}; the drives hold.",
         f"{capital(names)} over time before and after.",
-        Graph(f"{title}{where(results)}", "time [s]", results.time_s, tuple(panels)),
+        _over_time(f"{title}{where(results)}", results, panels),
+        "requirements",
     )
 
 
-# --- Everything that was asked for, before and after
+def _over_time(title: str, results: RunResults, panels: Sequence[Panel]) -> Graph:
+    clock = results.only or ""
+    return Graph(title, "time [s]", results.time_s, tuple(panels), clock=clock)
+
+
+# --- What was asked for, before and after (the paper's Figures 4 and 5)
+
+ROOM = 0.3  # of what a panel has to hold, or of a band: so much is shown beside it
+APART = 0.5  # of both together: what lies farther apart has panels of its own, of which there are
+MOST_PANELS = 3  # at most
 
 
 def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
-    """The modes up to the one above the highest asked for, with targets, limits and bands."""
-    wanted = [t for t in results.targets if t.asked.is_goal]
-    limits = [t.asked for t in results.targets if not t.asked.is_goal and not t.asked.is_aim]
-    limits = [asked for asked in limits if len(asked.terms) < 2]
+    """Targets, limits and bands with the modes around them; what lies far apart in own panels."""
+    groups, time_s = _groups(results, spectrum), results.time_s
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
-    time_s = results.time_s
-    low, high = graph.bounds([curve.y for curve in modes])
-    asked = [mark for one in limits for mark in _asked(one, time_s[one.rows], 0.05 * (high - low))]
-    targets = (Curve(t.target_hz, TARGET, capital(t.label), time_s[t.asked.rows]) for t in wanted)
-    marks: tuple[Mark, ...] = (*asked, *modes, *targets)
-    panels = [Panel("frequency [Hz]", marks, 2.8, key=BEFORE_AND_AFTER)]
+    height = {1: 2.9, 2: 1.9}.get(len(groups), 1.5)
+    panels = []
+    for own, (low, high) in groups:
+        asked = (mark for one in own for mark in _asked(one, time_s, 0.04 * (high - low)))
+        marks = (*asked, *modes)
+        panels.append(Panel("frequency [Hz]", marks, height, within=(low, high)))
+    for gap in (target for target in results.targets if len(target.asked.terms) > 1):
+        panels.append(_distance(gap, time_s))
+    wanted = [target for target in results.targets if target.asked.is_goal]
     if wanted:
         off = [curve for target in wanted for curve in _off_target(results, target)]
-        panels.append(Panel("off target [%]", (Rule(0.0, LEVEL), *off), 1.4, holds=(np.zeros(1),)))
+        panels.append(Panel("off target [%]", (Rule(0.0, LEVEL), *off), 1.3, holds=(np.zeros(1),)))
+    panels[0] = replace(panels[0], key=BEFORE_AND_AFTER)
     heading = f"Frequencies before and after{where(results)}"
     return FigurePlan(
         f"frequencies{suffix(results)}",
         heading,
-        f"Exact frequencies of mode{'s' if len(spectrum.modes) > 1 else ''} "
-        f"{', '.join(map(str, spectrum.modes))} along {results.along}, before and after, with all "
-        "that was asked for.",
+        f"Exact frequencies along {results.along} with all that was asked for.",
         "Frequencies over time before and after, with targets, limits and bands.",
-        Graph(heading, "time [s]", time_s, tuple(panels)),
+        _over_time(heading, results, panels),
+        "answer",
     )
 
 
-def _asked(asked: Requirement, x: Floats, width: float) -> Iterator[Mark]:
-    """A band; of a limit a strip on its wrong side in its mode's colour, for others may lie there.
+def _groups(
+    results: RunResults, spectrum: OtherModes
+) -> list[tuple[list[TargetStudy], tuple[float, float]]]:
+    """What is asked of frequencies, in groups of like ones, and the ends of each group's panel."""
+    asked = [target for target in results.targets if len(target.asked.terms) < 2]
+    held = sorted(((_range(t, spectrum), [t]) for t in asked), key=lambda each: each[0])
+    if not held:
+        held = [(graph.bounds([spectrum.initial_hz[:, :1], spectrum.optimal_hz[:, :1]]), [])]
+    while len(held) > 1:
+        gaps = [b[0][0] - a[0][1] for a, b in pairwise(held)]
+        k = int(np.argmin(gaps))
+        (low, _), (_, high) = held[k][0], held[k + 1][0]
+        if gaps[k] > APART * (high - low) and len(held) <= MOST_PANELS:
+            break
+        top = max(high, held[k][0][1])
+        held[k : k + 2] = [((low, top), [*held[k][1], *held[k + 1][1]])]
+    margins = (0.05 * (high - low) for (low, high), _ in held)
+    return [
+        (own, (low - margin, high + margin))
+        for ((low, high), own), margin in zip(held, margins, strict=True)
+    ]
 
-    ``width`` is that of the strip in Hz.
-    """
+
+def _range(target: TargetStudy, spectrum: OtherModes) -> tuple[float, float]:
+    """The frequencies that a panel has to hold of a target: its edges, and modes beside them."""
+    asked = target.asked
     low, high = asked.forbidden_hz
-    if low is not None and high is not None:
+    if not asked.terms:  # a band: the nearest modes that are near
+        edges = [edge for edge in (low, high) if edge is not None]
+        bottom, top = graph.bounds(edges)
+        room = ROOM * top
+        near = np.concatenate([spectrum.initial_hz[asked.rows], spectrum.optimal_hz[asked.rows]])
+        return graph.bounds([*edges, near[(near > bottom - room) & (near < top + room)]])
+    own = [target.initial_hz, target.exact_hz]
+    own += [target.target_hz] if asked.is_goal else [e for e in (low, high) if e is not None]
+    bottom, top = graph.bounds(own)
+    room = ROOM * (top - bottom)
+    return max(bottom - room, 0.0), top + room
+
+
+def _asked(target: TargetStudy, time_s: Floats, width: float) -> Iterator[Mark]:
+    """A wanted frequency; a band; of a limit a strip on its wrong side in its mode's colour.
+
+    Others may lie there. ``width`` is that of the strip in Hz. Of a mode that is followed by its
+    shape also its own curves, for its number changes.
+    """
+    asked, x = target.asked, time_s[target.asked.rows]
+    low, high = asked.forbidden_hz
+    colour = mode_colour(asked.mode)
+    if asked.is_goal:
+        yield Curve(target.target_hz, TARGET, capital(target.label), x)
+    elif low is not None and high is not None:
         yield Shade(low, high, graph.VERMILLION, asked.label, x=x)
-        return
-    edge, colour = asked.hz, mode_colour(asked.mode)
-    low, high = (edge - width, edge) if low is None else (edge, edge + width)
-    yield Shade(low, high, colour, asked.label, 0.25, x)
-    yield Curve(edge, Look(colour, 1.0, "fine"), x=x)
+    elif not asked.is_aim:
+        low, high = (asked.hz - width, asked.hz) if low is None else (asked.hz, asked.hz + width)
+        yield Shade(low, high, colour, asked.label, 0.25, x)
+        yield Curve(asked.hz, Look(colour, 1.0, "fine"), x=x)
+    if asked.followed and asked.terms:
+        yield Curve(target.initial_hz, replace(_BEFORE, colour=graph.BLACK), x=x)
+        yield Curve(target.exact_hz, replace(_AFTER, width=2.6), x=x, end=asked.curve_name)
+
+
+def _distance(target: TargetStudy, time_s: Floats) -> Panel:
+    """A distance of modes before and after, and what is too little."""
+    asked, x = target.asked, time_s[target.asked.rows]
+    low, high = asked.forbidden_hz
+    marks: tuple[Mark, ...] = (
+        Shade(low, high, graph.VERMILLION, asked.label, x=x),
+        *(Curve(edge, EDGE, x=x) for edge in (low, high) if edge is not None),
+        Curve(target.initial_hz, _BEFORE, x=x),
+        Curve(target.exact_hz, _AFTER, x=x),
+    )
+    return Panel(f"{asked.axis} [Hz]", marks, 1.4)
 
 
 def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
     """f/f_target − 1 before and after, in the colour of the mode."""
     asked = target.asked
     colour = mode_colour(asked.mode)
-    stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, asked.curve_name))
+    name = asked.curve_name
+    stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, name))
     for hz, look, end in stages:
         off = 100.0 * (hz / target.target_hz - 1.0)
         x = results.time_s[asked.rows]
-        yield Curve(off, replace(look, colour=colour), x=x, end=end)
-
-
-def other_modes(results: RunResults, others: OtherModes) -> FigurePlan:
-    """The modes of which no frequency is wanted, before and after (the paper's Figure 5)."""
-    modes = ", ".join(map(str, others.modes))
-    panel = Panel("frequency [Hz]", before_and_after(others), 2.9, key=BEFORE_AND_AFTER)
-    title = f"Other modes before and after, exact{where(results)}"
-    return FigurePlan(
-        f"other_modes{suffix(results)}",
-        f"Other modes{where(results)}",
-        f"Exact frequencies before and after of modes {modes}, for which no frequency was asked.",
-        f"Frequencies of modes {modes} over time before and after.",
-        Graph(title, "time [s]", results.time_s, (panel,)),
-    )
+        hover = f"{name}, initial design" * (not end)
+        yield Curve(off, replace(look, colour=colour), x=x, end=end, hover=hover)
 
 
 def mode_colour(mode: int) -> str:
@@ -199,89 +259,10 @@ def before_and_after(shown: OtherModes) -> tuple[Curve, ...]:
     found = []
     for k, mode in enumerate(shown.modes):
         before, after = (replace(look, colour=mode_colour(mode)) for look in (_BEFORE, _AFTER))
-        found.append(Curve(shown.initial_hz[:, k], before))
-        found.append(Curve(shown.optimal_hz[:, k], after, end=f"mode {mode}"))
+        name = f"mode {mode}"
+        found.append(Curve(shown.initial_hz[:, k], before, hover=f"{name}, initial design"))
+        found.append(Curve(shown.optimal_hz[:, k], after, end=name))
     return tuple(found)
-
-
-# --- One target (the paper's Figure 4)
-
-
-def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
-    """A target in time: frequencies before and after, and their distance or what is forbidden."""
-    asked = target.asked
-    modes = "_".join(map(str, asked.modes)) or "all"
-    if asked.followed:
-        modes = f"like_{asked.mode}"
-    place, name, label = where(results), capital(asked.curve_name), capital(asked.label)
-    if asked.is_goal:
-        kind, what = "assignment", "distance to the target"
-        heading = f"{name}: initial, optimal and target frequency"
-        alt = f"Frequency of {asked.curve_name} over time before and after, with its target."
-        title, panels = f"{name}: assigned frequency", _assigned(results, target)
-    else:
-        kind, what, heading, title = asked.kind, "violation", label, label
-        alt = f"{label}: frequencies over time before and after."
-        panels = (_limited(results, target),)
-    said = f"Worst {what} {percent(target.error.initial.max_relative)} before and "
-    said += f"{percent(target.error.exact.max_relative)} after."
-    if asked.is_aim:
-        before, after = (number(hz.min()) for hz in (target.initial_hz, target.exact_hz))
-        said = f"{before} Hz before and {after} Hz after at least, at the samples."
-    return FigurePlan(
-        f"{kind}_mode_{modes}{suffix(results)}",
-        f"{heading}{place}",
-        said,
-        alt,
-        Graph(f"{title}{place}", "time [s]", results.time_s[asked.rows], panels),
-    )
-
-
-def _assigned(results: RunResults, target: TargetStudy) -> tuple[Panel, ...]:
-    """Frequencies above, f/f_target − 1 below."""
-    curves = _curves(results, target)
-    off = (Curve(100.0 * (curve.y / target.target_hz - 1.0), curve.look) for curve in curves)
-    return (
-        Panel("frequency [Hz]", (Curve(target.target_hz, TARGET, "target"), *curves), 2.0),
-        Panel("off target [%]", (Rule(0.0, LEVEL), *off), 1.35, holds=(np.zeros(1),)),
-    )
-
-
-def _curves(results: RunResults, target: TargetStudy) -> tuple[Curve, ...]:
-    """The frequencies of a target before and after, each named with its worst error.
-
-    The one shot is shown where it is not the answer itself.
-    """
-    row, error = results.assignment, target.error
-    beside = row is not None and row.method != "one_shot"
-    stages = [
-        (target.initial_hz, INITIAL, "initial", error.initial),
-        (target.exact_hz, OPTIMAL, "optimal, exact", error.exact),
-        (target.predicted_hz, PREDICTED, "optimal, predicted", error.predicted),
-        (target.one_shot_hz if beside else None, ONE_SHOT, "one shot", error.one_shot),
-    ]
-    found = []
-    for hz, look, name, e in stages:
-        if hz is not None and e:
-            met = not target.asked.is_goal and e.max_relative == 0.0
-            worst = "met" if met else f"worst {percent(e.max_relative)}"
-            worst = f"at least {number(hz.min())} Hz" if target.asked.is_aim else worst
-            found.append(Curve(hz, look, f"{name} ({worst})"))
-    return tuple(found)
-
-
-def _limited(results: RunResults, target: TargetStudy) -> Panel:
-    """Frequencies of a limit, a gap, or all modes by a band; the forbidden ones are shaded."""
-    asked, near = target.asked, target.near
-    curves = _curves(results, target) if near is None else before_and_after(near)
-    low, high = asked.forbidden_hz
-    marks: tuple[Mark, ...] = (
-        *(() if asked.is_aim else (Shade(low, high, graph.VERMILLION, "forbidden"),)),
-        *(Curve(hz, EDGE) for hz in (low, high) if hz is not None),
-        *curves,
-    )
-    key = () if near is None else BEFORE_AND_AFTER
-    return Panel(f"{asked.axis} [Hz]", marks, 2.9, key=key)
 
 
 # --- The steps of the sequential method

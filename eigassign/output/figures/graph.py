@@ -58,6 +58,7 @@ class Curve:
     end: str = ""
     group: str = ""  # of the legend
     names: tuple[str, ...] = ()  # of its points, where each has one
+    hover: str = ""  # its name under the pointer, where it has no other
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,7 @@ class Panel:
     On a ``logarithmic`` one whole decades are shown, at most ``decades``; what is below them lies
     on the edge. ``holds`` are values that the ordinate has to hold besides the curves'; ``key``
     are entries of the legend that no mark has. ``names`` are those of the ordinates 0, −1, −2, ….
+    Where only part of the curves matters, the ordinate ends where ``within`` says.
     """
 
     label: str
@@ -107,6 +109,7 @@ class Panel:
     from_zero: bool = False
     key: tuple[tuple[str, Look], ...] = ()
     names: tuple[str, ...] = ()
+    within: tuple[float, float] | None = None
 
     @property
     def curves(self) -> tuple[Curve, ...]:
@@ -116,10 +119,18 @@ class Panel:
     @cached_property
     def limits(self) -> tuple[float, float]:
         """The ends of the ordinate."""
-        values = [*(curve.y for curve in self.curves), *self.holds]
         if self.logarithmic:
-            return decades(values, self.decades)
-        low, high = bounds(values)
+            return decades(self._values, self.decades)
+        return self.whole if self.within is None else self.within
+
+    @property
+    def _values(self) -> list[Floats]:
+        return [*(curve.y for curve in self.curves), *self.holds]
+
+    @cached_property
+    def whole(self) -> tuple[float, float]:
+        """The ends of an ordinate that all curves lie in."""
+        low, high = bounds(self._values)
         margin = 0.05 * (high - low)
         return 0.0 if self.from_zero else low - margin, high + margin
 
@@ -142,8 +153,9 @@ class Panel:
 
     def ends(self) -> list[tuple[str, float, str]]:
         """The names at the curves' ends, where they do not overlap, and their colours."""
-        named = sorted((c for c in self.curves if c.end), key=lambda c: float(c.y[-1]))
         low, high = self.limits
+        inside = (c for c in self.curves if c.end and low <= c.y[-1] <= high)
+        named = sorted(inside, key=lambda c: float(c.y[-1]))
         places = spread([float(c.y[-1]) for c in named], 0.15 * (high - low) / self.height)
         return [(c.end, at, c.look.colour) for c, at in zip(named, places, strict=True)]
 
@@ -160,6 +172,7 @@ class Graph:
     x_logarithmic: bool = False
     counted: bool = False  # the abscissa: whole numbers
     beside: bool = False  # where the legend stands; else above
+    clock: str | None = None  # the trajectory whose time the abscissa is, "" of a single one
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +223,8 @@ Description = Graph | Bars | Maps
 class FigurePlan:
     """One figure: its file's name without ending, heading, caption, alternative text, content.
 
-    ``shows`` describes it, or draws it where matplotlib alone can.
+    ``shows`` describes it, or draws it where matplotlib alone can. ``section`` is that of the page
+    that it stands in; a table of this ``title`` has its numbers.
     """
 
     name: str
@@ -218,6 +232,8 @@ class FigurePlan:
     caption: str
     alt: str
     shows: Description | Callable[[], Figure]
+    section: str = "appendix"
+    title: str = ""
 
 
 # --- Limits and places

@@ -84,6 +84,8 @@ def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePla
         f"{of_many}.",
         "Bars of the relative sensitivity of each target to each parameter.",
         Bars("Sensitivity of the frequencies", "% per %", names, tuple(groups)),
+        "depends",
+        "Sensitivity",
     )
 
 
@@ -95,7 +97,8 @@ def ranges(
     number: int,
 ) -> FigurePlan:
     """The answer inside the frequencies of all designs within the bounds, and the tolerances."""
-    place = f" along {along.name!r}" if len(results.trajectories) > 1 else ""
+    several = len(results.trajectories) > 1
+    place, clock = f" along {along.name!r}" if several else "", along.name if several else ""
     said: list[str] = []
     shades: list[Shade] = []
     for row, colour, label, what, words in (
@@ -118,7 +121,8 @@ def ranges(
         f"{capital(target.label)}: reach and tolerance{place}",
         " ".join(said),
         "The answer's frequency over time inside the range of others.",
-        Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,)),
+        Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,), clock=clock),
+        "depends" if shown[0] is not None else "robustness",
     )
 
 
@@ -148,4 +152,6 @@ def trade_off(found: TradeOff) -> FigurePlan:
             panels=(Panel(f"{found.error} [%]", marks, 2.4, from_zero=True),),
             x_limits=(low - margin, high + margin),
         ),
+        "depends",
+        "Trade-off",
     )

@@ -1,24 +1,25 @@
 """The mechanism in several poses with the path of its tip (the paper's Figures 1 and 2).
 
 From the bottom up: a parallel projection of a plane or of space on the sheet; a drawing at one
-scale in all directions; a symbol for each joint, body and spring; the figure of the poses.
-Symbols are measured in inches on the sheet, places in m.
+scale in all directions; the parts of the scene on it; the figure of the poses.
+Symbols are measured in inches on the sheet, places in m; `scene` has both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import graph, style
+from eigassign.output.figures import graph, scene, style
 from eigassign.output.figures.graph import BLACK, GREY, FigurePlan, short
-from eigassign.study.results import DrawnBody, DrawnJoint, DrawnPoses, DrawnSpring, RunResults
+from eigassign.output.figures.scene import Part, Shape
+from eigassign.study.results import DrawnPoses, RunResults
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -27,11 +28,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]  # left, bottom, width, height in inches
+THINNEST, CASING = 1.3, 1.6  # points of the thinnest line; of what is left free around it
 
 # --- A parallel projection
 
-_ELEVATION = np.radians(22.0)
-_AZIMUTHS = np.radians([-60.0, -30.0, -120.0])  # of the viewer
+_ELEVATIONS = np.radians([22.0, 50.0])
+_AZIMUTHS = np.radians([-60.0, -30.0, -90.0, -120.0, -5.0, -150.0])  # of the viewer
 
 
 @dataclass(frozen=True)
@@ -51,21 +53,25 @@ class View:
 
 
 def view_of(points: Floats) -> View:
-    """A plane as it is; space with z upright, by a viewer far away above the x-y plane.
+    """A plane as it is; space with z upright, by a viewer far away who faces the motion.
 
-    From the first azimuth that shows 70 % of the best one's area; what is nearly a line on the
-    sheet counts by its length.
+    The first view that shows 85 % of the best one's area; what is nearly a line on the sheet counts
+    by its length. From high above only what is flat on the floor is seen better.
     """
     if points.shape[1] == 2:
         return View(np.eye(2))
     views, seen = [], []
-    low, high = np.sin(_ELEVATION), np.cos(_ELEVATION)
-    for c, s in zip(np.cos(_AZIMUTHS), np.sin(_AZIMUTHS), strict=True):
+    for elevation, azimuth in product(_ELEVATIONS, _AZIMUTHS):
+        c, s, low, high = *_turned(azimuth), *_turned(elevation)[::-1]
         views.append(View(np.array([[-s, c, 0.0], [-low * c, -low * s, high]])))
         flat = views[-1].flat(points)
         long, wide = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
         seen.append(long * max(wide, 0.2 * long))
-    return next(v for v, area in zip(views, seen, strict=True) if area >= 0.7 * max(seen))
+    return next(v for v, area in zip(views, seen, strict=True) if area >= 0.85 * max(seen))
+
+
+def _turned(angle: float) -> tuple[float, float]:
+    return float(np.cos(angle)), float(np.sin(angle))
 
 
 # --- A drawing at one scale in all directions
@@ -78,6 +84,7 @@ class Extent:
     view: View
     middle: Floats  # (2,)
     size: Floats  # (2,) width and height
+    thick: float  # of the thickest link
 
     def drawing(self, figure: Figure, box: Box, room: float = 1.0, grain: float = 1.0) -> Drawing:
         """Axes at ``box`` of the figure that show it in their middle, ``room`` times as large."""
@@ -87,7 +94,8 @@ class Extent:
         axes = figure.add_axes(tuple(np.array(box) / sheet))
         low, high = (self.middle + side * per_inch * inside / 2.0 for side in (-1.0, 1.0))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        return Drawing(axes, self.view, per_inch, grain)
+        larger = float(np.clip(self.thick / per_inch / scene.SYMBOL_IN, 1.0, scene.LARGEST))
+        return Drawing(axes, self.view, per_inch, grain, larger * grain)
 
 
 def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
@@ -96,8 +104,10 @@ def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
     view = view_of(shown)
     flat = view.flat(np.concatenate([shown, *others]))
     low, high = flat.min(axis=0), flat.max(axis=0)
-    largest = float(np.max(high - low)) or 1.0
-    return Extent(view, 0.5 * (low + high), np.maximum(high - low, 0.02 * largest))
+    thick = scene.thickest(poses)
+    size = high - low + thick
+    size = np.maximum(size, 0.02 * float(np.max(size)) or 1.0)
+    return Extent(view, 0.5 * (low + high), size, thick)
 
 
 def points_of(poses: DrawnPoses) -> Floats:
@@ -112,8 +122,9 @@ def points_of(poses: DrawnPoses) -> Floats:
 
 @dataclass(frozen=True)
 class Drawing:
-    """Axes on which places are drawn; ``grain`` is the size of symbols, 1 in a full figure.
+    """Axes on which places are drawn; ``grain`` is the size of letters, 1 in a full figure.
 
+    That of symbols is ``larger``, beside thick links.
     What is drawn later lies above what was drawn before, whatever it is.
     """
 
@@ -121,10 +132,16 @@ class Drawing:
     view: View
     per_inch: float  # m
     grain: float = 1.0
+    larger: float = 1.0
+
+    @property
+    def inch(self) -> float:
+        """An inch of a symbol, m."""
+        return self.per_inch * self.larger
 
     def symbol(self, at: Floats, shape: Floats) -> Floats:
         """A shape (n, 2) in inches around the flat place ``at``, in m."""
-        return np.asarray(at + self.per_inch * self.grain * shape)
+        return np.asarray(at + self.inch * shape)
 
     def heading(self, direction: Floats) -> Floats:
         """Unit vector on the sheet of a direction; across where it points at the viewer."""
@@ -142,7 +159,7 @@ class Drawing:
     def dots(self, places: Floats, diameter: float, edge: str, fill: str) -> None:
         """Circles at flat places (n, 2), diameter in points."""
         self.axes.plot(
-            *places.T, "o", markersize=diameter * self.grain, markeredgecolor=edge,
+            *places.T, "o", markersize=diameter * self.larger, markeredgecolor=edge,
             markerfacecolor=fill, markeredgewidth=0.8, zorder=2.0, clip_on=False,
         )  # fmt: skip
 
@@ -153,145 +170,90 @@ class Drawing:
         )
 
 
-# --- A symbol for each joint, body and spring
+# --- The parts of the scene
 
-KINDS = ("turning", "sliding", "fixed")
+LOOK = {"body": graph.VERMILLION, "spring": graph.GREEN, "ground": GREY}  # others: as the pose
 _GROUND = "#e6e6e6"
-_DOWN, _ACROSS = np.array([0.0, -1.0]), np.array([1.0, 0.0])
-_TURN = np.linspace(0.0, 4.5 * np.pi, 60)
-_SPIRAL = (0.05 + 0.08 * _TURN / _TURN[-1]) * np.array([np.cos(_TURN), np.sin(_TURN)])
-_SPIRAL = _SPIRAL.T
 
 
-def draw_links(
-    drawing: Drawing, poses: DrawnPoses, pose: int, colour: str, scale: float = 1.0
+def draw(
+    drawing: Drawing, shown: Iterable[Part], pose: int, colour: str, look: Mapping[str, str] = LOOK
 ) -> None:
-    """Lines of one pose; thicker sections are drawn thicker, a taper in eight pieces."""
+    """The parts in one pose, in ``colour`` but for the roles in ``look``."""
+    for part in shown:
+        draw_part(drawing, part, min(pose, len(part.places) - 1), look.get(part.role, colour))
+
+
+def of_roles(shown: Iterable[Part], *roles: str) -> list[Part]:
+    """The parts of these roles."""
+    return [part for part in shown if part.role in roles]
+
+
+def draw_part(drawing: Drawing, part: Part, pose: int, colour: str) -> None:
+    """One part in one pose."""
+    places = drawing.view.flat(part.places[pose])
+    if part.kind == "line":
+        _draw_thick(drawing, places, part.ends, colour)
+    elif part.kind == "spring":
+        zigzag = scene.zigzagged((places[1] - places[0]) / drawing.inch)
+        drawing.line(drawing.symbol(places[0], zigzag), colour, 1.1)
+    elif part.kind == "rail":
+        assert part.axes is not None
+        along = drawing.heading(part.axes[0])
+        along = -along if along[0] < 0.0 else along  # so that the strokes are below it
+        half = 0.5 * float(np.linalg.norm(places[1] - places[0])) / drawing.inch + 0.2
+        rail = _aligned(scene.hatched(half) + np.array([0.0, -0.09]), along)
+        drawing.line(drawing.symbol(places.mean(axis=0), rail), colour, 0.8)
+    else:
+        turned = None if part.axes is None else drawing.heading(part.axes[pose])
+        for shape in part.shapes:
+            _draw_shape(drawing, places[0], shape, turned, colour)
+
+
+def _draw_shape(
+    drawing: Drawing, at: Floats, shape: Shape, along: Floats | None, colour: str
+) -> None:
+    fill = {"own": colour, "page": "white", "ground": _GROUND, "": "none"}[shape.fill]
+    if shape.dot:
+        drawing.dots(at[None], shape.dot, colour, fill)
+        return
+    points = shape.points if along is None else _aligned(shape.points, along)
+    placed = drawing.symbol(at, points)
+    if shape.fill:
+        drawing.area(placed, colour, fill)
+    else:
+        drawing.line(placed, colour, shape.width)
+
+
+def _aligned(points: Floats, along: Floats) -> Floats:
+    """Points (n, 2), their first direction turned to a unit vector."""
+    return np.asarray(points @ np.array([along, [-along[1], along[0]]]))
+
+
+def _draw_thick(drawing: Drawing, flat: Floats, ends: tuple[float, float], colour: str) -> None:
+    """A line as thick as its section, but no hair; a taper in eight pieces."""
     from matplotlib.collections import LineCollection
 
-    pieces: list[Floats] = []
-    widths: list[float] = []
-    for points, (start, end) in zip(poses.lines[pose], line_widths(poses), strict=True):
-        flat = drawing.view.flat(points)
-        if len(flat) < 2 or not np.ptp(flat, axis=0).any():
-            continue
-        own, count = np.linspace(0.0, 1.0, len(flat)), 1 if start == end else 8
-        for low, high in pairwise(np.linspace(0.0, 1.0, count + 1)):
-            at = np.linspace(low, high, 1 + max(1, len(flat) // count)) if count > 1 else own
-            pieces.append(np.column_stack([np.interp(at, own, column) for column in flat.T]))
-            widths.append(start + (end - start) * 0.5 * (low + high))
-    drawing.axes.add_collection(
-        LineCollection(
-            pieces, colors=colour, linewidths=scale * drawing.grain * np.array(widths),
-            capstyle="round", joinstyle="round", zorder=2.0, clip_on=False,
-        ),
-        autolim=False,
-    )  # fmt: skip
-
-
-def line_widths(poses: DrawnPoses) -> list[tuple[float, float]]:
-    """Start and end width of each line in points, by the root of its section's size.
-
-    From 1.3, the thinnest line that can be, to 4.2; 2.6 of lines without a section.
-    """
-    largest = max((size for pair in poses.sizes for size in pair), default=0.0)
-
-    def width(size: float) -> float:
-        return 1.3 + 2.9 * (size / largest) ** 0.5 if size > 0.0 else 2.6
-
-    return [(width(a), width(b)) for a, b in poses.sizes or ((0.0, 0.0),) * len(poses.lines[0])]
-
-
-def draw_ground(drawing: Drawing, joints: Sequence[DrawnJoint]) -> None:
-    """Feet of the joints on the ground, and the way of those that slide in all poses."""
-    for joint in (joint for joint in joints if joint.grounded):
-        places = drawing.view.flat(joint.places)
-        along = drawing.heading(joint.axes[0])
-        across = np.array([-along[1], along[0]])
-        if joint.kind == "turning":
-            foot = np.array([(0.0, 0.0), (-0.08, -0.14), (0.08, -0.14)])
-            drawing.area(drawing.symbol(places[0], foot), GREY, _GROUND)
-            _hatched(drawing, drawing.symbol(places[0], 0.14 * _DOWN), _ACROSS, _DOWN, 0.14)
-        elif joint.kind == "sliding":
-            # a hatched line beside all places, somewhat longer than their way
-            behind, way = across if across[1] < 0.0 else -across, (places - places[0]) @ along
-            middle = places[0] + 0.5 * (way.min() + way.max()) * along
-            half = 0.5 * float(np.ptp(way)) / (drawing.per_inch * drawing.grain) + 0.2
-            _hatched(drawing, drawing.symbol(middle, 0.09 * behind), along, behind, half)
-        else:
-            _hatched(drawing, places[0], across, -along, 0.13)
-
-
-def _hatched(drawing: Drawing, at: Floats, along: Floats, behind: Floats, half: float) -> None:
-    """A line through ``at``, ``half`` inches to both sides, with short strokes behind it."""
-    feet = np.linspace(-0.76, 1.0, round(2.0 * half / 0.055))[:, None] * half * along
-    gap = np.full_like(feet, np.nan)
-    strokes = np.stack([feet, feet + 0.06 * behind - 0.05 * along, gap], axis=1).reshape(-1, 2)
-    shape = np.vstack([-half * along, half * along, gap[:1], strokes])
-    drawing.line(drawing.symbol(at, shape), GREY, 0.8)
-
-
-def draw_joints(
-    drawing: Drawing, joints: Sequence[DrawnJoint], pose: int, colour: str, kinds: Sequence[str]
-) -> None:
-    """A ring where it turns, a box where it slides, a square where it is fixed.
-
-    With a dot inside if a coordinate moves it. Only those of ``kinds`` are drawn.
-    """
-    shown = [joint for joint in joints if joint.kind in kinds]
-    places = [drawing.view.flat(joint.places[pose]) for joint in shown]
-    rings = [at for joint, at in zip(shown, places, strict=True) if joint.kind == "turning"]
-    if rings:
-        drawing.dots(np.array(rings), 5.6, colour, "white")
-    for joint, at in zip(shown, places, strict=True):
-        along = drawing.heading(joint.axes[pose])
-        if joint.kind == "sliding":
-            drawing.area(drawing.symbol(at, _box(along, 0.09, 0.055)), colour, "white")
-        elif joint.kind == "fixed" and not joint.grounded:
-            drawing.area(drawing.symbol(at, _box(along, 0.028, 0.028)), colour, colour)
-    driven = [at for joint, at in zip(shown, places, strict=True) if joint.driven]
-    if driven:
-        drawing.dots(np.array(driven), 1.6, colour, colour)
-
-
-def _box(along: Floats, half: float, tall: float) -> Floats:
-    across = np.array([-along[1], along[0]])
-    signs = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
-    return np.array([a * half * along + b * tall * across for a, b in signs])
-
-
-def draw_bodies(drawing: Drawing, bodies: Sequence[DrawnBody], pose: int, colour: str) -> None:
-    """Dots, their diameter by the cube root of the mass; a ring without mass."""
-    for body, diameter in zip(bodies, diameters(bodies), strict=True):
-        at = drawing.view.flat(body.places[[pose]])
-        drawing.dots(at, diameter, colour, colour if body.mass > 0.0 else "white")
-
-
-def diameters(bodies: Sequence[DrawnBody]) -> list[float]:
-    """Diameter of each body's dot in points."""
-    heaviest = max((body.mass for body in bodies), default=0.0)
-    if heaviest <= 0.0:
-        return [8.0] * len(bodies)
-    return [6.0 + 6.0 * (max(body.mass, 0.0) / heaviest) ** (1.0 / 3.0) for body in bodies]
-
-
-def draw_springs(drawing: Drawing, springs: Sequence[DrawnSpring], pose: int, colour: str) -> None:
-    """A zigzag between its ends or to the ground, a spiral where it only resists rotation."""
-    for spring in springs:
-        start, end = drawing.view.flat(np.stack([spring.starts[pose], spring.ends[pose]]))
-        if spring.grounded and not spring.turning:
-            end = drawing.symbol(start, np.array([0.16, -0.3]))
-            _hatched(drawing, end, _ACROSS, _DOWN, 0.09)
-        inches = (end - start) / (drawing.per_inch * drawing.grain)
-        coiled = spring.turning or float(np.linalg.norm(inches)) < 0.05
-        drawing.line(drawing.symbol(start, _SPIRAL if coiled else _zigzag(inches)), colour, 1.1)
-
-
-def _zigzag(along: Floats) -> Floats:
-    across = 0.05 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    at = np.concatenate([[0.0, 0.2], np.linspace(0.25, 0.75, 6), [0.8, 1.0]])
-    side = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0])
-    return np.asarray(at[:, None] * along + side[:, None] * across)
+    if len(flat) < 2 or not np.ptp(flat, axis=0).any():
+        return
+    start, end = (max(72.0 * thick / drawing.per_inch, THINNEST) for thick in ends)
+    own, count = np.linspace(0.0, 1.0, len(flat)), 1 if start == end else 8
+    pieces, widths = [], []
+    for low, high in pairwise(np.linspace(0.0, 1.0, count + 1)):
+        at = np.linspace(low, high, 1 + max(1, len(flat) // count)) if count > 1 else own
+        pieces.append(np.column_stack([np.interp(at, own, column) for column in flat.T]))
+        widths.append(start + (end - start) * 0.5 * (low + high))
+    for colours, wider in (
+        ("white", CASING),
+        (colour, 0.0),
+    ):  # so that links that cross are told apart
+        drawing.axes.add_collection(
+            LineCollection(
+                pieces, colors=colours, linewidths=wider * drawing.grain + np.array(widths),
+                capstyle="round", joinstyle="round", zorder=2.0, clip_on=False,
+            ),
+            autolim=False,
+        )  # fmt: skip
 
 
 def draw_bearings(figure: Figure, drawing: Drawing, left: float, bottom: float) -> None:
@@ -340,9 +302,11 @@ def poses(results: RunResults) -> FigurePlan:
     return FigurePlan(
         "mechanism",
         "Mechanism",
-        f"The links ({links}) in {len(results.poses.lines)} poses, and the path of the tip.",
+        f"The links ({links}) in {len(results.poses.lines)} poses, and the path of the tip. "
+        f"{scene.scale_words(results.poses)}".strip(),
         f"Line drawing of the mechanism with links {links} in several poses.",
         partial(draw_poses, results),
+        "answer",
     )
 
 
@@ -366,16 +330,14 @@ def draw_poses(results: RunResults) -> Figure:
         drawing.axes.set(xlabel="x [m]", ylabel="y [m]")
     if shown.tip_path is not None:
         drawing.line(drawing.view.flat(shown.tip_path), graph.VERMILLION, 1.8)
-    draw_ground(drawing, shown.joints)
+    every = scene.parts(shown)
+    draw(drawing, of_roles(every, "ground"), 0, GREY)
     for pose, colour in enumerate(colours):
-        draw_springs(drawing, shown.springs, pose, GREY)
-        draw_links(drawing, shown, pose, colour, scale=0.8)
-        draw_joints(drawing, shown.joints, pose, colour, KINDS)
-    for at, (body, size) in enumerate(zip(shown.bodies, diameters(shown.bodies), strict=True)):
-        colour = _BODIES[at % len(_BODIES)]
-        drawing.dots(drawing.view.flat(body.places), 0.7 * size, colour, colour)
-    grounded = [joint for joint in shown.joints if joint.grounded]
-    draw_joints(drawing, grounded, 0, BLACK, ("turning",))
+        moving = of_roles(every, "spring", "link", "rigid", "slide", "pivot")
+        draw(drawing, moving, pose, colour, {"spring": GREY})
+    for at, body in enumerate(of_roles(every, "body")):
+        for pose in range(len(colours)):
+            draw_part(drawing, body, pose, _BODIES[at % len(_BODIES)])
     return figure
 
 

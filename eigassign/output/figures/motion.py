@@ -18,18 +18,15 @@ from eigassign.facts import number
 from eigassign.output.figures import graph, style
 from eigassign.output.figures.graph import BLUE, GREY, FigurePlan, short
 from eigassign.output.figures.mechanism import (
-    KINDS,
     Drawing,
     Extent,
+    draw,
     draw_bearings,
-    draw_bodies,
-    draw_ground,
-    draw_joints,
-    draw_links,
-    draw_springs,
     extent,
+    of_roles,
     points_of,
 )
+from eigassign.output.figures.scene import parts, scale_words
 from eigassign.study.results import DrawnPoses, ModePictures
 
 if TYPE_CHECKING:
@@ -37,7 +34,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 Floats = NDArray[np.float64]
-_REST = "#c4c4c4"
+_REST = "#d4d4d4"
 
 
 def _sheet(
@@ -78,8 +75,9 @@ def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
     held = _held(pictures)
     caption = (
         "Grey: the rigid links. Blue: the mode, its largest displacement drawn as "
-        f"{100 * pictures.amplitude:.0f} % of the mechanism's extent; light: half a period later."
-    )
+        f"{100 * pictures.amplitude:.0f} % of the mechanism's extent; light: half a period later. "
+        f"{scale_words(pictures.rest)}"
+    ).strip()
     return tuple(
         FigurePlan(
             f"mode_{k + 1}",
@@ -123,23 +121,25 @@ def _draw_shape(drawing: Drawing, pictures: ModePictures, mode: int) -> None:
     """One mode over the mechanism at rest."""
     rest, deformed = pictures.rest, pictures.deformed
     drawing.axes.set_axis_off()
-    draw_ground(drawing, rest.joints)
-    draw_links(drawing, rest, 0, _REST)
-    draw_joints(drawing, rest.joints, 0, _REST, KINDS)
+    _draw_staying(drawing, rest)
     for line, moved in zip(rest.lines[0], deformed.lines[mode], strict=True):
         drawing.line(drawing.view.flat(2.0 * line - moved), graph.SKY, 1.0)
     _draw_pose(drawing, deformed, mode)
 
 
+def _draw_staying(drawing: Drawing, poses: DrawnPoses, pose: int = 0) -> None:
+    """The ground, and one pose in grey."""
+    every = parts(poses)
+    draw(drawing, of_roles(every, "ground"), 0, GREY)
+    draw(drawing, of_roles(every, "link", "rigid", "slide", "pivot"), pose, _REST)
+
+
 def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
-    """One pose in colour; joints that turn lie on top."""
+    """One pose in colour."""
     if poses.tip_path is not None:
         drawing.line(drawing.view.flat(poses.tip_path), graph.VERMILLION, 1.2)
-    draw_springs(drawing, poses.springs, pose, graph.GREEN)
-    draw_links(drawing, poses, pose, BLUE)
-    draw_joints(drawing, poses.joints, pose, BLUE, ("sliding", "fixed"))
-    draw_bodies(drawing, poses.bodies, pose, graph.VERMILLION)
-    draw_joints(drawing, poses.joints, pose, BLUE, ("turning",))
+    every = parts(poses)
+    draw(drawing, [part for part in every if part.role != "ground"], pose, BLUE)
 
 
 def thumbnail(pictures: ModePictures) -> bytes:
@@ -164,9 +164,10 @@ def mechanism_plan(title: str, poses: DrawnPoses) -> FigurePlan:
 
 def _draw_mechanism(title: str, poses: DrawnPoses) -> Figure:
     figure, drawing = _sheet(short(title, 60), extent(poses))
-    draw_ground(drawing, poses.joints)
+    every = parts(poses)
+    draw(drawing, of_roles(every, "ground"), 0, GREY)
     for pose in range(len(poses.lines) - 1, 0, -1):
-        draw_links(drawing, poses, pose, _REST)
+        draw(drawing, of_roles(every, "link", "rigid"), pose, _REST)
     _draw_pose(drawing, poses, 0)
     return figure
 
@@ -261,9 +262,7 @@ def _frames(animation: Animation) -> list[Image]:
         figure, drawing = _sheet(animation.title, extent(animation.still, [points_of(moving)]))
         note = _note(figure, "")
         canvas: Any = FigureCanvasAgg(figure)
-        draw_ground(drawing, moving.joints)
-        draw_links(drawing, animation.still, 0, _REST)
-        draw_joints(drawing, animation.still.joints, 0, _REST, KINDS)
+        _draw_staying(drawing, animation.still)
         canvas.draw()
         staying, artists = canvas.copy_from_bbox(figure.bbox), drawing.axes.get_children()
         for pose, caption in enumerate(animation.captions):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import count
 
 from eigassign.output.figures import approximation, curves, mechanism
 from eigassign.output.figures.graph import FigurePlan
@@ -13,7 +11,7 @@ from eigassign.study.results import RunResults, along_each
 
 
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
-    """Figures of what was asked, the mechanism, each target, what the answer means, how exact."""
+    """Figures of what was asked, the mechanism, what the answer means, the motion, how exact."""
     return tuple(_figures(results))
 
 
@@ -24,14 +22,11 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
             yield curves.overview(one, one.spectrum)
     if any(results.poses.lines):
         yield mechanism.poses(results)
-    yield from _targets(results)
-    for one in each:
-        if one.others is not None and one.others.initial_hz.size:
-            yield curves.other_modes(one, one.others)
     asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
-    yield from (curves.drives(one) for one in each if asked)
     yield from (curves.statics(one) for one in each if one.statics)
     yield from meaning_figures(results)
+    yield from (curves.drives(one) for one in each if asked)
+    yield from (curves.coordinates(one) for one in each if one.q.size)
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)
     for k, study in enumerate(results.studies):
@@ -44,16 +39,3 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
         yield from approximation.over_entries(study, study.over_q, study.q0, point, "q")
         names = tuple(row.name for row in results.design)
         yield from approximation.over_entries(study, study.over_design, study.y0, names, "design")
-    yield from (curves.coordinates(one) for one in each if one.q.size)
-
-
-def _targets(results: RunResults) -> Iterator[FigurePlan]:
-    """Figures of each target along each trajectory, mode by mode; equal names get a number."""
-    taken: set[str] = set()
-    for target in sorted(results.targets, key=lambda one: (one.asked.mode, one.asked.curve_name)):
-        for one in along_each(replace(results, targets=(target,))):
-            for plan in (curves.assignment(one, own) for own in one.targets if own.exact_hz.size):
-                names = (f"{plan.name}_{k}" if k > 1 else plan.name for k in count(1))
-                name = next(name for name in names if name not in taken)
-                taken.add(name)
-                yield replace(plan, name=name)

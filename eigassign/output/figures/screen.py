@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.facts import number
-from eigassign.output.figures import graph
+from eigassign.output.figures import graph, mechanism, scene
 from eigassign.output.figures.graph import (
     Bars,
     Curve,
@@ -29,7 +29,8 @@ from eigassign.output.figures.graph import (
     Shade,
     short,
 )
-from eigassign.study.results import MovingMode
+from eigassign.output.figures.scene import Part, Shape
+from eigassign.study.results import Motion
 
 Floats = NDArray[np.float64]
 Json = dict[str, Any]
@@ -113,9 +114,20 @@ def _graph(shown: Graph) -> Json:
             for name, at, colour in panel.ends()
         ]  # fmt: skip
     last = f"y{len(heights)}" if len(heights) > 1 else "y"
+    if shown.clock is not None:
+        layout["meta"] = {"clock": shown.clock, "whole": _whole(shown)}
     layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
     tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM  # pixels an inch on paper
     return {"data": data, "layout": {**layout, "height": round(tall)}}
+
+
+def _whole(shown: Graph) -> dict[str, list[float | None]]:
+    """The ends of ordinates that show all curves, of those that show a part."""
+    return {
+        f"yaxis{k + 1}" if k else "yaxis": _numbers(panel.whole)
+        for k, panel in enumerate(shown.panels)
+        if panel.within is not None
+    }
 
 
 def _abscissa(shown: Graph) -> Json:
@@ -161,7 +173,8 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     x, y = shown.x if curve.x is None else curve.x, panel.shown(curve)
     plotted = _plotted(y)
     look = curve.look
-    name = short(curve.label or curve.end or names.get(look, ""), 60)
+    name = short(curve.hover or curve.label or curve.end or names.get(look, ""), 60)
+    unit = panel.label.rpartition("[")[2].partition("]")[0] if "[" in panel.label else ""
     single = x.size == 1 and not look.marker
     parts = [part for part, there in (("lines", look.width), ("markers", look.marker)) if there]
     marker = {
@@ -181,7 +194,9 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
         "line": _line(look),
         **({"marker": marker} if look.marker or single else {}),
         "cliponaxis": not look.marker,
-        "hovertemplate": "%{y:.5~g}" if not shown.x_logarithmic else "%{y:.3~g} at %{x:.3~g}",
+        "hovertemplate": f"%{{y:.4~g}} {unit}".rstrip()
+        if not shown.x_logarithmic
+        else "%{y:.3~g} at %{x:.3~g}",
         **({"text": list(curve.names), "hovertemplate": _NAMED} if curve.names else {}),
         **({} if name else {"hoverinfo": "skip", "hovertemplate": None}),
     }
@@ -246,6 +261,7 @@ def _bars(shown: Bars) -> Json:
     tall = max(100, 22 * len(names) * (len(shown.groups) + 1)) + _ROOM
     layout = {
         "barmode": "group",
+        "bargap": 0.5,
         "xaxis": {"title": {"text": shown.label}, "zeroline": True},
         "yaxis": {"autorange": "reversed", "automargin": True, "type": "category"},
         "height": tall,
@@ -347,32 +363,81 @@ def _some(count: int, most: int) -> list[int]:
     return [int(k) for k in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
-# --- A mode that moves
+# --- The mechanism in motion
 
 
-def moving_modes(modes: Sequence[MovingMode]) -> list[Json]:
-    """Everything that the page draws: of each mode its lines, null between them, and marks."""
+def motions(shown: Sequence[Motion]) -> list[Json]:
+    """What the page draws of each trajectory: the parts of the scene, their places, and modes.
+
+    Of all parts together: ``rest`` are places in each pose, direction by direction, ``axes`` those
+    that parts lie along, and ``motion`` what each mode adds at its largest. ``at`` says which of
+    these places are a part's own, ``axis`` which of the axes.
+    """
+    return [_motion(one) for one in shown]
+
+
+def _motion(shown: Motion) -> Json:
+    parts = scene.parts(shown.rest)
+    held = mechanism.extent(shown.rest, [mechanism.points_of(m.deformed) for m in shown.modes])
+    n = len(shown.rest.lines)
+    rest, axes = _places(parts, n), [part.axes for part in parts if part.axes is not None]
+    ends = np.cumsum([0, *(part.places.shape[1] for part in parts)]).tolist()
+    own = iter(range(len(axes)))
+    still = np.repeat([part.role == "ground" for part in parts], np.diff(ends))[:, None]
+    return {
+        "trajectory": shown.trajectory,
+        "time": _numbers(shown.rest.time_s),
+        "view": held.view.directions.tolist(),
+        "middle": _numbers(held.middle),
+        "size": _numbers(held.size),
+        "thick": held.thick,
+        "symbol": [scene.SYMBOL_IN, scene.LARGEST],
+        "hair": [mechanism.THINNEST, mechanism.CASING],
+        "words": scene.scale_words(shown.rest),
+        "parts": [
+            {
+                "kind": part.kind,
+                "role": part.role,
+                "name": short(part.name),
+                "at": [start, end],
+                "ends": _numbers(part.ends),
+                "axis": None if part.axes is None else next(own),
+                "shapes": [_shape(shape) for shape in part.shapes],
+            }
+            for part, start, end in zip(parts, ends, ends[1:], strict=False)
+        ],
+        "rest": [_columns(one) for one in rest],
+        "axes": [_columns(np.array([a[min(k, len(a) - 1)] for a in axes])) for k in range(n)]
+        if axes
+        else [],
+        "tip": None if shown.rest.tip_path is None else _columns(shown.rest.tip_path),
+        "modes": [
+            {
+                "name": mode.name,
+                "hz": _numbers(mode.hz),
+                "motion": [
+                    _columns(np.where(still, 0.0, there - here))
+                    for there, here in zip(
+                        _places(scene.parts(mode.deformed), n), rest, strict=True
+                    )
+                ],
+            }
+            for mode in shown.modes
+        ],
+    }
+
+
+def _places(parts: Sequence[Part], count: int) -> list[Floats]:
+    """The places of all parts in each of ``count`` poses, one below the other."""
     return [
-        {
-            "name": mode.name,
-            "trajectory": mode.trajectory,
-            "time": _numbers(mode.time_s),
-            "hz": _numbers(mode.hz),
-            "rest": [_joined(lines) for lines in zip(*mode.rest, strict=True)],
-            "motion": [_joined(lines) for lines in zip(*mode.motions, strict=True)],
-            "marks": [{"name": short(name), "kind": kind} for name, kind in mode.marks],
-            "places": [_columns(places) for places in mode.mark_places],
-            "moves": [_columns(moves) for moves in mode.mark_motions],
-            "tip": None if mode.tip_path is None else _columns(mode.tip_path),
-        }
-        for mode in modes
+        np.concatenate([part.places[min(k, len(part.places) - 1)] for part in parts])
+        for k in range(count)
     ]
 
 
-def _joined(lines: Sequence[Floats]) -> list[list[float | None]]:
-    d = lines[0].shape[1]
-    parts = [part for line in lines for part in (line, np.full((1, d), np.nan))]
-    return _columns(np.concatenate(parts[:-1]))
+def _shape(shape: Shape) -> Json:
+    points = [[None if np.isnan(v) else round(float(v), 4) for v in row] for row in shape.points]
+    return {"points": points, "fill": shape.fill, "width": shape.width, "dot": shape.dot}
 
 
 def _columns(points: Floats) -> list[list[float | None]]:

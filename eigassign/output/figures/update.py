@@ -30,6 +30,7 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             f"deviation. The worst is {after:.2g} standard deviations off after updating.",
             "Measured frequencies with error bars, and those of the model before and after.",
             _measurements(results),
+            "answer",
         ),
         FigurePlan(
             "parameters",
@@ -38,6 +39,7 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             "values that the measurements allow while the others are fitted anew.",
             "One line for each parameter between its bounds, with its interval.",
             _parameters(results),
+            "parameters",
         ),
     )
 

@@ -22,11 +22,11 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
-from eigassign.output.figures.screen import moving_modes, screen_figures, screen_table
-from eigassign.output.pages import TEMPLATES, inside, page_of
+from eigassign.output.figures.screen import motions, screen_figures, screen_table
+from eigassign.output.pages import TEMPLATES, inside, page_of, today
 from eigassign.output.reports.verdict import verdict_of
 from eigassign.output.result_files import sample_files
-from eigassign.output.tables import Table, run_tables
+from eigassign.output.tables import SECTIONS, Table, run_tables
 from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
@@ -58,41 +58,62 @@ def page(
     *,
     line: str | None = None,
     tone: str = "fair",
-    first: int = 1,
+    headings: Mapping[str, str] = SECTIONS,
     full: bool = True,
     document: tuple[str, bytes] | None = None,
 ) -> bytes:
     """Any page of ours as UTF-8; ``files`` holds what `render` made of ``plans``.
 
-    A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad);
-    then come the ``first`` figures, and all else below. ``document`` is the file of all numbers,
-    name and content: a full page saves it unless it is longer than 400 kB, a tenth of Plotly's
-    script. A light page is at most 1 MB, that it may go by mail: pictures for which there is no
-    room are named.
+    A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad),
+    and figures of the answer; then come the sections, by key and heading, the appendix folded.
+    ``document`` is the file of all numbers, name and content: a full page saves it unless it is longer than 400 kB, a tenth
+    of Plotly's script. A light page is at most 1 MB, that it may go by mail: pictures for which
+    there is no room are named.
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
     graphs = {p.name: screen_figures(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
-    several = run is not None and len(run.trajectories) > 1
     kept = full and len(content) <= 400_000
+    figures = list(_shown(plans, graphs, files, 900_000))
     return page_of(
         "report.html.j2",
         f=f,
         verdict=None if run is None else verdict_of(run),
         headline=line,
         tone=tone,
-        tables=[(table, [not number for number in table.numeric]) for table in shown],
-        figures=list(_shown(plans, graphs, files, 900_000)),
-        first=first,
-        moving=[(mode.name, mode.trajectory, several) for mode in moving],
-        moving_json=inside(moving_modes(moving)) if full else "",
+        date=today(),
+        answer=[one for one in figures if one.plan.section == "answer"],
+        sections=[*_sections(shown, figures, headings)],
+        moving=moving,
+        moving_json=inside(motions(moving)) if full else "",
         figures_json=inside(graphs) if full else "",
         document=content.decode().replace("<", "\\u003c") if kept else "",
         document_name=name,
         plotly=_plotly() if full else "",
         script=(TEMPLATES / "report.js").read_text("utf-8") if full else "",
     )
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page; a table that has the numbers of a figure is below it, folded."""
+
+    key: str
+    heading: str
+    tables: tuple[Table, ...]
+    figures: tuple[tuple[Shown, Table | None], ...]
+
+
+def _sections(
+    tables: Sequence[Table], figures: Sequence[Shown], headings: Mapping[str, str]
+) -> Iterator[Section]:
+    """The sections that there is something in; what is in none of them is the appendix's."""
+    for key, heading in {**headings, "appendix": "Appendix"}.items():
+        own = {table.title: table for table in tables if table.section == key}
+        drawn = [(one, own.pop(one.plan.title, None)) for one in figures if one.plan.section == key]
+        if own or drawn:
+            yield Section(key, heading, tuple(own.values()), tuple(drawn))
 
 
 @cache
@@ -144,7 +165,6 @@ def write_run(
     write_page(
         results, run_tables(results), plans, folder, formats, kind,
         ("results.json", to_json(results)),
-        first=sum(plan.name.startswith("frequencies") for plan in plans),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,6 +27,8 @@ from eigassign.study.updating.fit import (
 )
 
 Floats = NDArray[np.float64]
+
+SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 
 # --- The verdict and the tables
 
@@ -59,11 +61,12 @@ def _why_not(results: UpdateResults) -> Iterator[str]:
 
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
     """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
-    made = (
-        *(parameters(results), directions(results), minima(results)),
-        *(fit(results), measurements(results, most)),
-    )
-    return tuple(table for table in made if table.rows)
+    made = {
+        "parameters": (parameters(results), directions(results), minima(results)),
+        "fit": (fit(results), measurements(results, most)),
+    }
+    every = (replace(table, section=key) for key, own in made.items() for table in own)
+    return tuple(table for table in every if table.rows)
 
 
 def parameters(results: UpdateResults) -> Table:
@@ -129,7 +132,7 @@ def write_update(
     data, plans = f"{dumps(document(results))}\n".encode(), update_figures(results)
     report.write_page(
         results, update_tables(results, None), plans, folder, formats, kind,
-        ("results.json", data), line=headline(results), first=len(plans),
+        ("results.json", data), line=headline(results), headings=SECTIONS,
         tone="good" if results.verdict == "fitted" else "bad",
     )  # fmt: skip
 

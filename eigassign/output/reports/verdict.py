@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.facts import capital, percent
+from eigassign.facts import at_most, capital, number, percent
 from eigassign.output.tables import violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
+MOST = 8  # findings on the first screen
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 WORDS = {
     "reached": "Reached",
@@ -53,93 +54,89 @@ class FirstScreen:
 
     word: str
     tone: str  # good | fair | bad
-    reason: str
-    asked: tuple[str, ...]
+    sentence: str  # what follows the word
+    reason: str  # what else the verdict rests on; "" where all is said
+    helps: tuple[str, ...]  # where a target is missed
     findings: tuple[Finding, ...]
-    trust: tuple[str, ...]
     bars: tuple[Bar, ...]
     cost: tuple[str, ...]
+    trust: tuple[str, ...]
 
 
 def verdict_of(results: RunResults) -> FirstScreen | None:
-    """The verdict of a run; None where nothing was asked for.
-
-    Of more than three targets only the worst distance is told.
-    """
+    """The verdict of a run; None where nothing was asked for."""
     row = results.assignment
     if row is None:
         return None
-    few = len(results.targets) <= 3
     aim, tone = row.aim, TONES.get(row.verdict, "bad")
-    said = {one.mode: one.words for one in results.meaning.anatomies}
-    findings = [] if aim is None else [Finding(aim.label, aim.before, aim.after, tone)]
+    findings = [] if aim is None else [Finding(capital(aim.label), aim.before, aim.after, tone)]
     targets = (target for target in results.targets if not target.asked.is_aim)
-    findings += [_finding(target, row.max_error, few, said) for target in targets]
+    findings += [_finding(target, row.max_error) for target in targets]
     static = {one.name for one in results.statics}
     findings += [_kept(one) for one in row.limits if one.name in static or not one.satisfied]
     return FirstScreen(
         word=WORDS[row.verdict],
         tone=tone if row.shortcoming is None else "bad",
-        reason=_sentence(row.reason),
-        asked=tuple(_asked(results)),
-        findings=tuple(findings),
-        trust=tuple(_trust(results)),
+        sentence=_sentence(findings) if aim is None else f"{aim.words}.",
+        reason="" if row.verdict == "reached" else f"{capital(row.reason)}.",
+        helps=tuple(_helps(results)),
+        findings=tuple(findings[:MOST]),
         bars=tuple(_bars(results)),
         cost=tuple(_cost(results)),
+        trust=tuple(_trust(results)),
     )
 
 
-def _sentence(text: str) -> str:
-    return capital(text) if text.endswith(".") else f"{capital(text)}."
+def _sentence(findings: Sequence[Finding]) -> str:
+    """The first finding that is missed, or the first, before and after; how many others are met."""
+    if not findings:
+        return "nothing is limited."
+    worst = min(findings, key=lambda one: ("bad", "fair", "good").index(one.tone))
+    others = [one for one in findings if one is not worst]
+    missed = sum(one.tone != "good" for one in others)
+    said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after} ({worst.before} before)"
+    if others:
+        what = f"all {len(others)} others are met" if len(others) > 1 else "the other is met"
+        said += f"; {what if not missed else f'{missed} of {len(others)} others are missed'}"
+    return f"{said}."
 
 
-def _asked(results: RunResults) -> Iterator[str]:
-    row = results.assignment
-    if row is not None and row.aim is not None:
-        yield capital(row.aim.label)
-    for target in (each for each in results.targets if not each.asked.is_aim):
-        within = f", within {100 * row.max_error:.3g} %" if row and target.asked.is_goal else ""
-        yield f"{capital(target.label)}{within}"
-    yield from (capital(static.name) for static in results.statics)
-    parameters = [each.name for each in results.design]
-    names = ", ".join(parameters[:4]) + (", …" if len(parameters) > 4 else "")
-    yield f"by {names} within the bounds" if parameters else "with the design as it is"
-    yield f"along {results.along}, {results.time_s.size} samples"
-    if results.mass is not None and results.mass.upper is not None:
-        yield f"mass at most {_few(results.mass.upper)} kg"
+def _helps(results: RunResults) -> Iterator[str]:
+    """What would help where something is missed: what holds the modes, what limits cost."""
+    met = all(target.satisfied for target in results.targets)
+    if met and all(one.satisfied for one in results.assignment.limits):  # type: ignore[union-attr]
+        return
+    for one in results.meaning.anatomies[:2]:
+        helped = one.helped(3).replace(" -", " −")
+        yield f"{capital(one.mode)} is held by {one.most('strain', 2)}."
+        if helped:
+            yield f"1 % more of what is no parameter changes {one.mode} by: {helped}."
+    for row in results.meaning.relaxed[:2]:
+        yield f"{capital(row.words)}."
 
 
-def _finding(
-    target: TargetStudy, accepted: float, detailed: bool, modes: Mapping[str, str]
-) -> Finding:
-    """Worst distances, with rms and frequencies; of a limit by how much it is violated.
-
-    ``modes`` says what they are, by their names, where a target is missed.
-    """
-    start, end = target.error.initial, target.error.exact
-    before, after = start.max_relative, end.max_relative
+def _finding(target: TargetStudy, accepted: float) -> Finding:
+    """The worst distance before and after; of a limit by how much it is violated."""
+    before, after = target.error.initial.max_relative, target.error.exact.max_relative
     more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
     if target.asked.is_goal:
         met = after <= accepted
-        said = percent(before), f"{percent(after)} off at worst"
-        more.insert(0, f"{percent(start.rms_relative)} → {percent(end.rms_relative)} rms")
+        said = percent(before), f"is {percent(after)} off at worst"
+        rms = (percent(each.rms_relative) for each in (target.error.initial, target.error.exact))
+        more.insert(0, f"{' → '.join(rms)} rms; {100 * accepted:.3g} % is accepted")
     else:
         met = target.satisfied
-        said = violated(before), violated(after)
+        said = violated(before), f"is {violated(after)}"
         more *= len(target.asked.terms) == 1
     tone = "good" if met else "fair" if after < before else "bad"
-    if not met:
-        own = [row.name for row in target.followed]
-        own = own or [f"mode {mode}" for mode in sorted(target.judged)]
-        more += [modes[name] for name in own if name in modes]
-    return Finding(target.label, *said, tone, tuple(more) if detailed else ())
+    return Finding(capital(target.label), *said, tone, tuple(more))
 
 
 def _kept(limit: LimitRow) -> Finding:
     """A limit of a quantity that the answer breaks, or of statics, with its amounts."""
     before, after = (limit.said(_rounded(a)) for a in (limit.initial, limit.optimal))
     tone = "good" if limit.satisfied else "bad"
-    return Finding(limit.words, before, after, tone, (limit.stated,))
+    return Finding(capital(limit.words), before, f"is {after}", tone, (limit.stated,))
 
 
 def _between(hz: Floats) -> str:
@@ -154,13 +151,13 @@ def _trust(results: RunResults) -> Iterator[str]:
     if row is None:
         return
     if row.model_error != 0.0:
-        most = row.model_error
-        how = "an unknown amount" if most is None else f"{percent(max(most, 1e-5))} at most"
         judged = results.discretisation
         few = judged is not None and judged.poses < results.time_s.size
-        where = f", at {judged.poses} of them" if judged is not None and few else ""
-        yield f"Mesh and reduced links put the modes asked for too high by {how}{where}."
-    yield _sentence(row.optimality.words)
+        where = f", at {judged.poses} of the samples" if judged is not None and few else ""
+        cause = "of mesh and reduced links" if results.reduced else "of the mesh"
+        most = at_most(np.inf if row.model_error is None else row.model_error)
+        yield f"The modes asked for are too high because {cause}: {most}{where}."
+    yield f"{capital(row.optimality.words)}."
     if not row.finished:
         yield "The search was ended before it was done."
     for clear in row.clearances:
@@ -171,10 +168,7 @@ def _trust(results: RunResults) -> Iterator[str]:
         yield f"Robust instead of alone: {row.robust.words}."
     found = results.meaning.tolerance
     if found is not None:
-        yield _sentence(found.words)
-    count = len(results.warnings)
-    if count:
-        yield f"{count} warning{'s' if count > 1 else ''}, listed below."
+        yield f"{capital(found.words)}."
 
 
 def _bars(results: RunResults) -> Iterator[Bar]:
@@ -186,10 +180,10 @@ def _bars(results: RunResults) -> Iterator[Bar]:
         )
         yield Bar(
             row.name,
-            _few(row.initial / size),
-            _few(row.optimal / size),
+            number(row.initial / size),
+            number(row.optimal / size),
             f"{unit} ({row.chosen})" if row.chosen else unit,
-            (_few(row.lower / size), _few(row.upper / size)),
+            (number(row.lower / size), number(row.upper / size)),
             round(100.0 * start, 2),
             round(100.0 * end, 2),
         )
@@ -199,17 +193,12 @@ def _cost(results: RunResults) -> Iterator[str]:
     mass = results.mass
     if mass is not None:
         change = mass.optimal - mass.initial
-        added = f"{change:+.4g} kg".replace("-", "−") if _few(change) != "0" else "unchanged"
-        yield f"Mass {_few(mass.initial)} → {_few(mass.optimal)} kg ({added})"
+        added = f"{change:+.4g} kg".replace("-", "−") if number(change) != "0" else "unchanged"
+        yield f"Mass {number(mass.initial)} → {number(mass.optimal)} kg ({added})"
     if results.price is not None:
         listed = any(row.choice_price is not None for row in results.design)
         what = "Price" if listed else "Price of the change"
-        yield f"{what} {_few(results.price)}".replace("-", "−")
-
-
-def _few(value: float) -> str:
-    """Four digits, and 15000 rather than 1.5e+04: the tables below have more."""
-    return f"{_rounded(value):.7g}"
+        yield f"{what} {number(results.price)}".replace("-", "−")
 
 
 def _rounded(value: float) -> float:

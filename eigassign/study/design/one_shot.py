@@ -116,6 +116,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
             chosen.get(k),
             p.price,
             whole.get(k),
+            scene.file.in_degrees,
         )
         for k, (name, p) in enumerate(parameters.items())
     )

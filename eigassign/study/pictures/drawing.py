@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING, SLIDING
-from eigassign.mechanism.elements.sections import section_values
 from eigassign.mechanism.kinematics.joints import sliding_axis
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
-from eigassign.mechanism.kinematics.parameters import link_type
+from eigassign.mechanism.kinematics.parameters import initial_design, link_type
 from eigassign.mechanism.kinematics.rotations import mounting, multiply
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
@@ -97,8 +96,8 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
         q=tuple((name, float(value), unit) for name, value, unit in coordinates),
         y=tuple((name, float(value), unit) for name, value, unit in design),
         amplitude=AMPLITUDE,
-        rest=_displaced(file, model, x, shapes, np.zeros((1, count))),
-        deformed=_displaced(file, model, x, shapes, np.diag(scales)),
+        rest=displaced(file, model, x, [shapes], np.zeros((1, count))),
+        deformed=displaced(file, model, np.repeat(x, count, 0), [shapes] * count, np.diag(scales)),
     )
 
 
@@ -129,24 +128,43 @@ def _phase(shapes: ModeShapes) -> Floats:
     return np.where(total < 0.0, -1.0, 1.0)
 
 
-def _displaced(
-    file: CaseFile, model: Model, x: Floats, shapes: ModeShapes, factors: Floats
+def displaced(
+    file: CaseFile,
+    model: Model,
+    x: Floats,
+    found: Sequence[ModeShapes],
+    factors: Floats,
+    points: int | None = None,
 ) -> DrawnPoses:
-    """Poses moved by ``factors`` (n_poses, count) of the modes."""
-    d, n = _dimension(file), len(factors)
+    """Poses at samples x (n, n_x), of one design: each of ``found`` with ``factors`` (n, count).
+
+    ``points`` is how many of a line are drawn at most.
+    """
+    d, n = _dimension(file), len(found)
 
     def at(node: NodeName) -> Floats:
-        shape = shapes.nodes[node]
-        return frozen((shape.place + factors @ shape.motion[:, :3])[:, :d])
+        own = (one.nodes[node] for one in found)
+        each = [
+            shape.place + f @ shape.motion[:, :3] for shape, f in zip(own, factors, strict=True)
+        ]
+        return frozen(np.array(each)[:, :d])
 
-    moved = [s.places + np.tensordot(factors, s.motions, axes=1) for s in shapes.strands]
+    lines = []
+    for one, f in zip(found, factors, strict=True):
+        whole = (s.places + np.tensordot(f, s.motions, axes=1) for s in one.strands)
+        lines.append(tuple(frozen(line[_spread(len(line), points)]) for line in whole))
     axes = model.poses.values(x, joint_axes(file, model.poses))
     y = x[0, len(model.q_names) :]
     return DrawnPoses(
         time_s=np.zeros(n),
-        lines=tuple(tuple(frozen(line[k]) for line in moved) for k in range(n)),
-        **_symbols(file, model, y, at, [np.repeat(axis[:, :d], n, axis=0) for axis in axes]),
+        lines=tuple(lines),
+        **_symbols(file, model, y, at, [axis[:, :d] for axis in axes]),
     )
+
+
+def _spread(count: int, most: int | None) -> NDArray[np.intp]:
+    few = count if most is None else min(count, most)
+    return np.unique(np.linspace(0, count - 1, few).round().astype(np.intp))
 
 
 def _posed(
@@ -175,18 +193,17 @@ def _posed(
 def _symbols(
     file: CaseFile, model: Model, y: Floats, at: At, axes: Sequence[Floats]
 ) -> dict[str, Any]:
-    """The joints, bodies and springs of poses."""
-    design = {path: f * y[k] for path, ((k, f),) in file.design.varied.items()}
-    poses = model.poses
+    """The joints, bodies and springs of poses, and how thick lines are, of one design."""
+    file, poses = file.with_design(y), model.poses
     return {
         "link_names": poses.links,
         "line_links": tuple(
             link for link, pairs in zip(poses.links, poses.drawn, strict=True) for _ in pairs
         ),
         "joints": joints(file, poses.motion.tree, at, axes),
-        "bodies": bodies(file, lambda path, value: float(design.get(path, value)), at),
+        "bodies": bodies(file, at),
         "springs": springs(file, at),
-        "sizes": sizes(file, poses.links, poses.drawn),
+        "depths": depths(file, poses.links, poses.drawn),
     }
 
 
@@ -201,7 +218,7 @@ def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:
         return np.zeros(0)
 
     axes = [np.zeros(0)] * len(edges(poses.motion.tree))
-    _symbols(file, model, np.zeros(len(model.y_names)), ask, axes)
+    _symbols(file, model, initial_design(file), ask, axes)
     return list(dict.fromkeys(nodes))
 
 
@@ -266,11 +283,12 @@ def joints(
     return tuple(found)
 
 
-def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple[DrawnBody, ...]:
-    """The bodies, and the rigid links without extent; ``mass(path, value)`` at the design."""
-    found = []
-    for name, body in file.mechanism.bodies.items():
-        found.append(DrawnBody(name, mass(f"bodies.{name}.mass", body.mass), at(split(body.at))))
+def bodies(file: CaseFile, at: At) -> tuple[DrawnBody, ...]:
+    """The bodies, and the rigid links without extent."""
+    found = [
+        DrawnBody(name, body.mass, at(split(body.at)))
+        for name, body in file.mechanism.bodies.items()
+    ]
     links: Mapping[str, Any] = file.mechanism.links
     for name, link in links.items():
         if link_type(file, name) != "rigid":
@@ -278,7 +296,7 @@ def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple
         places = [tuple(map(float, X)) for X in (link.nodes or {}).values()]
         if link.length is None and not any(map(any, places)):
             node = next(iter(link.nodes or {"start": None}))
-            found.append(DrawnBody(name, mass(f"links.{name}.mass", link.mass), at((name, node))))
+            found.append(DrawnBody(name, link.mass, at((name, node))))
     return tuple(found)
 
 
@@ -294,23 +312,23 @@ def springs(file: CaseFile, at: At) -> tuple[DrawnSpring, ...]:
     return tuple(found)
 
 
-def sizes(
+def depths(
     file: CaseFile, links: tuple[str, ...], drawn: tuple[tuple[tuple[str, str], ...], ...]
 ) -> tuple[tuple[float, float], ...]:
-    """The larger radius of gyration √(I/A) of each line's section at its two ends, in m."""
+    """The depth of each line's section at its two ends, m; 0 without a section."""
     found: list[tuple[float, float]] = []
     for link, pairs in zip(links, drawn, strict=True):
         data: Any = file.mechanism.links[link]
         beams = data.beams.values() if link_type(file, link) == "frame" else [data] * len(pairs)
-        found += [_line_sizes(file, getattr(beam, "section", None)) for beam in beams]
+        found += [_line_depths(file, getattr(beam, "section", None)) for beam in beams]
     return tuple(found)
 
 
-def _line_sizes(file: CaseFile, section: Any) -> tuple[float, float]:
+def _line_depths(file: CaseFile, section: Any) -> tuple[float, float]:
     if section is None:
         return 0.0, 0.0
-    found = []
-    for name in (section, section) if isinstance(section, str) else (section.start, section.end):
-        values: Any = section_values(file.mechanism.sections[name], lambda _key, value: value)
-        found.append(float(np.sqrt(max(values.inertia_z, values.inertia_y) / values.area)))
-    return found[0], found[1]
+    ends = (section, section) if isinstance(section, str) else (section.start, section.end)
+    start, end = (
+        file.mechanism.sections[name].depth(file.mechanism.space == "spatial") for name in ends
+    )
+    return start, end

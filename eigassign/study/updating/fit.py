@@ -142,6 +142,7 @@ class UpdateResults(Brief):
     """The answer of updating a case."""
 
     title: str
+    author: str | None
     reference: str | None
     case_name: str
     case_sha256: str
@@ -264,6 +265,7 @@ def collect_update(
     weight = study_weight(case.file, problem.model, sorted(modes), q, found.y, "updated")
     return UpdateResults(
         title=case.file.title,
+        author=case.file.author,
         reference=case.file.reference,
         case_name=case.file.path.stem.encode("utf-8", "replace").decode("utf-8"),
         case_sha256=case.file.sha256,

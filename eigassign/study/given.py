@@ -1,0 +1,99 @@
+"""The inputs of a run in three lines: links, drives, and what is carried along which trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.parts import Quantity
+from eigassign.case.units import handy
+from eigassign.mechanism.kinematics.parameters import link_type
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+
+LONG = 220  # characters of a line: what is more is left to the case file
+
+
+def given(file: CaseFile, path: Trajectories | None) -> tuple[str, ...]:
+    """Links with sections and materials; drives; trajectory and bodies, of the case as written."""
+    found = (
+        f"Links: {'; '.join(_links(file))}",
+        f"Drives: {', '.join(_drives(file)) or 'none, nothing moves'}",
+        f"Motion: {', '.join(_motion(file, path))}",
+    )
+    return tuple(line if len(line) <= LONG else f"{line[: LONG - 1]}…" for line in found)
+
+
+def _links(file: CaseFile) -> Iterator[str]:
+    """Yield links that are made alike together."""
+    alike: dict[str, list[str]] = {}
+    links: Mapping[str, Any] = file.mechanism.links
+    for name, link in links.items():
+        length = getattr(link, "length", None)
+        own = name if length is None else f"{name} {handy(length, 'm')}"
+        alike.setdefault(_made_of(file, name, link), []).append(own)
+    for made, names in alike.items():
+        listed = ", ".join(names) if len(names) < 5 else f"{names[0]} and {len(names) - 1} more"
+        yield f"{listed}: {made}"
+
+
+def _made_of(file: CaseFile, name: str, link: Any) -> str:
+    kind = link_type(file, name)
+    beams = [*link.beams.values()] if kind == "frame" else [link]
+    sections = {n for beam in beams for n in _names(getattr(beam, "section", None))}
+    materials = dict.fromkeys(m for beam in beams if (m := getattr(beam, "material", None)))
+    said = [_section(n, file.mechanism.sections[n]) for n in sorted(sections)[:2]]
+    said += [f"{len(sections) - 2} more sections"] if len(sections) > 2 else []
+    what = [kind] if kind != "beam" else []
+    return ", ".join(filter(None, (*what, " and ".join(said), *materials)))
+
+
+def _names(section: Any) -> tuple[str, ...]:
+    if section is None:
+        return ()
+    return (section,) if isinstance(section, str) else (section.start, section.end)
+
+
+def _section(name: str, section: Any) -> str:
+    """``rod (tube, outer diameter 60 mm, thickness 3 mm)``."""
+    said = [] if section.shape == "bare" else [section.shape.replace("_", " ")]
+    for key, field in type(section).model_fields.items():
+        value, quantity = getattr(section, key), _quantity((field.annotation, *field.metadata))
+        if value is not None and quantity is not None and quantity.dimension is not None:
+            said.append(f"{key.replace('_', ' ')} {handy(value, quantity.dimension.si)}")
+    return f"{name} ({', '.join(said)})"
+
+
+def _quantity(kind: Any) -> Quantity | None:
+    """The quantity that a type, or one of several, is annotated with."""
+    if isinstance(kind, Quantity):
+        return kind
+    each = kind if isinstance(kind, tuple) else get_args(kind)
+    return next(filter(None, map(_quantity, each)), None)
+
+
+def _drives(file: CaseFile) -> Iterator[str]:
+    for (name, coordinate), unit in zip(
+        file.coordinates.items(), file.coordinate_units, strict=True
+    ):
+        stiffness = getattr(coordinate.drive, "stiffness", None)
+        per = "N m/rad" if unit == "rad" else "N/m"
+        yield f"{name} {coordinate.moves if stiffness is None else handy(stiffness, per)}"
+
+
+def _motion(file: CaseFile, path: Trajectories | None) -> Iterator[str]:
+    if path is None:
+        yield "no trajectory"
+    else:
+        several = len(path.parts) > 1
+        seconds = sum(float(np.ptp(part.trajectory.time_s)) for part in path.parts)
+        along = f"{len(path.parts)} trajectories, " if several else ""
+        yield f"{along}{seconds:.3g} s in {len(path.time_s)} samples"
+    for name, body in file.mechanism.bodies.items():
+        if body.mass:
+            yield f"{name} {handy(body.mass, 'kg')} at {body.at}"
+    gravity = file.mechanism.gravity
+    if isinstance(gravity, tuple):
+        yield "under its weight"
