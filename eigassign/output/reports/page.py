@@ -66,9 +66,9 @@ def page(
 
     A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad),
     and figures of the answer; then come the sections, by key and heading, the appendix folded.
-    ``document`` is the file of all numbers, name and content: a full page saves it unless it is longer than 400 kB, a tenth
-    of Plotly's script. A light page is at most 1 MB, that it may go by mail: pictures for which
-    there is no room are named.
+    ``document`` is the file of all numbers, name and content: a full page saves it unless it is
+    longer than 400 kB, a tenth of Plotly's script. A light page is at most 1 MB, that it may go by
+    mail: pictures for which there is no room are named.
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
