@@ -190,9 +190,9 @@ def _moving(
     target = next((t for t in targets if t.asked.is_goal), next(iter(targets), None))
     name, first = f"mode {scene.modes[0]}", scene.modes[0] * ones
     if target is not None:
-        asked, row = target.asked, target.followed
-        name, first = asked.curve_name, np.full_like(ones, np.nan)
-        first[asked.rows] = row[0].exact_numbers if row else asked.mode
+        name, first = target.asked.curve_name, target.asked.mode * ones
+        for row in target.followed[:1]:
+            first[target.asked.rows] = row.exact_numbers
     numbers = {name: first, **numbers} | {name: first}
     return tuple(motions(scene.file, scene.model, scene.path, y, numbers))
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_DOWN, Context
+from functools import partial
 from operator import itemgetter
 from typing import Annotated, TypeVar
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
-from eigassign.case.units import angle_unit, handy_unit, is_bare
+from eigassign.case.units import angle_unit, handy, handy_unit, is_bare
 from eigassign.facts import (
     OF_ROW,
     Curve,
@@ -39,6 +40,7 @@ Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
+Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 EnergyShare = Annotated[
     float, Fact(unit="fraction", digits=lambda s: f"{100 * s + 0.0:.1f} %", says_unit=True)
 ]
@@ -62,8 +64,11 @@ def _highest(hz: Floats) -> str:
 
 
 def _metres(along: Floats) -> str:
-    """``0, -0.0123``: three digits each."""
-    return ", ".join(f"{value + 0.0:.3g}" for value in along.tolist())
+    """``0, -12.3 mm``: three digits each."""
+    unit, size = handy_unit("m", *along.tolist())
+    small = 1e-6 * float(np.abs(along).max())
+    shown = (value / size if abs(value) > small else 0.0 for value in along.tolist())
+    return f"{', '.join(f'{value:.3g}' for value in shown)} {unit}"
 
 
 # --- How good an expansion is
@@ -875,10 +880,12 @@ class SagRow:
     """How far the weight bends a named node from its place, where that is farthest."""
 
     node: str
-    sag: Annotated[Floats, Fact("along the axes of the ground", "sag", unit="m", digits=_metres)]
+    sag: Annotated[
+        Floats, Fact("along the axes of the ground", "sag", "m", _metres, says_unit=True)
+    ]
 
     @property
-    def most(self) -> Annotated[float, Fact("at its largest", unit="m", digits=".3g")]:
+    def most(self) -> Annotated[Metres, Fact("at its largest")]:
         """Its length."""
         return float(np.linalg.norm(self.sag))
 

@@ -79,10 +79,12 @@ def drives(results: RunResults) -> FigurePlan:
     """What each drive exerts before and after, with its limit, one panel for each coordinate."""
     panels = []
     for row in results.drives:
-        curves = (Curve(row.initial_curve, _BEFORE), Curve(row.optimal_curve, _AFTER))
-        edges = [] if row.limit is None else [row.limit, -row.limit]
+        unit, size = row.handy
+        pairs = ((row.initial_curve, _BEFORE), (row.optimal_curve, _AFTER))
+        curves = [Curve(curve / size, look) for curve, look in pairs]
+        edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
         edges = [e for e in edges if any((e * curve.y).max() > 0.0 for curve in curves)]
-        label = labelled(short(row.name, 12), row.unit)
+        label = labelled(short(row.name, 12), unit)
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
         panels.append(Panel(label, marks, 1.3, holds=(np.array([0.0, *edges]),)))
     key = (*BEFORE_AND_AFTER, *((("limit", EDGE),) * any(row.limit for row in results.drives)))

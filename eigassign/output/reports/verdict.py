@@ -94,7 +94,8 @@ def _sentence(findings: Sequence[Finding]) -> str:
     worst = min(findings, key=lambda one: ("bad", "fair", "good").index(one.tone))
     others = [one for one in findings if one is not worst]
     missed = sum(one.tone != "good" for one in others)
-    said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after} ({worst.before} before)"
+    before = "" if worst.before == "met" else f" ({worst.before} before)"
+    said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after}{before}"
     if others:
         what = f"all {len(others)} others are met" if len(others) > 1 else "the other is met"
         said += f"; {what if not missed else f'{missed} of {len(others)} others are missed'}"

@@ -97,6 +97,16 @@ const eigassign = (function () {
     addEventListener("afterprint", () => open().forEach((box) => Plotly.relayout(box, { autosize: true, width: null })));
   }
 
+  // The page is seen before 5 MB of script are compiled.
+  function begin() {
+    requestAnimationFrame(() => setTimeout(() => {
+      const script = document.createElement("script");
+      script.textContent = document.getElementById("plotly").textContent;
+      document.body.append(script);
+      plots();
+    }));
+  }
+
   // --- Numbers as files
 
   function save(name, text, type) {
@@ -319,5 +329,5 @@ const eigassign = (function () {
     return [[-s, c, 0], [-low * c, -low * s, tall]];
   }
   all("#motion-player").forEach(player);
-  return { plots, setTime, clock };
+  return { begin, setTime };
 })();

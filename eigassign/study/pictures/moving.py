@@ -33,19 +33,15 @@ POINTS = 12  # of a line
 def motions(
     file: CaseFile, model: Model, path: Trajectories, y: Floats, numbers: Mapping[str, Floats]
 ) -> Iterator[Motion]:
-    """Yield modes of design y by name; ``numbers`` (n_t,) say which each is.
+    """Yield modes of design y by name along each trajectory; ``numbers`` (n_t,) say which each is.
 
-    Where the first is not asked for, it is NaN, and nothing is shown. Raises what `Model.shapes`
-    raises.
+    Raises what `Model.shapes` raises.
     """
     shown = list(zip(path.parts, path.rows, strict=True))[:MOVING]
-    each = FRAMES // len(shown) if model.pencil.is_dense else 0
-    q, first = path.at(y)[0], next(iter(numbers.values()))
+    each, q = FRAMES // len(shown) if model.pencil.is_dense else 0, path.at(y)[0]
     for part, rows in shown:
-        own = rows.start + np.flatnonzero(np.isfinite(first[rows]))
-        if not len(own):
-            continue
-        chosen = own[spread_samples(q[own][:, : len(file.coordinates)], max(each, FEW_FRAMES))]
+        few = spread_samples(q[rows][:, : len(file.coordinates)], max(each, FEW_FRAMES))
+        chosen = rows.start + np.array(few)
         which = {name: numbers[name][chosen].astype(int) - 1 for name in numbers}
         count = 1 + int(max(modes.max() for modes in which.values()))
         found, x = model.shapes_along(q[chosen], y, count), model.x(q[chosen], y)
