@@ -92,6 +92,14 @@ def test_the_gallery_has_a_small_picture_of_every_shipped_case(name: str) -> Non
     assert (np.abs(committed - drawn).max(axis=2) > 40).mean() < 0.01, "run cases/gallery/draw.py"
 
 
+def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> None:
+    expected = {f"{name}{end}.png" for name in ALL for end in ("", "_report")}
+    assert {path.name for path in GALLERY.glob("*.png")} == expected, "run cases/gallery/draw.py"
+    assert sum(path.stat().st_size for path in GALLERY.glob("*.png")) < 2_000_000
+    listed = (CASES / "README.md").read_text(encoding="utf-8")
+    assert [name for name in expected if f"gallery/{name}" not in listed] == []
+
+
 def test_the_shapes_are_left_as_numbers_too(tmp_path: Path) -> None:
     found = pictures("four_bar", 3)
     write_modes(found, tmp_path)
