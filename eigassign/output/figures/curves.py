@@ -133,6 +133,7 @@ def _over_time(title: str, results: RunResults, panels: Sequence[Panel]) -> Grap
 ROOM = 0.3  # of what a panel has to hold, or of a band: so much is shown beside it
 APART = 0.5  # of both together: what lies farther apart has panels of its own, of which there are
 MOST_PANELS = 3  # at most
+FAR = 0.5  # of a limit that is kept: as far from it nothing is seen in one panel with it
 
 
 def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
@@ -153,10 +154,12 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
         panels.append(Panel("off target [%]", (Rule(0.0, LEVEL), *off), 1.3, holds=(np.zeros(1),)))
     panels[0] = replace(panels[0], key=BEFORE_AND_AFTER)
     heading = f"Frequencies before and after{where(results)}"
+    beyond = [t.label for t in results.targets if len(t.asked.terms) < 2 and _is_far(t)]
+    left_out = f" Kept from afar, outside the axis: {', '.join(beyond)}." if beyond else ""
     return FigurePlan(
         f"frequencies{suffix(results)}",
         heading,
-        f"Exact frequencies along {results.along} with all that was asked for.",
+        f"Exact frequencies along {results.along} with all that was asked for.{left_out}",
         "Frequencies over time before and after, with targets, limits and bands.",
         _over_time(heading, results, panels),
         "answer",
@@ -197,10 +200,19 @@ def _range(target: TargetStudy, spectrum: OtherModes) -> tuple[float, float]:
         near = np.concatenate([spectrum.initial_hz[asked.rows], spectrum.optimal_hz[asked.rows]])
         return graph.bounds([*edges, near[(near > bottom - room) & (near < top + room)]])
     own = [target.initial_hz, target.exact_hz]
-    own += [target.target_hz] if asked.is_goal else [e for e in (low, high) if e is not None]
+    if not _is_far(target):
+        own += [target.target_hz] if asked.is_goal else [e for e in (low, high) if e is not None]
     bottom, top = graph.bounds(own)
     room = ROOM * (top - bottom)
     return max(bottom - room, 0.0), top + room
+
+
+def _is_far(target: TargetStudy) -> bool:
+    """True of a limit that is kept with so much room that no panel shows both."""
+    if target.asked.is_goal or target.asked.is_aim or not target.asked.terms:
+        return False
+    edge, curves = target.asked.hz, (target.initial_hz, target.exact_hz)
+    return all(float(np.abs(curve / edge - 1.0).min()) > FAR for curve in curves)
 
 
 def _asked(target: TargetStudy, time_s: Floats, width: float) -> Iterator[Mark]:

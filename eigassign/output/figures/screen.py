@@ -34,6 +34,7 @@ from eigassign.study.results import Motion
 
 Floats = NDArray[np.float64]
 Json = dict[str, Any]
+_LEGEND = 70  # letters of a legend in one line
 _ROOM = 118  # pixels for the legend, the abscissa and its label, by their fonts in Plotly
 _DASHES = {
     "solid": "solid",
@@ -117,7 +118,12 @@ def _graph(shown: Graph) -> Json:
     if shown.clock is not None:
         layout["meta"] = {"clock": shown.clock, "whole": _whole(shown)}
     layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
-    tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM  # pixels an inch on paper
+    named = [*(mark.label for panel in shown.panels for mark in panel.marks if mark.label)]
+    named += [name for panel in shown.panels for name, _ in panel.key]
+    rows = (
+        len(named) if sum(map(len, named)) > _LEGEND else 1
+    )  # one below the other, if they are long
+    tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM + 19.0 * (rows - 1)  # an inch is 78
     return {"data": data, "layout": {**layout, "height": round(tall)}}
 
 

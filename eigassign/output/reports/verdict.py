@@ -109,9 +109,8 @@ def _helps(results: RunResults) -> Iterator[str]:
         return
     for one in results.meaning.anatomies[:2]:
         helped = one.helped(3).replace(" -", " −")
-        yield f"{capital(one.mode)} is held by {one.most('strain', 2)}."
-        if helped:
-            yield f"1 % more of what is no parameter changes {one.mode} by: {helped}."
+        more = f"; 1 % more of what is no parameter: {helped}" if helped else ""
+        yield f"{capital(one.mode)} is held by {one.most('strain', 2)}{more}."
     for row in results.meaning.relaxed[:2]:
         yield f"{capital(row.words)}."
 
