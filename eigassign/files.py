@@ -29,6 +29,7 @@ CASE = 10_000_000  # bytes of a case file
 TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
 MATRIX = 1_000_000_000  # of a matrix of a superelement
 MESH = 200_000_000  # of a mesh of a solid: 10⁵ elements take some 20 MB
+VALUES = 8_000_000  # of JSON: up to 80 bytes of memory each, whatever stands there
 STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
 _PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
 _KINDS = {
@@ -85,8 +86,11 @@ def json_value(text: str | bytes) -> Any:
     """The value that JSON of anybody says; raises ValueError for everything else.
 
     That is NaN, infinities and numbers beyond all floats too, and brackets that are nested deeper
-    than can be read.
+    than can be read. Raises OSError for more values than `VALUES`.
     """
+    signs = (",", ":", "[", "{") if isinstance(text, str) else (b",", b":", b"[", b"{")
+    if len(text) > VALUES and (n := sum(map(text.count, signs))) > raised(VALUES):  # type: ignore[arg-type]
+        raise OSError(errno.EFBIG, f"too many values; {how_to_raise(n, VALUES)}")
     try:
         return _JSON.decode(text if isinstance(text, str) else text.decode())
     except RecursionError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -149,6 +150,8 @@ def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> Non
     wrong += [whole.replace(b"    2,\n", b"    0,\n"), whole.replace(b'"abc"', b"7")]
     wrong += [whole.replace(b'"abc"', b'"\\ud800"')]
     wrong += [whole.replace(b'"../arm.yaml"', each) for each in (b"5", b'"a\\u0000b"')]
+    wrong += [whole.replace(b'"keys": []', each) for each in (b'"keys": {}', b'"keys": "a"')]
+    wrong += [re.sub(rb'"files": \[.*?\]', b'"files": "arm.yaml"', whole, flags=re.DOTALL)]
     assert whole not in wrong
     for damaged in (b"{", b"[]", b"[" * 10**5, b'{"format": 1}', b'{"format": 9}', *wrong):
         (tmp_path / "batch.json").write_bytes(damaged)
