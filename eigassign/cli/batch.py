@@ -12,6 +12,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting, show
 from eigassign.errors import EigassignError, UsageError
+from eigassign.files import folder_name
 
 if TYPE_CHECKING:
     from eigassign.batch.cases import Batch, Progress
@@ -111,7 +112,7 @@ def batch(
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
     swept = plan.is_swept and len(cases) == 1
-    usual = Path("results", f"{cases[0].stem}_sweep") if swept else Path("results")
+    usual = Path("results", folder_name(f"{cases[0].stem}_sweep") if swept else "")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
         with _workers(how["scheduler"], jobs, how["case_memory"] is not None) as workers:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from eigassign.batch import plan_of, variant_problem
+from eigassign.batch import folder_names, plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -48,6 +48,46 @@ def test_names_that_do_not_say_all_end_with_a_hash_of_their_values(tmp_path: Pat
     assert len(set(found)) == len(plan) == 9
     assert max(len(name.encode()) for name in found) < 120
     assert not any("/" in name for name in found)
+
+
+def test_names_that_differ_in_the_case_of_letters_alone_are_told_apart(tmp_path: Path) -> None:
+    for sample in ("grid", "list"):
+        titles = "[arm, Arm, ARM, 180 MHz, 180 mHz, beam]"
+        sweep = f"sweep: {{sample: {sample}, parameters: {{title: {titles}}}}}\n"
+        found = names(plan_of([case(tmp_path, end=sweep)]))
+        assert len({name.casefold() for name in found}) == len(found) == 6
+        assert [name.partition("~")[0] for name in found[:2]] == ["title=arm", "title=Arm"]
+        assert found[-1] == "title=beam"
+
+
+STRANGE = (
+    *(
+        "plain",
+        "Case",
+        "case",
+        "a\nb",
+        "a\x1b[2J",
+        "a\u202eb",
+        "CON",
+        "aux",
+        "nul.x",
+        "Com1",
+        "blank ",
+        "point.",
+    ),
+    *("x" * 250, "x" * 251, 120 * "ü", "\udcff\udcfe", "\udcff\udcfd"),
+)
+
+
+def test_names_of_case_files_are_such_as_every_file_system_allows() -> None:
+    found = folder_names([Path("cases", f"{name}.yaml") for name in STRANGE])
+    assert len({name.casefold() for name in found}) == len(STRANGE)
+    assert found[:3] == ["plain", "Case", "case-2"]
+    for name in found:
+        assert name.isprintable()
+        assert len(name.encode()) <= 111
+        assert name.rstrip(" .") == name
+        assert name.partition(".")[0].upper() not in ("CON", "AUX", "NUL", "COM1")
 
 
 def test_keys_are_those_of_the_content(tmp_path: Path) -> None:
