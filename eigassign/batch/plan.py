@@ -129,6 +129,15 @@ class BatchPlan:
         n = bisect_right(self._ends, index) - 1
         return self.files[n], index - self._ends[n]
 
+    def swept(self, indices: range) -> list[range]:
+        """Those of ``indices`` that are variants of a file, of each file."""
+        step, spans = indices.step, zip(self.files, self._ends, self._ends[1:], strict=False)
+        return [
+            range(first + (indices.start - first) % step, end, step)
+            for file, first, end in spans
+            if file.variants.keys
+        ]
+
     @cached_property
     def _ends(self) -> tuple[int, ...]:
         return tuple(accumulate((len(file.variants) for file in self.files), initial=0))

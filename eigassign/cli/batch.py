@@ -242,6 +242,8 @@ def _cases(count: int) -> str:
 
 def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
+    from array import array
+
     from eigassign.batch.cases import seconds_of_done
     from eigassign.batch.runner import require_valid
     from eigassign.facts import duration
@@ -250,7 +252,7 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
 
     require_valid(batch, workers, reporter.stage)
     spent = seconds_of_done(batch)
-    todo = [index for index in batch.header.indices() if index not in spent]
+    todo = array("q", (index for index in batch.header.indices() if index not in spent))
     first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
     rows = [(str(index + 1), batch.plan[index].name) for index in (*first, *last)]
     if len(todo) > len(rows):
