@@ -31,6 +31,7 @@ TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than m
 MATRIX = 1_000_000_000  # of a matrix of a superelement
 MESH = 200_000_000  # of a mesh of a solid: 10⁵ elements take some 20 MB
 VALUES = 8_000_000  # of JSON: up to 80 bytes of memory each, whatever stands there
+CACHE = 1_000_000_000  # of the cache: 30 000 files, which a run that stores lists in 0.4 s
 STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
@@ -74,6 +75,14 @@ def file_digest(path: str | Path, limit: int) -> str | None:
     except (OSError, ValueError):
         return None
     return found.hexdigest()
+
+
+def at_home(path: str, what: str) -> Path:
+    """``path`` with the home folder for ``~``; raises UsageError, with ``what``, without one."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        raise UsageError(f"{what}: there is no home folder for {path!r}") from None
 
 
 def seen_from(folder: Path, path: str | Path) -> str:

@@ -35,7 +35,7 @@ import os, re, sys
 
 def note(event, args):
     if event == "os.mkdir":
-        made = re.fullmatch(r"[.](.*)[.][0-9]+-[0-9a-f]{8}[.]tmp", os.path.basename(str(args[0])))
+        made = re.fullmatch(r"[.](.*)[.][0-9]+-[0-9a-f]{12}[.]tmp", os.path.basename(str(args[0])))
         if made and os.path.dirname(str(args[0])).endswith("out"):
             with open("begun", "a") as file:
                 file.write(made[1] + chr(10))
