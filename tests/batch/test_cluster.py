@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -110,6 +111,32 @@ def test_a_scheduler_with_tls_is_reached_by_the_configuration_of_dask(
         done = begun("eigassign", *command)
         assert done.wait(timeout=100) == 1
     assert len(summary("out")) == 60
+
+
+STRANGER = """
+import sys
+sys.modules["eigassign"] = None
+from distributed.cli.dask_worker import main
+main()
+"""
+
+
+@pytest.mark.slow
+def test_a_worker_without_eigassign_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(beam.TEXT + SWEEP)
+    with scheduler(tmp_path, workers=0) as (address, _):
+        command = [sys.executable, "-c", STRANGER, address, "--nthreads", "1", "--no-nanny"]
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as worker:
+            with distributed.Client(address) as client:
+                client.wait_for_workers(1)
+            code = main(["batch", "arm.yaml", "--scheduler", address])
+            worker.kill()
+    assert code == 2
+    assert "the workers cannot run eigassign: " in capsys.readouterr().err
 
 
 @pytest.mark.slow
