@@ -69,8 +69,8 @@ def read_header(folder: Path) -> Header | None:
         lists = {name: found[name] for name in ("shard", "files", "keys")}
         header = Header(**{**found, **{name: tuple(given) for name, given in lists.items()}})
         (i, n), texts = header.shard, (header.plan, header.version, header.summarised)
-        whole = {*map(type, (header.cases, i, n))} == {int} and type(header.columns) is bool
-        whole = whole and {*map(type, lists.values())} == {list}
+        kinds = [header.columns], (header.cases, i, n), lists.values()
+        whole = [{*map(type, each)} for each in kinds] == [{bool}, {int}, {list}]
         right = whole and 1 <= i <= n and 0 <= header.cases <= MOST * len(header.files)
         names = {*map(type, (*texts, *header.files, *header.keys))} == {str}
         if not (right and names and header.plan.isascii() and all(map(name_of, header.files))):

@@ -78,6 +78,8 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
     spans = plan.swept(batch.header.indices())
     parts = (span[k : k + _CHECKED] for span in spans for k in range(0, len(span), _CHECKED))
     total, done, wrong, first = sum(map(len, spans)), 0, 0, list[tuple[int, Problem]]()
+    if not total:
+        return
 
     def keep(task: Sequence[Variant], found: Sequence[tuple[int, tuple[Problem, ...]]]) -> None:
         nonlocal done, wrong
