@@ -99,11 +99,11 @@ def json_value(text: str | bytes) -> Any:
     That is NaN, infinities and numbers beyond all floats too, and brackets that are nested deeper
     than can be read. Raises OSError for more values than `VALUES`.
     """
-    signs = (",", ":", "[", "{") if isinstance(text, str) else (b",", b":", b"[", b"{")
-    if len(text) > VALUES and (n := sum(map(text.count, signs))) > raised(VALUES):  # type: ignore[arg-type]
+    text = text if isinstance(text, str) else text.decode()
+    if len(text) > VALUES and (n := sum(map(text.count, ",:[{"))) > raised(VALUES):
         raise OSError(errno.EFBIG, f"too many values; {how_to_raise(n, VALUES)}")
     try:
-        return _JSON.decode(text if isinstance(text, str) else text.decode())
+        return _JSON.decode(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
 

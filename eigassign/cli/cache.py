@@ -42,7 +42,7 @@ def cache_path(cache_dir: Path | None) -> int:
 def cache_clear(older_than_s: float | None, cache_dir: Path | None) -> int:
     """Delete what is in the cache.
 
-    Above 1 GB the oldest files go of themselves.
+    Above 1 GB the oldest files go by themselves.
     """
     found = _cache(cache_dir)
     count = found.clear() if older_than_s is None else found.clear(older_than_s)
