@@ -5,6 +5,8 @@ processes at once, before and after the sweep; what a process takes to start is 
 The sweep is counted whole: checking the variants, run folders that are synced to disk, manifest,
 summaries. Memory is looked at every second, and compared between the first and the last tenth of
 the cases. Then the same command is run again, with everything done.
+
+    python benchmarks/sweep.py --count 2000 --columns    without folders, in one process too
 """
 
 from __future__ import annotations
@@ -94,13 +96,12 @@ def memory_mb(pid: int) -> dict[int, float]:
     return found
 
 
-def swept(case: Path, out: Path, count: int) -> dict[str, float]:
+def swept(case: Path, out: Path, count: int, jobs: int, columns: bool) -> dict[str, float]:
     """One whole command: wall-clock and processor time, and memory early and late."""
-    command = [sys.executable, "-m", "eigassign", "batch", str(case), "--jobs", "2"]
+    command = [sys.executable, "-m", "eigassign", "batch", str(case), "--jobs", str(jobs)]
+    command += ["--out", str(out), "--reports", "none", "--quiet", *["--columns"] * columns]
     before, start = common.children_s(), time.perf_counter()
-    process = subprocess.Popen(
-        [*command, "--out", str(out), "--reports", "none", "--quiet"], stdout=subprocess.DEVNULL
-    )
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     looks: list[tuple[int, float]] = []
     over = threading.Event()
 
@@ -129,6 +130,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=5000)
     parser.add_argument("--loop", type=int, default=400, help="cases of each bare loop")
+    parser.add_argument("--columns", action="store_true", help="the cases have no folders")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -136,9 +138,11 @@ def main() -> None:
         case = write_case(folder, asked.count)
         some = list(range(0, asked.count, max(1, asked.count // (2 * asked.loop))))
         bare = loops(case, some[::2])
-        sweep = swept(case, folder / "sweep", asked.count)
+        given = {"count": asked.count, "columns": asked.columns}
+        sweep = swept(case, folder / "sweep", jobs=2, **given)
         bare += loops(case, some[1::2])
-        again = swept(case, folder / "sweep", asked.count)
+        again = swept(case, folder / "sweep", jobs=2, **given)
+        alone = swept(case, folder / "alone", jobs=1, **given) if asked.columns else None
     wall = sum(each for each, _ in bare) / len(bare)
     processor = sum(each for _, each in bare) / len(bare)
     rows = [
@@ -157,8 +161,13 @@ def main() -> None:
         {"": "sweep, whole", "wall clock": f"{sweep['wall']:.0f} s"},
         {"": "the same command again, all done", "wall clock": f"{again['wall']:.1f} s"},
     ]
+    if alone is not None:
+        cores = len(os.sched_getaffinity(0))
+        row = {"": f"sweep in one process; two on {cores} cores are so many times as fast"}
+        rows.append({**row, "wall clock": f"{alone['wall']:.0f} s"})
+        rows[-1]["ratio"] = alone["wall"] / sweep["wall"]
     common.report(
-        "sweep",
+        "sweep_columns" if asked.columns else "sweep",
         f"A sweep of {asked.count} small assignments in two processes",
         rows,
         [

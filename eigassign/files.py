@@ -15,6 +15,7 @@ import io
 import json
 import math
 import os
+import re
 import shlex
 import stat
 from collections.abc import Iterator, Mapping
@@ -29,7 +30,10 @@ CASE = 10_000_000  # bytes of a case file
 TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
 MATRIX = 1_000_000_000  # of a matrix of a superelement
 MESH = 200_000_000  # of a mesh of a solid: 10⁵ elements take some 20 MB
+VALUES = 8_000_000  # of JSON: up to 80 bytes of memory each, whatever stands there
+CACHE = 1_000_000_000  # of the cache: 30 000 files, which a run that stores lists in 0.4 s
 STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -73,6 +77,14 @@ def file_digest(path: str | Path, limit: int) -> str | None:
     return found.hexdigest()
 
 
+def at_home(path: str, what: str) -> Path:
+    """``path`` with the home folder for ``~``; raises UsageError, with ``what``, without one."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        raise UsageError(f"{what}: there is no home folder for {path!r}") from None
+
+
 def seen_from(folder: Path, path: str | Path) -> str:
     """``path`` as seen from ``folder``, or from the root on another drive."""
     try:
@@ -85,10 +97,13 @@ def json_value(text: str | bytes) -> Any:
     """The value that JSON of anybody says; raises ValueError for everything else.
 
     That is NaN, infinities and numbers beyond all floats too, and brackets that are nested deeper
-    than can be read.
+    than can be read. Raises OSError for more values than `VALUES`.
     """
+    text = text if isinstance(text, str) else text.decode()
+    if len(text) > VALUES and (n := sum(map(text.count, ",:[{"))) > raised(VALUES):
+        raise OSError(errno.EFBIG, f"too many values; {how_to_raise(n, VALUES)}")
     try:
-        return _JSON.decode(text if isinstance(text, str) else text.decode())
+        return _JSON.decode(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
 
@@ -98,6 +113,25 @@ def name_of(text: str) -> str:
     if b"\0" in os.fsencode(text):
         raise ValueError("a null character in its name")
     return text
+
+
+def folder_name(exact: str, shown: str | None = None, is_alone: bool = True) -> str:
+    """A name that every file system allows, of a folder of what ``exact`` says.
+
+    It is ``shown`` where that says all, and nothing else has it but for the case of letters
+    (``is_alone``); otherwise what can be shown of it, and digits of a hash of ``exact``. Not
+    allowed is what cannot be printed, the devices of Windows, blanks and points at the end, which
+    Windows drops, and more than 100 bytes: systems allow 255, and the name of a variant has two of
+    these, hidden ones 30 more.
+    """
+    text = exact if shown is None else shown
+    plain = "".join(c if c.isprintable() else "_" for c in text)
+    plain = f"_{plain}" if _DEVICE.fullmatch(plain) else plain
+    short = plain.encode()[:100].decode(errors="ignore").rstrip(" .")
+    if short == exact and is_alone:
+        return exact
+    digest = hashlib.sha256(exact.encode(errors="surrogatepass")).hexdigest()
+    return f"{short}~{digest[:10]}"
 
 
 def _number(text: str) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.files import read_bytes
+from eigassign.files import json_value, read_bytes
 
 
 def refusal(path: Path | str, limit: int = 1000) -> str:
@@ -66,3 +66,13 @@ def test_folders_devices_and_endless_links_are_refused(tmp_path: Path) -> None:
 def test_a_file_that_holds_more_than_its_size_says_is_bounded_as_well() -> None:
     assert os.stat("/proc/self/status").st_size == 0
     assert "too large" in refusal("/proc/self/status", 10)
+
+
+@pytest.mark.parametrize(
+    "text", ["[" + "[]," * 5_000_000 + "0]", '[{"a":1}' + ',{"a":1}' * 3_000_000 + "]"]
+)
+def test_json_of_more_values_than_memory_holds_is_refused(text: str) -> None:
+    for given in (text, text.encode()):
+        with pytest.raises(OSError, match="EIGASSIGN_LIMITS=2 allows it"):
+            json_value(given)
+    assert json_value(text[:3000].rpartition(",")[0] + "]")

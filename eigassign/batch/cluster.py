@@ -30,7 +30,7 @@ def cluster(address: str) -> Iterator[Workers]:
     """The workers at ``address``.
 
     Raises UsageError where dask.distributed is not installed here, or the workers are not fit for
-    this; StorageError where no scheduler answers.
+    this; StorageError where no scheduler answers, or does so no more.
     """
     try:
         from distributed import Client
@@ -42,10 +42,16 @@ def cluster(address: str) -> Iterator[Workers]:
         client = Client(address, timeout=10.0)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # no TLS, no ucx
         raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
+    folder = os.getcwd()
     with client:
-        folder = os.getcwd()
-        workers = _require_fit(client, folder)
-        yield Workers(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
+        try:
+            workers = _require_fit(client, folder)
+            yield Workers(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
+        except Exception as error:  # a task that is cancelled, a stream that is closed
+            if isinstance(error, EigassignError) or client.status == "running":
+                raise
+            kept = "what is done is kept, and the same command goes on from there"
+            raise StorageError(f"--scheduler: the scheduler was lost: {kept}") from error
 
 
 def _require_fit(client: Client, folder: str) -> int:
@@ -55,7 +61,13 @@ def _require_fit(client: Client, folder: str) -> int:
         raise UsageError("--scheduler: there are no workers yet")
     if several := [worker for worker, n in threads.items() if n != 1]:
         raise UsageError(f"--scheduler: worker {several[0]} has several threads; use --nthreads 1")
-    for worker, (version, is_there) in client.run(_seen, folder).items():
+    try:
+        seen = client.run(_seen, folder)
+    except Exception as error:
+        if client.status != "running":
+            raise
+        raise UsageError(f"--scheduler: the workers cannot run eigassign: {error}") from error
+    for worker, (version, is_there) in seen.items():
         if version != __version__:
             raise UsageError(f"--scheduler: worker {worker} has eigassign {version}, not the same")
         if not is_there:
@@ -69,18 +81,10 @@ def _seen(folder: str) -> tuple[str, bool]:
 
 @contextlib.contextmanager
 def _executor(client: Client, folder: str, _slots: int) -> Iterator[Executor]:
-    """One that runs every task in ``folder``; on an error inside, what is in flight is given up.
-
-    Raises StorageError where the scheduler is gone.
-    """
+    """One that runs every task in ``folder``; on an error inside, what is in flight is given up."""
     pool = client.get_executor(pure=False)
     try:
         yield _There(pool, folder)
-    except Exception as error:  # a task that is cancelled, a stream that is closed
-        if isinstance(error, EigassignError) or client.status == "running":
-            raise
-        kept = "what is done is kept, and the same command goes on from there"
-        raise StorageError(f"--scheduler: the scheduler was lost: {kept}") from error
     finally:
         pool.shutdown(wait=False)  # and what is in flight is cancelled
 

@@ -23,6 +23,8 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from eigassign._version import __version__
 from eigassign.case.schema.sweep import MOST
 from eigassign.errors import StorageError, UsageError
@@ -64,10 +66,11 @@ def read_header(folder: Path) -> Header | None:
         found = json_value(read_bytes(folder / HEADER, TABLE))
         if found["format"] != FORMAT:
             raise UsageError(f"{folder / HEADER} is of another version of eigassign: use --out")
-        found |= {name: tuple(found[name]) for name in ("shard", "files", "keys")}
-        header = Header(**found)
+        lists = {name: found[name] for name in ("shard", "files", "keys")}
+        header = Header(**{**found, **{name: tuple(given) for name, given in lists.items()}})
         (i, n), texts = header.shard, (header.plan, header.version, header.summarised)
-        whole = {*map(type, (header.cases, i, n))} == {int} and type(header.columns) is bool
+        kinds = [header.columns], (header.cases, i, n), lists.values()
+        whole = [{*map(type, each)} for each in kinds] == [{bool}, {int}, {list}]
         right = whole and 1 <= i <= n and 0 <= header.cases <= MOST * len(header.files)
         names = {*map(type, (*texts, *header.files, *header.keys))} == {str}
         if not (right and names and header.plan.isascii() and all(map(name_of, header.files))):
@@ -237,27 +240,32 @@ def _cut(file: io.FileIO) -> int:
 class InOrder:
     """The row of each case that has one, as the last of its lines says, in the order of the plan.
 
-    The file is gone through once for where each line is, and then read line by line: memory is 24
-    bytes a case. ``digest`` tells these rows from all others, ``ends`` counts how they ended.
+    The file is gone through once for where each line is, and then read line by line: memory is 32
+    bytes a line, however many cases the header speaks of. ``digest`` tells these rows from all
+    others, ``ends`` counts how they ended.
     """
 
     def __init__(self, folder: Path, header: Header) -> None:
-        indices = header.indices()
-        self._path, places = folder / LINES, array("q", [-1]) * len(indices)
-        seals, ends = array("Q", [0]) * len(indices), [""] * len(indices)
+        self._path, indices = folder / LINES, header.indices()
+        numbers, places, seals, ends = array("q"), array("q"), array("Q"), list[str]()
         for line in Manifest(folder, header.plan).news():
             if line.index in indices:
-                k = indices.index(line.index)
-                places[k], seals[k], ends[k] = line.start, line.seal, sys.intern(line.status)
-        self._places = array("q", (place for place in places if place >= 0))
-        self.digest = hashlib.sha256(seals.tobytes()).hexdigest()
-        self.ends = Counter(filter(None, ends))
+                numbers.append(line.index)
+                places.append(line.start)
+                seals.append(line.seal)
+                ends.append(sys.intern(line.status))
+        known, back = np.unique(numbers[::-1], return_index=True)
+        last = len(numbers) - 1 - back  # the line of each case, in the order of the plan
+        self._places = np.array(places)[last]
+        said = known.tobytes() + np.array(seals)[last].tobytes()
+        self.digest = hashlib.sha256(said).hexdigest()
+        self.ends = Counter(ends[k] for k in last)
 
     def __len__(self) -> int:
         return len(self._places)
 
     def __iter__(self) -> Iterator[str]:
-        if self._places:
+        if len(self):
             with open(self._path, "rb", buffering=1 << 20) as file:  # nearly in order
                 for place in self._places:
                     if file.tell() != place:

@@ -28,7 +28,7 @@ from eigassign.case.schema.sweep import text_of
 from eigassign.case.units import NUMBER
 from eigassign.case.values import key_path
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
-from eigassign.files import MATRIX, file_digest
+from eigassign.files import MATRIX, file_digest, folder_name
 from eigassign.modal.storage import ALGORITHM
 from eigassign.output.batch.files import NAMES
 from eigassign.output.store.run_record import MARKER
@@ -73,8 +73,16 @@ class PlannedFile:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = self.variants[k]
         key = key_of(self.content, values, Path(self.path).parent)
-        name = self.prefix + _named(self._short, values) if values else self.name
+        name = self.prefix + self._named(values) if values else self.name
         return Variant(index, name, self.path, values, key)
+
+    def _named(self, values: Mapping[str, object]) -> str:
+        """``mass=100g,frequency=180Hz``; what does not say all ends with digits of a hash of it."""
+        texts = {key: text_of(value) for key, value in values.items()}
+        exact = ",".join(f"{self._short[key]}={text}" for key, text in texts.items())
+        rounded = NUMBER.sub(_six_digits, exact) if _LONG.search(exact) else exact
+        is_alone = not any(text in self._twins[key] for key, text in texts.items())
+        return folder_name(exact, _UNSAFE.sub("_", rounded), is_alone)
 
     @cached_property
     def _short(self) -> Mapping[str, str]:
@@ -85,6 +93,20 @@ class PlannedFile:
             key: next(e for e in mine if sum(e in other for other in ends.values()) == 1)
             for key, mine in ends.items()
         }
+
+    @cached_property
+    def _twins(self) -> Mapping[str, set[str]]:
+        """Of each key the values that are told from another one by the case of letters alone.
+
+        macOS and Windows take the names of their folders for the same: `180 mHz`, `180 MHz`.
+        """
+        found = {}
+        for key, column in zip(self.variants.keys, self.variants.columns, strict=True):
+            values = column if isinstance(column, tuple) else ()  # of ranges only numbers differ
+            texts = {text_of(value) for value in values if not isinstance(value, (int, float))}
+            counts = Counter(map(str.casefold, texts))
+            found[key] = {text for text in texts if counts[text.casefold()] > 1}
+        return found
 
 
 @dataclass(frozen=True)
@@ -106,6 +128,15 @@ class BatchPlan:
         """The case file of a variant, and which of its variants it is."""
         n = bisect_right(self._ends, index) - 1
         return self.files[n], index - self._ends[n]
+
+    def swept(self, indices: range) -> list[range]:
+        """Those of ``indices`` that are variants of a file, of each file."""
+        step, spans = indices.step, zip(self.files, self._ends, self._ends[1:], strict=False)
+        return [
+            range(first + (indices.start - first) % step, end, step)
+            for file, first, end in spans
+            if file.variants.keys
+        ]
 
     @cached_property
     def _ends(self) -> tuple[int, ...]:
@@ -206,20 +237,6 @@ _LONG = re.compile(r"[0-9.]{7}")  # what may have more digits than a name has
 _UNSAFE = re.compile(r"[^\w.,=+-]")
 
 
-def _named(short: Mapping[str, str], values: Mapping[str, object]) -> str:
-    """``mass=100g,frequency=180Hz``; what does not say all ends with digits of a hash of it.
-
-    File systems allow names of 255 bytes, and hidden ones are longer than these.
-    """
-    exact = ",".join(f"{short[key]}={text_of(value)}" for key, value in values.items())
-    rounded = NUMBER.sub(_six_digits, exact) if _LONG.search(exact) else exact
-    shown = _UNSAFE.sub("_", rounded)
-    if shown == exact and len(shown.encode()) <= 100:
-        return shown
-    digits = hashlib.sha256(exact.encode()).hexdigest()[:10]
-    return f"{shown.encode()[:100].decode(errors='ignore')}~{digits}"
-
-
 def _six_digits(number: re.Match[str]) -> str:
     """A number with at most so many."""
     digits = re.sub(r"[eE].*|[-+.]", "", number.group())
@@ -265,14 +282,17 @@ def _cases_below(folder: Path) -> Iterator[Path]:
 
 
 def folder_names(cases: Sequence[Path]) -> list[str]:
-    """The files' stems; where two would collide, the path that tells them apart joins in."""
+    """The files' stems; where two would collide, the path that tells them apart joins in.
+
+    Each is one that every file system allows.
+    """
     counts = Counter(case.stem.casefold() for case in cases)
     root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
     taken = set(FILES)
     names = []
     for case in cases:
         parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
-        stem = "-".join(parts) if counts[case.stem.casefold()] > 1 else case.stem
+        stem = folder_name("-".join(parts) if counts[case.stem.casefold()] > 1 else case.stem)
         free = (stem, *(f"{stem}-{k}" for k in range(2, len(taken) + 3)))
         names.append(next(name for name in free if name.casefold() not in taken))
         taken.add(names[-1].casefold())

@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import itemgetter
 from typing import NoReturn
 
 from eigassign.batch.cases import Batch, Progress, summarise, take_up
@@ -25,9 +26,10 @@ from eigassign.batch.workers import Workers, run_all, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.store.run_record import MARKER
-from eigassign.pipeline.stages import silent
+from eigassign.pipeline.stages import Stages, silent
 
 _CHECKED = 100  # variants in a task that checks them: half a second
+_SHOWN = 10  # problems of variants
 
 
 def run(
@@ -72,20 +74,27 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
     """Check every variant of a sweep, once for each folder; raises CaseError."""
     if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
         return
-    plan = batch.plan
-    indices = [k for k in batch.header.indices() if plan.whose(k)[0].variants.keys]
-    if indices:
-        say(f"checking {len(indices)} variant{'s' if len(indices) > 1 else ''}")
-    starts = range(0, len(indices), _CHECKED)
-    tasks = ([plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
-    wrong: dict[int, tuple[Problem, ...]] = {}
-    check = partial(check_cases, options=batch.options)
-    where = workers if len(starts) > 1 else this_machine(1)
-    run_all(where, tasks, check, lambda _task, found: wrong.update(found), _lost_in_check)
+    plan, stages = batch.plan, Stages(say)
+    spans = plan.swept(batch.header.indices())
+    parts = (span[k : k + _CHECKED] for span in spans for k in range(0, len(span), _CHECKED))
+    total, done, wrong, first = sum(map(len, spans)), 0, 0, list[tuple[int, Problem]]()
+    if not total:
+        return
+
+    def keep(task: Sequence[Variant], found: Sequence[tuple[int, tuple[Problem, ...]]]) -> None:
+        nonlocal done, wrong
+        done, wrong = done + len(task), wrong + len(found)
+        stages.advance(done, total)
+        first.extend((index, problem) for index, problems in found for problem in problems)
+        first[:] = sorted(first, key=itemgetter(0))[:_SHOWN]
+
+    check, where = partial(check_cases, options=batch.options), this_machine(1)
+    with stages("check", f"checking {total} variant{'s' if total > 1 else ''}"):
+        tasks = ([plan[k] for k in part] for part in parts)
+        run_all(workers if total > _CHECKED else where, tasks, check, keep, _lost_in_check)
     if wrong:
-        found = [(index, problem) for index in sorted(wrong) for problem in wrong[index]]
-        problems = [variant_problem(plan, *each) for each in found[:10]]
-        many = f"{len(wrong)} of {len(indices)} variants are no valid cases: nothing was run"
+        problems = [variant_problem(plan, *each) for each in first]
+        many = f"{wrong} of {total} variants are no valid cases: nothing was run"
         raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
 
 

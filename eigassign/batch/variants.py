@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
 from eigassign.case.schema.document import validated_sweep
-from eigassign.case.schema.sweep import MOST, Sweep, text_of
+from eigassign.case.schema.sweep import MOST, Range, Steps, Sweep, text_of
 from eigassign.case.table import read_words
 from eigassign.case.values import key_path, objection
 from eigassign.errors import CaseError, MechanismError, Problem
@@ -70,12 +70,14 @@ class Variants:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of all keys and values in their order."""
-        columns: object = self.columns
-        if self.shares is not None:
-            columns = [(str(span.min), str(span.max)) for span in self.columns]
-        digest = hashlib.sha256(json.dumps([self.keys, columns, self.grid]).encode())
+        said = json.dumps([self.keys, self.columns, self.grid], default=_said)
+        digest = hashlib.sha256(said.encode())
         digest.update(b"" if self.shares is None else self.shares.tobytes())
         return digest.hexdigest()
+
+
+def _said(span: Range | Steps) -> str:
+    return (span.span if isinstance(span, Steps) else span).said()
 
 
 AS_IT_STANDS = Variants((), (), grid=True)  # one, without values
@@ -162,8 +164,8 @@ def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
 
 def _repeated(variants: Variants) -> Iterator[Finding]:
     """The first variant of a list or file whose values are those of one before."""
-    if variants.grid or variants.shares is not None:
-        return  # of a grid, values of a key are told apart; samples do not meet
+    if variants.grid or any(not isinstance(column, tuple) for column in variants.columns):
+        return  # of a grid, values of a key are told apart; samples and ranges do not meet
     seen: dict[tuple[str, ...], int] = {}
     for k, row in enumerate(zip(*variants.columns, strict=True)):
         first = seen.setdefault(tuple(map(text_of, row)), k)

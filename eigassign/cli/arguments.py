@@ -48,6 +48,21 @@ class Shard(click.ParamType[tuple[int, int]]):
         return i, n
 
 
+class Age(click.ParamType[float]):
+    """``30d``: so many seconds."""
+
+    name = "age"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """``value`` in seconds, or a usage error at its option."""
+        found = re.fullmatch(r"([0-9]{1,9}) ?([hdw])", value)
+        if found is None:
+            self.fail(f"{value!r} is no age, as 12h, 30d or 8w.", param, ctx)
+        return int(found[1]) * {"h": 3600.0, "d": 86400.0, "w": 604800.0}[found[2]]
+
+
 class Number(click.FloatRange):
     """A number of a range: `nan` compares as inside any, and `inf` is no amount of anything."""
 

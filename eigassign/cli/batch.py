@@ -12,6 +12,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting, show
 from eigassign.errors import EigassignError, UsageError
+from eigassign.files import folder_name
 
 if TYPE_CHECKING:
     from eigassign.batch.cases import Batch, Progress
@@ -111,7 +112,7 @@ def batch(
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
     swept = plan.is_swept and len(cases) == 1
-    usual = Path("results", f"{cases[0].stem}_sweep") if swept else Path("results")
+    usual = Path("results", folder_name(f"{cases[0].stem}_sweep") if swept else "")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
         with _workers(how["scheduler"], jobs, how["case_memory"] is not None) as workers:
@@ -241,6 +242,8 @@ def _cases(count: int) -> str:
 
 def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
+    from array import array
+
     from eigassign.batch.cases import seconds_of_done
     from eigassign.batch.runner import require_valid
     from eigassign.facts import duration
@@ -249,7 +252,7 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
 
     require_valid(batch, workers, reporter.stage)
     spent = seconds_of_done(batch)
-    todo = [index for index in batch.header.indices() if index not in spent]
+    todo = array("q", (index for index in batch.header.indices() if index not in spent))
     first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
     rows = [(str(index + 1), batch.plan[index].name) for index in (*first, *last)]
     if len(todo) > len(rows):

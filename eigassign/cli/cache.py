@@ -27,11 +27,25 @@ def cache_path(cache_dir: Path | None) -> int:
     return 0
 
 
-@cache.command("clear", epilog=arguments.examples("eigassign cache clear"))
+@cache.command(
+    "clear",
+    epilog=arguments.examples("eigassign cache clear", "eigassign cache clear --older-than 30d"),
+)
+@click.option(
+    "--older-than",
+    "older_than_s",
+    type=arguments.Age(),
+    metavar="AGE",
+    help="Only what was written so long ago, as 12h, 30d or 8w (default: everything).",
+)
 @arguments.cache_dir
-def cache_clear(cache_dir: Path | None) -> int:
-    """Delete everything that is in the cache."""
-    count = _cache(cache_dir).clear()
+def cache_clear(older_than_s: float | None, cache_dir: Path | None) -> int:
+    """Delete what is in the cache.
+
+    Above 1 GB the oldest files go by themselves.
+    """
+    found = _cache(cache_dir)
+    count = found.clear() if older_than_s is None else found.clear(older_than_s)
     click.echo(f"{count} file{'' if count == 1 else 's'} deleted")
     return 0
 

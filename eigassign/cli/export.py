@@ -9,6 +9,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import print_json, reporting, show
+from eigassign.files import folder_name
 
 
 @click.command(
@@ -94,7 +95,7 @@ def animate(
 
     if file is None:
         what = "motion" if mode is None else f"mode_{mode}"
-        file = Path("results", f"{case.stem}_{what}.gif")
+        file = Path("results", folder_name(f"{case.stem}_{what}") + ".gif")
     with reporting(how) as reporter:
         loaded = load_case(case, how["allow_outside"])
         reporter.stage("drawing the frames")

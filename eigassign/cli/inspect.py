@@ -47,13 +47,15 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     """
     from eigassign.pipeline import outlook
     from eigassign.pipeline.queries import check as checked
+    from eigassign.pipeline.stages import Stages
 
     codes, answers = [0], dict[str, Any]()
     with reporting(how) as reporter:
         for case in cases:
             try:
-                answer = checked(case, how["allow_outside"])
-                notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
+                with Stages(reporter.stage)("check", f"checking {case}", at_once=False):
+                    answer = checked(case, how["allow_outside"])
+                    notes = (*answer.notes, *_sweep(case, how["allow_outside"], answer.outlook))
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
@@ -74,10 +76,12 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     return max(codes)
 
 
-def _sweep(case: Path, allow_outside: bool) -> list[str]:
+def _sweep(case: Path, allow_outside: bool, takes: Outlook | None) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
     from eigassign.batch.plan import plan_of, variant_problem
     from eigassign.batch.work import CaseOptions, check_cases
+    from eigassign.facts import duration
+    from eigassign.pipeline.outlook import ELSE_S
 
     plan = plan_of([case])
     if not plan.is_swept:
@@ -89,7 +93,9 @@ def _sweep(case: Path, allow_outside: bool) -> list[str]:
         raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
     command = f"eigassign batch {quoted(case)} --dry-run"
-    return [f"sweep: {len(plan)} variants, {seen}; what they take: {command}"]
+    case_s = 0.0 if takes is None or takes.optimize_s is None else takes.optimize_s - ELSE_S
+    all_take = f"about {duration(len(plan) * case_s)} on one core" if case_s else "what they take"
+    return [f"sweep: {len(plan)} variants, {seen}; {all_take}: {command}"]
 
 
 def _trajectories(answer: CheckAnswer) -> list[str]:

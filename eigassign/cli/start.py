@@ -12,7 +12,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import show
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, quoted, read_bytes
+from eigassign.files import CASE, at_home, quoted, read_bytes
 
 PACKAGE = Path(__file__).parents[1]
 STARTERS = PACKAGE / "starters"
@@ -205,7 +205,7 @@ def completion(shell: str | None, install: bool) -> int:
     if not install:
         click.echo(script)
         return 0
-    home = Path.home()
+    home = at_home("~", "--install")
     if name == "fish":
         _write(home / ".config/fish/completions/eigassign.fish", script)
     else:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from eigassign.case.schema.targets import TARGETS, HighestTarget
 from eigassign.errors import UsageError
 from eigassign.facts import Fact
-from eigassign.files import STORED, json_value, read_bytes
+from eigassign.files import TABLE, json_value, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.comparison import TRAJECTORY
@@ -131,7 +131,7 @@ def _read(path: Path, kind: Kind) -> list[Known]:
         files = [batch] if batch.exists() else [own] if own.exists() else below
     for file in files:
         try:
-            for known in _known(json_value(read_bytes(file, STORED)), kind):
+            for known in _known(json_value(read_bytes(file, TABLE)), kind):
                 if not isinstance(known.case, str) or not isinstance(known.ended, str):
                     raise TypeError
                 found.append(known)

@@ -35,6 +35,7 @@ def results_schema(left_by: str) -> dict[str, Any]:
 
 def _schema(kind: Any, may_lack: bool, found: dict[str, Any]) -> dict[str, Any]:
     """The schema of a type; those of rows go into ``found``."""
+    kind = getattr(get_origin(kind), "__value__", kind)  # NDArray names a type, from NumPy 2.5 on
     origin, inner = get_origin(kind) or kind, get_args(kind)
     if origin is Annotated:
         return _schema(inner[0], may_lack, found)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
-from eigassign.files import printable
+from eigassign.files import folder_name, printable
 from eigassign.output.reports import page as report
 from eigassign.output.store.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
@@ -49,7 +49,8 @@ def new_run_folder(
     if out is None and not file.path.stem.strip("."):
         message = f"{file.path} has no name before its ending: say where the run goes, --out DIR"
         raise UsageError(message)
-    target = Path("results", file.path.stem + suffix) if out is None else Path(out)
+    named = Path("results", folder_name(file.path.stem + suffix))
+    target = named if out is None else Path(out)
     case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
     with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
         (hidden / "case.yaml").write_text(file.resolved(), encoding="utf-8")

@@ -30,12 +30,16 @@ class Stages:
         self._counted = ""
 
     @contextmanager
-    def __call__(self, name: str, announcement: str) -> Iterator[None]:
-        """Announce the stage, run the body, and add what it took to the stage ``name``."""
-        self._progress(announcement)
+    def __call__(self, name: str, announcement: str, at_once: bool = True) -> Iterator[None]:
+        """Announce the stage, run the body, and add what it took to the stage ``name``.
+
+        Not ``at_once``: announced with the first line of progress, if it lasts so long.
+        """
+        if at_once:
+            self._progress(announcement)
         self._counted = ""
-        start, over = perf_counter(), Event()
-        clock = Thread(target=self._tell, args=(start, over), daemon=True)
+        start, over, late = perf_counter(), Event(), "" if at_once else announcement
+        clock = Thread(target=self._tell, args=(start, over, late), daemon=True)
         if self._progress is not silent:
             clock.start()
         try:
@@ -48,10 +52,13 @@ class Stages:
         """Count the pieces of the stage that are done."""
         self._counted = f"{done} of {of}"
 
-    def _tell(self, start: float, over: Event) -> None:
+    def _tell(self, start: float, over: Event, late: str) -> None:
         pause = self._first_s
         while not over.wait(pause):
             pause = min(2.0 * pause, 10.0)
+            if late:
+                self._progress(late)
+                late = ""
             self._progress(f"  {self._counted or f'{perf_counter() - start:.0f} s'}")
 
     @property

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import json
 import os
 import shutil
 import signal
@@ -18,11 +16,10 @@ from typing import Any
 
 import beam
 import pytest
+from schedulers import begun, scheduler
 
-import eigassign
 from eigassign.cli import main
 
-ROOT = Path(eigassign.__file__).parents[1]
 SWEEP = "sweep: {parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}}\n"
 
 
@@ -75,22 +72,20 @@ def test_a_scheduler_that_is_killed_costs_nothing_that_is_done(
     monkeypatch.chdir(tmp_path)
     sweep = SWEEP.replace("60", "240")  # more than one task checks
     Path("arm.yaml").write_text(beam.TEXT + sweep)
-    with _processes("scheduler", "--port", "0", "--scheduler-file", "there.json") as scheduler:
-        while not Path("there.json").exists():
-            time.sleep(0.1)
-        address = json.loads(Path("there.json").read_text())["address"]
-        with _processes("worker", address, "--nthreads", "1", "--no-nanny"):
-            command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
-            batch = _begun("eigassign", *command, stderr=subprocess.PIPE)
-            assert batch.stderr is not None
-            heard = [batch.stderr.readline() for _ in range(lines + 2)]  # checking, left out
-            scheduler.kill()
-            _, err = batch.communicate(timeout=60)
+    with scheduler(tmp_path) as (address, (first, _worker)):
+        command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
+        batch = begun("eigassign", *command, stderr=subprocess.PIPE)
+        assert batch.stderr is not None
+        heard = [batch.stderr.readline()]
+        while sum(line.startswith("case ") for line in heard) < lines:
+            heard.append(batch.stderr.readline())
+        first.kill()
+        _, err = batch.communicate(timeout=60)
     assert "checking 240 variants" in "".join(heard)
     assert batch.returncode == 3
     assert err.splitlines()[-1].startswith("eigassign: error: --scheduler: the scheduler was lost")
     assert "Traceback" not in err
-    assert len(summary("out")) >= lines
+    assert not lines or len(summary("out")) >= lines
     assert main(["batch", "arm.yaml", "--jobs", "1", "--columns", "--out", "out"]) == 1
     assert len(summary("out")) == 240
 
@@ -107,44 +102,41 @@ def test_a_scheduler_with_tls_is_reached_by_the_configuration_of_dask(
     made = "openssl req -x509 -newkey rsa:2048 -nodes -keyout key.pem -out cert.pem -subj /CN=here"
     subprocess.run(made.split(), check=True, capture_output=True)
     tls = ("--tls-ca-file", "cert.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
-    where = ("--protocol", "tls", "--port", "0", "--scheduler-file", "there.json")
-    with _processes("scheduler", *where, *tls):
-        while not Path("there.json").exists():
-            time.sleep(0.1)
-        address = json.loads(Path("there.json").read_text())["address"]
-        with _processes("worker", address, "--nthreads", "1", "--no-nanny", *tls):
-            time.sleep(3)  # until it is known
-            command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
-            assert main(command) == 3
-            assert "TLS configuration" in capsys.readouterr().err
-            for name, file in (
-                ("CA_FILE", "cert"),
-                ("CLIENT__CERT", "cert"),
-                ("CLIENT__KEY", "key"),
-            ):
-                monkeypatch.setenv(f"DASK_DISTRIBUTED__COMM__TLS__{name}", f"{file}.pem")
-            done = _begun("eigassign", *command)
-            assert done.wait(timeout=100) == 1
+    with scheduler(tmp_path, "--protocol", "tls", tls=tls) as (address, _):
+        command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
+        assert main(command) == 3
+        assert "TLS configuration" in capsys.readouterr().err
+        for name, file in (("CA_FILE", "cert"), ("CLIENT__CERT", "cert"), ("CLIENT__KEY", "key")):
+            monkeypatch.setenv(f"DASK_DISTRIBUTED__COMM__TLS__{name}", f"{file}.pem")
+        done = begun("eigassign", *command)
+        assert done.wait(timeout=100) == 1
     assert len(summary("out")) == 60
 
 
-def _begun(module: str, *arguments: str, **how: Any) -> subprocess.Popen[str]:
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", module, *arguments]
-    return subprocess.Popen(command, text=True, env=environment, **how)
+STRANGER = """
+import sys
+sys.modules["eigassign"] = None
+from distributed.cli.dask_worker import main
+main()
+"""
 
 
-@contextlib.contextmanager
-def _processes(kind: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A scheduler, or a worker, as the command line of dask starts it."""
-    module = f"distributed.cli.dask_{kind}"
-    process = _begun(module, *arguments, "--no-dashboard", stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
+@pytest.mark.slow
+def test_a_worker_without_eigassign_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(beam.TEXT + SWEEP)
+    with scheduler(tmp_path, workers=0) as (address, _):
+        command = [sys.executable, "-c", STRANGER, address, "--nthreads", "1", "--no-nanny"]
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as worker:
+            with distributed.Client(address) as client:
+                client.wait_for_workers(1)
+            code = main(["batch", "arm.yaml", "--scheduler", address])
+            worker.kill()
+    assert code == 2
+    assert "the workers cannot run eigassign: " in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
+import threading
 from pathlib import Path
 
 import pytest
@@ -37,6 +41,40 @@ def test_rows_are_read_as_they_are_added_by_whomever(tmp_path: Path) -> None:
     one.append(row(2))
     assert news(one) == [row(2)]
     assert news(other) == [row(1), row(0), row(2)]
+
+
+def test_lines_are_on_disk_soon_and_when_they_are_asked_to_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced, fsync, manifest = threading.Event(), os.fsync, Manifest(tmp_path, PLAN)
+
+    def heard(descriptor: int) -> None:
+        fsync(descriptor)
+        synced.set()
+
+    monkeypatch.setattr(os, "fsync", heard)
+    for k in range(2):
+        manifest.append(row(k))
+        assert synced.wait(timeout=60)  # of itself, a second later
+        synced.clear()
+    manifest.append(row(2))
+    manifest.sync()
+    assert synced.is_set()
+
+
+def test_a_disk_that_keeps_no_line_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    manifest = Manifest(tmp_path, PLAN)
+    manifest.append(row(1))
+    for _ in range(2):
+        with pytest.raises(StorageError, match="No space left"):
+            manifest.sync()
+    with pytest.raises(StorageError, match="No space left"):
+        manifest.append(row(2))
+    assert news(Manifest(tmp_path, PLAN)) == [row(1), row(2)]
 
 
 @pytest.mark.parametrize("torn", [b"x", b'{"index": 7, "na', b"y" * 10_000])
@@ -149,6 +187,8 @@ def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> Non
     wrong += [whole.replace(b"    2,\n", b"    0,\n"), whole.replace(b'"abc"', b"7")]
     wrong += [whole.replace(b'"abc"', b'"\\ud800"')]
     wrong += [whole.replace(b'"../arm.yaml"', each) for each in (b"5", b'"a\\u0000b"')]
+    wrong += [whole.replace(b'"keys": []', each) for each in (b'"keys": {}', b'"keys": "a"')]
+    wrong += [re.sub(rb'"files": \[.*?\]', b'"files": "arm.yaml"', whole, flags=re.DOTALL)]
     assert whole not in wrong
     for damaged in (b"{", b"[]", b"[" * 10**5, b'{"format": 1}', b'{"format": 9}', *wrong):
         (tmp_path / "batch.json").write_bytes(damaged)

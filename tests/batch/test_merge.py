@@ -16,7 +16,15 @@ import numpy as np
 import pytest
 from instant import write_run
 
-from eigassign.batch import Header, Manifest, merge_shards, read_header, summarise, write_header
+from eigassign.batch import (
+    Header,
+    Manifest,
+    limited,
+    merge_shards,
+    read_header,
+    summarise,
+    write_header,
+)
 from eigassign.cli import main
 from eigassign.errors import UsageError
 from eigassign.output import CaseOutcome
@@ -38,7 +46,7 @@ def shard(folder: Path, i: int, n: int, *, columns: bool = False, **changes: obj
     folder.mkdir(parents=True)
     write_header(folder, replace(header, **changes))
     manifest = Manifest(folder, "abc")
-    for k in reversed(header.indices()):
+    for k in reversed(header.indices()[: len(range(i - 1, TOTAL, n))]):
         manifest.append(replace(row(k), run_folder=None) if columns else row(k))
         if not columns:
             write_run(folder / row(k).name, row(k))
@@ -148,6 +156,18 @@ def test_shards_of_other_batches_and_the_same_one_twice_are_named(tmp_path: Path
     for name in "bc":
         assert f"{tmp_path / name} is a shard of another batch than {first}" in said
     assert f"{tmp_path / 'd'} and {first} are the same shard, 1/2" in said
+
+
+def test_a_header_of_more_cases_than_memory_holds_costs_none(tmp_path: Path) -> None:
+    many = {"cases": 400_000_000, "files": ("../arm.yaml",) * 40}
+    shards = [shard(tmp_path / str(i), i, 2, **many) for i in (1, 2)]
+    of_many = [shard(tmp_path / f"{i} of many", i, 300_000_000, **many) for i in (1, 300_000_000)]
+    with limited(None, 400.0):
+        said = refused(tmp_path / "out", *shards)
+        assert "shard 1/2, is not finished: 4 of 200000000 cases" in said
+        said = refused(tmp_path / "out", *of_many)
+        assert "missing of 300000000 shards: 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 299999988" in said
+        assert merge_shards(shards[0], []).ends == {"ok": 4}
 
 
 def test_no_folder_of_a_batch_and_a_shard_as_target_are_refused(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from eigassign.batch import plan_of, variant_problem
+from eigassign.batch import folder_names, limited, plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -50,6 +50,46 @@ def test_names_that_do_not_say_all_end_with_a_hash_of_their_values(tmp_path: Pat
     assert not any("/" in name for name in found)
 
 
+def test_names_that_differ_in_the_case_of_letters_alone_are_told_apart(tmp_path: Path) -> None:
+    for sample in ("grid", "list"):
+        titles = "[arm, Arm, ARM, 180 MHz, 180 mHz, beam]"
+        sweep = f"sweep: {{sample: {sample}, parameters: {{title: {titles}}}}}\n"
+        found = names(plan_of([case(tmp_path, end=sweep)]))
+        assert len({name.casefold() for name in found}) == len(found) == 6
+        assert [name.partition("~")[0] for name in found[:2]] == ["title=arm", "title=Arm"]
+        assert found[-1] == "title=beam"
+
+
+STRANGE = (
+    *(
+        "plain",
+        "Case",
+        "case",
+        "a\nb",
+        "a\x1b[2J",
+        "a\u202eb",
+        "CON",
+        "aux",
+        "nul.x",
+        "Com1",
+        "blank ",
+        "point.",
+    ),
+    *("x" * 250, "x" * 251, 120 * "ü", "\udcff\udcfe", "\udcff\udcfd"),
+)
+
+
+def test_names_of_case_files_are_such_as_every_file_system_allows() -> None:
+    found = folder_names([Path("cases", f"{name}.yaml") for name in STRANGE])
+    assert len({name.casefold() for name in found}) == len(STRANGE)
+    assert found[:3] == ["plain", "Case", "case-2"]
+    for name in found:
+        assert name.isprintable()
+        assert len(name.encode()) <= 111
+        assert name.rstrip(" .") == name
+        assert name.partition(".")[0].upper() not in ("CON", "AUX", "NUL", "COM1")
+
+
 def test_keys_are_those_of_the_content(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     first = plan_of([case(tmp_path)], [f"{MASS}=0,100 g"])
@@ -89,3 +129,30 @@ def test_a_plan_of_many_variants_is_made_at_once(tmp_path: Path) -> None:
     plan = plan_of([case(tmp_path)], [f"{MASS}=0..1:1000", "targets.0.frequency=180..190:1001"])
     assert len(plan) == 1_001_000
     assert plan[len(plan) - 1].values == {MASS: 1, "targets.0.frequency": 190}
+
+
+@pytest.mark.parametrize("sample", ["grid", "list"])
+def test_ranges_of_many_values_take_neither_time_nor_memory(tmp_path: Path, sample: str) -> None:
+    other = "targets.0.frequency: {min: 180 Hz, max: 190 Hz, count: 9999999}"
+    sweep = f"sample: {sample}, parameters: {{{MASS}: {{min: 0, max: 1, count: 9999999}}"
+    sweep += f", {other}" if sample == "list" else ""
+    arm = case(tmp_path, end=f"sweep: {{{sweep}}}}}\n")
+    with limited(None, 100.0):
+        plan = plan_of([arm])
+        assert len(plan) == 9_999_999
+        assert plan[4_999_999].values[MASS] == 0.5
+        assert plan.digest != plan_of([case(tmp_path, "b.yaml", f"sweep: {{{sweep}}}}}\n")]).digest
+        (span,) = plan.swept(range(2, len(plan), 5))
+    assert (span[0], span[-1], len(span)) == (2, 9_999_997, 2_000_000)
+
+
+def test_the_variants_of_a_shard_are_those_of_swept_files(tmp_path: Path) -> None:
+    swept = [
+        case(tmp_path, f"{n}.yaml", f"sweep: {{parameters: {{{MASS}: [1, 2, 3, 4]}}}}\n")
+        for n in "bd"
+    ]
+    plan = plan_of([case(tmp_path, "a.yaml"), swept[0], case(tmp_path, "c.yaml"), swept[1]])
+    for i in range(3):
+        indices = range(i, len(plan), 3)
+        found = [k for span in plan.swept(indices) for k in span]
+        assert found == [k for k in indices if plan[k].values]

@@ -104,6 +104,11 @@ def test_a_wrong_file_of_variants_is_refused_with_its_line(
         (f"  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many values"),
         (f"  sample: sobol\n  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many variants"),
         (f"  sample: sobol\n  count: 3\n  parameters: {{{MASS}: [1]}}\n", "needs a range"),
+        (
+            "  sample: latin_hypercube\n  count: 9999999\n  parameters:\n"
+            f"    {{{MASS}: {{min: 1, max: 2}}, {WANTED}: {{min: 1, max: 2}}}}\n",
+            "sweep.count: of 2 parameters at most 5000000 points can be drawn",
+        ),
         (f"  sample: list\n  parameters: {{{MASS}: [1, 2], {WANTED}: [1]}}\n", "equally many"),
         (
             f"  sample: list\n  parameters: {{{MASS}: [1, 2, 1]}}\n",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -116,7 +117,10 @@ def test_check_sees_a_wrong_sweep(
     assert said in capsys.readouterr().err
     write("a.yaml", f"{GOOD}sweep: {{parameters: {{mechanism.bodies.tool.mass: [0.1, 0.2]}}}}\n")
     assert main(["check", "a.yaml"]) == 0
-    assert "sweep: 2 variants, all of them valid" in " ".join(capsys.readouterr().out.split())
+    assert re.search(
+        r"sweep: 2 variants, all of them valid; about [\d.]+ s on one core: eigassign batch a.yaml",
+        " ".join(capsys.readouterr().out.split()),
+    )
 
 
 def test_stems_that_collide_get_folders_that_tell_them_apart() -> None:

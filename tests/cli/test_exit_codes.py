@@ -234,12 +234,23 @@ def test_ctrl_c_while_packages_are_imported_ends_with_130(name: str) -> None:
     assert done.stdout == ""
 
 
+SCRIPT = Path(sys.executable).with_name("eigassign")  # that of an installed package
+
+
 @pytest.mark.slow
-def test_ctrl_c_at_any_moment_of_the_start_shows_no_import_of_ours() -> None:
+@pytest.mark.parametrize(
+    "start",
+    [
+        (sys.executable, "-m", "eigassign"),
+        pytest.param((str(SCRIPT),), marks=pytest.mark.skipif(not SCRIPT.exists(), reason="none")),
+    ],
+    ids=["module", "script"],
+)
+def test_ctrl_c_at_any_moment_of_the_start_shows_no_import_of_ours(start: tuple[str, ...]) -> None:
     """Before that it is Python that is interrupted."""
     draw, codes = random.Random(1), []
     for _ in range(60):
-        command = [sys.executable, "-m", "eigassign", "check", "good.yaml"]
+        command = [*start, "check", "good.yaml"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         process = subprocess.Popen(command, **pipes, env=environment())
         time.sleep(draw.uniform(0.0, 0.12))

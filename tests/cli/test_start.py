@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import shutil
@@ -114,6 +115,14 @@ def test_completion_is_installed_by_one_command_once(shell: str, capsys: Capture
         first, line = rc.read_text().splitlines()
         assert first == "export A=1"
         assert str(scripts[0].absolute()) in line
+
+
+def test_without_a_home_folder_completion_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # as it is where none is known
+    assert main(["completion", "bash", "--install"]) == 2
+    assert "--install: there is no home folder for '~'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

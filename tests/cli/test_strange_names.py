@@ -100,3 +100,13 @@ def test_a_file_that_is_no_table_of_numbers_is_not_quoted(
         told = said(capsys)
         assert "secret:1: expected a header with" in told
         assert "hunter2" not in told
+
+
+@pytest.mark.parametrize("stem", ["x" * 250, "a\nb", "aux", "point."])
+def test_the_folder_of_a_run_has_a_name_that_every_file_system_allows(stem: str) -> None:
+    Path(f"{stem}.yaml").write_text(GOOD)
+    assert main(["check", f"{stem}.yaml", "--draw", "--figures", "none"]) == 0
+    (folder,) = Path("results").iterdir()
+    assert folder.name.isprintable()
+    assert len(folder.name) <= 111
+    assert ("~" in folder.name) == (stem in ("x" * 250, "a\nb"))

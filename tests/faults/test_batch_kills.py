@@ -1,30 +1,39 @@
 """A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
 
-So does one of which results are damaged between. Slow: forty kills, each followed by the same
-command again, half of them after a file of a case was cut, emptied or deleted.
+So does one of which results are damaged between, one on a cluster of which the scheduler is killed,
+and the merging of shards, killed before each of its changes. Slow: forty kills, each followed by
+the same command again, half of them after a file of a case was cut, emptied or deleted.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from itertools import count
 from pathlib import Path
 
 import pytest
+from schedulers import scheduler
+from stopping import can_stop, stopped_at
 
 import eigassign
+from eigassign.cli import main
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux"),
 ]
 CASES, KILLS, DAMAGES, JOBS = 60, 40, 20, 2
+SCHEDULERS = 9  # kills of a scheduler, the command and a worker, in turn
 ROOT = Path(eigassign.__file__).parents[1]
 SMALL = ROOT / "benchmarks" / "small_arm.yaml"
 
@@ -35,7 +44,7 @@ import os, re, sys
 
 def note(event, args):
     if event == "os.mkdir":
-        made = re.fullmatch(r"[.](.*)[.][0-9]+-[0-9a-f]{8}[.]tmp", os.path.basename(str(args[0])))
+        made = re.fullmatch(r"[.](.*)[.][0-9]+-[0-9a-f]{12}[.]tmp", os.path.basename(str(args[0])))
         if made and os.path.dirname(str(args[0])).endswith("out"):
             with open("begun", "a") as file:
                 file.write(made[1] + chr(10))
@@ -52,12 +61,12 @@ COMMAND = (
 )
 
 
-def begun(folder: Path) -> subprocess.Popen[bytes]:
+def begun(folder: Path, command: tuple[str, ...] = COMMAND) -> subprocess.Popen[bytes]:
     """The command at work in this folder."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    nowhere = subprocess.DEVNULL
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    environment, nowhere = {**os.environ, "PYTHONPATH": path}, subprocess.DEVNULL
     return subprocess.Popen(
-        [sys.executable, *COMMAND], cwd=folder, env=environment, stdout=nowhere, stderr=nowhere
+        [sys.executable, *command], cwd=folder, env=environment, stdout=nowhere, stderr=nowhere
     )
 
 
@@ -159,3 +168,57 @@ def test_sweeps_that_are_killed_forty_times_end_as_if_they_had_not_been(tmp_path
     assert not unharmed
     said = f"{KILLS} kills and {DAMAGES} damages in {sweeps} sweeps"
     sys.stdout.write(f"{said}, {twice} cases begun again\n")
+
+
+def test_sweeps_whose_scheduler_is_killed_end_as_if_it_had_not_been(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    undisturbed = placed(tmp_path / "undisturbed")
+    assert begun(undisturbed).wait() == 1
+    expected, draw = made(undisturbed), random.Random(2)
+    left, sweeps, codes = SCHEDULERS, 0, Counter[int]()
+    here = [each for each in COMMAND if each not in ("--jobs", str(JOBS))]
+    while left:
+        folder, sweeps, code = placed(tmp_path / f"killed {sweeps}"), sweeps + 1, 0
+        while code != 1:  # it is done, and some cases have missed their targets
+            with scheduler(tmp_path, workers=JOBS) as (address, there):
+                batch = begun(folder, (*here, "--scheduler", address))
+                if left and _goes_on(batch, folder / "out" / "manifest.jsonl"):
+                    time.sleep(draw.uniform(0.0, 0.5))
+                    if batch.poll() is None:
+                        (there[0], there[1], batch)[left % 3].kill()
+                        left -= 1
+                code = batch.wait()
+                codes[code] += 1
+        assert made(folder) == expected
+    assert set(codes) == {1, 3, -signal.SIGKILL}
+    said = f"{SCHEDULERS} kills on a cluster in {sweeps} sweeps, exit codes {dict(codes)}"
+    sys.stdout.write(f"{said}\n")
+
+
+@pytest.mark.skipif(not can_stop(), reason="needs ptrace, on Linux")
+def test_a_merge_killed_before_any_change_of_a_file_ends_as_if_it_had_not_been(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(placed(tmp_path / "sweep"))
+    parts = [f"part-{i}" for i in (1, 2, 3)]
+    sweep = [*COMMAND[1:3], "--jobs", "1", *COMMAND[COMMAND.index("--set") :], "--figures", "none"]
+    for i, part in enumerate(parts, 1):
+        assert main([*sweep, "--out", part, "--shard", f"{i}/3", "--quiet"]) in (0, 1)
+
+    def merge() -> int:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            return main(["merge", "out", *parts])
+
+    assert merge() == 1
+    expected = made(Path.cwd())
+    assert len(expected) == CASES
+    for call in count(1):
+        shutil.rmtree("out")
+        stopped = stopped_at(merge, call, signal.SIGKILL)
+        assert merge() == 1, call
+        assert made(Path.cwd()) == expected, call
+        assert not [path for path in Path("out").glob(".*") if path.name != ".lock"], call
+        if not stopped.reached:
+            break
+    assert call > 20
+    sys.stdout.write(f"merging was killed {call - 1} times\n")

@@ -10,7 +10,7 @@ import pytest
 from fuzz_stored import Stage
 from fuzz_worker import Worker
 
-EACH = 16  # damages of a seed: 1 024 in all
+SEEDS, EACH = 125, 16  # damages of a seed: 2 000 in all
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def stage(worker: Worker, tmp_path_factory: pytest.TempPathFactory) -> Stage:
     return Stage(tmp_path_factory.mktemp("stored"), worker)
 
 
-@pytest.mark.parametrize("seed", range(64))
+@pytest.mark.parametrize("seed", range(SEEDS))
 def test_stored_files_that_anything_has_happened_to_are_whole_again_or_named(
     stage: Stage, worker: Worker, seed: int
 ) -> None:

@@ -287,14 +287,22 @@ def boom(length: float, diameter: float, wall: float, load: float, gravity: Any)
 
 
 def ritz(length: float, diameter: float, wall: float, load: float, angle: float) -> float:
-    """The first frequency from ten powers of x, the weight along the boom as its axial force."""
+    """The first frequency from ten powers of x, the weight along the boom as its axial force.
+
+    x² times Legendre's polynomials, which are 1 at the end, spans the same: of the powers
+    themselves the mass matrix is singular but for round-off.
+    """
     x, w = np.polynomial.legendre.leggauss(30)
     x, w = 0.5 * (x + 1.0), 0.5 * length * w
     area = np.pi / 4 * (diameter**2 - (diameter - 2 * wall) ** 2)
     EI = 210e9 * np.pi / 64 * (diameter**4 - (diameter - 2 * wall) ** 4)
-    n = np.arange(2, 12)[:, None]
-    v, slope = x**n, n * x ** (n - 1) / length
-    curvature = n * (n - 1) * x ** (n - 2) / length**2
+    square = np.polynomial.Polynomial([0.0, 0.0, 1.0])
+    legendre = (np.polynomial.Legendre.basis(n, [0.0, 1.0]) for n in range(10))
+    powers = [square * each.convert(kind=np.polynomial.Polynomial) for each in legendre]
+    v, slope, curvature = (
+        np.array([each.deriv(m)(x) if m else each(x) for each in powers]) / length**m
+        for m in range(3)
+    )
     mass = 7850.0 * area
     N = -G * np.sin(angle) * (load + mass * length * (1.0 - x))
     K = EI * (curvature * w) @ curvature.T + (slope * w * N) @ slope.T

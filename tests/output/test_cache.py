@@ -8,12 +8,14 @@ import logging
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from eigassign.errors import StorageError
+from eigassign.cli import main
+from eigassign.errors import StorageError, UsageError
 from eigassign.output import Cache, content_key, default_directory, pack, write_files
 
 ARRAYS = {"numbers": np.array([[1.0, -0.0], [np.nan, 5e-324]]), "nothing": np.zeros((0, 7))}
@@ -144,6 +146,52 @@ def test_what_a_killed_writer_left_is_swept_by_the_next_reader_and_nothing_else(
     assert sorted(cache.directory.iterdir()) == sorted([theirs, stored])
 
 
+def aged(cache: Cache, days: list[float]) -> list[Path]:
+    """Entries that were written so long ago."""
+    paths = []
+    for number, age in enumerate(days):
+        cache.store(key(number), {"a": np.ones(1000)}, {})
+        paths.append(cache.directory / f"{key(number)}.h5")
+        os.utime(paths[-1], 2 * (time.time() - 86400 * age,))
+    return paths
+
+
+def test_clear_may_leave_what_is_young(cache, capsys):
+    aged(cache, [40, 20, 31, 0])
+    where = ["--cache-dir", str(cache.directory)]
+    assert main(["cache", "clear", "--older-than", "30d", *where]) == 0
+    assert capsys.readouterr().out == "2 files deleted\n"
+    assert {path.stem for path in cache.directory.iterdir()} == {key(1), key(3)}
+    assert cache.clear(3600.0) == 1
+    assert main(["cache", "clear", "--older-than", "30", *where]) == 2
+    assert "as 12h, 30d or 8w" in capsys.readouterr().err
+    assert cache.clear() == 1
+
+
+def test_above_the_limit_the_oldest_files_go(cache, monkeypatch):
+    paths = aged(cache, [3, 1, 2, 0])
+    (cache.directory / "measurements.h5").write_bytes(bytes(10**6))
+    size = paths[0].stat().st_size
+    monkeypatch.setenv("EIGASSIGN_LIMITS", f"{3.5 * size / 1e9}")
+    Cache(cache.directory).store(KEY, {"a": np.ones(1000)}, {})
+    left = {path for path in cache.directory.iterdir() if path.name != "measurements.h5"}
+    assert left == {paths[1], paths[3], cache.directory / f"{KEY}.h5"}
+    monkeypatch.setenv("EIGASSIGN_LIMITS", f"{0.5 * size / 1e9}")
+    Cache(cache.directory).store(KEY, {"a": np.ones(1000)}, {})
+    assert [path.name for path in cache.directory.glob(f"{KEY}.h5")] == [f"{KEY}.h5"]
+    assert not any(path.exists() for path in paths)
+
+
+def test_what_another_machine_is_writing_is_left_alone_for_a_week(cache, stored):
+    """Locks of a network folder may be seen on one machine only."""
+    old, young = (cache.directory / f".{KEY}.h5.{n}-{4 * '0'}deadbeef.tmp" for n in (1, 2))
+    for path, days in ((old, 8), (young, 6)):
+        path.write_bytes(b"half")
+        os.utime(path, 2 * (time.time() - 86400 * days,))
+    assert Cache(cache.directory).load(KEY) is not None
+    assert sorted(cache.directory.iterdir()) == sorted([young, stored])
+
+
 def test_clear_says_what_it_cannot_delete(cache, stored, monkeypatch):
     def refuse(self: Path, missing_ok: bool = False) -> None:
         raise PermissionError(errno.EACCES, "Permission denied", str(self))
@@ -156,6 +204,9 @@ def test_clear_says_what_it_cannot_delete(cache, stored, monkeypatch):
 def test_the_directory_follows_the_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "mine"))
     assert default_directory() == tmp_path / "mine"
+    monkeypatch.setenv("EIGASSIGN_CACHE_DIR", "~nosuchuser/x")
+    with pytest.raises(UsageError, match="EIGASSIGN_CACHE_DIR: there is no home folder for '~nosu"):
+        default_directory()
     monkeypatch.delenv("EIGASSIGN_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert default_directory() == tmp_path / "eigassign"

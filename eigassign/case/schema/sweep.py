@@ -7,7 +7,8 @@ the second ones, and so on. Samples are spread over ranges: `latin_hypercube`, `
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
@@ -79,10 +80,23 @@ class Range(Part):
         named = unit or other
         return f"{number!r} {named}" if named else number
 
-    def values(self) -> tuple[object, ...]:
-        """`count` values at equal distances."""
-        count = self.count or 2
-        return tuple(self.value(Fraction(k, count - 1)) for k in range(count))
+    def said(self) -> str:
+        """What tells it from other ranges."""
+        return f"{self.min}..{self.max}:{self.count}"
+
+
+@dataclass(frozen=True)
+class Steps(Sequence[object]):
+    """The values of a range at equal distances, with both ends; each is made when asked for."""
+
+    span: Range
+
+    def __len__(self) -> int:
+        return self.span.count or 2
+
+    def __getitem__(self, k: Any) -> Any:
+        """The k-th of them."""
+        return self.span.value(Fraction(range(len(self))[k], len(self) - 1))
 
 
 def text_of(value: object) -> str:
@@ -127,6 +141,9 @@ class Sweep(Part):
                 raise wrong("is for latin_hypercube and sobol only", key)
         if self.file is not None and self.sample is not None:
             raise wrong("is for parameters: the rows of a file are the variants", "sample")
+        keys = len(self.parameters or ())
+        if drawn and keys * (self.count or 0) > MOST:
+            raise wrong(f"of {keys} parameters at most {MOST // keys} points can be drawn", "count")
         for key, body in (self.parameters or {}).items():
             self._check(key, body, drawn)
         counts = {len(axis) for axis in self.axes()} if self.sample == "list" else {1}
@@ -151,7 +168,7 @@ class Sweep(Part):
                     raise wrong(f"{shown(value)} is given twice", *place, k)
                 seen.add(written)
 
-    def axes(self) -> tuple[tuple[object, ...], ...]:
+    def axes(self) -> tuple[Sequence[object], ...]:
         """The values of each key, in the order of the file; not of samples or a file."""
         bodies = (self.parameters or {}).values()
-        return tuple(b.values() if isinstance(b, Range) else b for b in bodies)
+        return tuple(Steps(b) if isinstance(b, Range) else b for b in bodies)

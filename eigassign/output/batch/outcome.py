@@ -72,7 +72,7 @@ def from_line(line: str | bytes, folder: str | Path = "") -> CaseOutcome:
     """
     try:
         return from_plain(json_value(line))
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OSError):
         begin = line[:40].decode(errors="replace") if isinstance(line, bytes) else line[:40]
         message = f"has a damaged line, {begin}…: delete it and run the batch again"
         raise StorageError(f"{Path(folder, 'manifest.jsonl')} {message}") from None

@@ -10,10 +10,12 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import errno
+import hashlib
 import os
 import re
 import secrets
 import shutil
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -81,14 +83,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 # --- What is being written, and what killed writers left
 
-_HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<token>\d+-[0-9a-f]{8})(\.[a-z0-9]+)+", re.DOTALL)
+_TOKEN = r"(?P<token>\d+-(?P<machine>[0-9a-f]{4})?[0-9a-f]{8})"
+_HIDDEN = re.compile(rf"\.(?P<name>.+)\.{_TOKEN}(\.[a-z0-9]+)+", re.DOTALL)
+_HERE = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:4]
 
 
 @contextlib.contextmanager
 def temporary(target: Path, make: Callable[[Path], None]) -> Iterator[Path]:
     """A file or folder that ``make`` makes beside ``target``, locked; what is left of it goes."""
     while True:
-        made = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        token = f"{os.getpid()}-{_HERE}{secrets.token_hex(4)}"
+        made = target.with_name(f".{target.name}.{token}.tmp")
         try:
             make(made)
             with lock(made, wait=True):
@@ -113,13 +118,18 @@ def remove(path: Path) -> None:
 
 
 def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Hidden names of dead writers in ``folder``, locked while looked at, each with its target."""
+    """Hidden names of dead writers in ``folder``, locked while looked at, each with its target.
+
+    Some network file systems have locks that other machines do not see: what is of one of these
+    is dead after a week.
+    """
     with contextlib.suppress(OSError):
         names = [name for name in os.listdir(folder) if name.startswith(".")]
         for path, found in ((folder / name, _HIDDEN.fullmatch(name)) for name in sorted(names)):
             if found:
                 with lock(path) as held:
-                    if held or (held is None and _is_long_dead(path)):
+                    is_ours = held and found["machine"] in (None, _HERE)
+                    if is_ours or (held is not False and _is_long_dead(path)):
                         yield path, folder / found["name"]
 
 

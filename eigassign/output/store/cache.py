@@ -7,14 +7,18 @@ written costs one warning, never the run.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
+import math
 import os
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
+from eigassign.files import CACHE, at_home, raised
 from eigassign.output.store.array_file import Array, DamagedError, get, put
 from eigassign.output.store.atomic import sweep_files
 
@@ -39,9 +43,12 @@ class CacheEntry:
 
 
 def default_directory() -> Path | None:
-    """``EIGASSIGN_CACHE_DIR``, else the platform's cache folder; None where there is no home."""
+    """``EIGASSIGN_CACHE_DIR``, else the platform's cache folder; None where there is no home.
+
+    Raises UsageError where the variable names the home folder of nobody.
+    """
     if chosen := os.environ.get("EIGASSIGN_CACHE_DIR"):
-        return Path(chosen).expanduser()
+        return at_home(chosen, "EIGASSIGN_CACHE_DIR")
     from platformdirs import user_cache_path
 
     try:
@@ -68,6 +75,7 @@ class Cache:
         self.directory, self.least_s = directory, least_s
         self._warned = False
         self._swept = False
+        self._trimmed = False
 
     def load(self, key: str) -> dict[str, Array] | None:
         """The arrays stored under ``key``, read-only; None if missing or damaged."""
@@ -91,26 +99,31 @@ class Cache:
     def store(self, key: str, arrays: Mapping[str, Array], meta: Mapping[str, str]) -> None:
         """Keep ``arrays`` under ``key``; ``meta`` is for people who list the cache.
 
-        Raises UsageError for arrays or names that cannot be stored, never for a full disk.
+        The first time the oldest files go where all of them are over the limit. Raises UsageError
+        for arrays or names that cannot be stored, never for a full disk.
         """
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             put(self.directory / f"{key}{_SUFFIX}", key, arrays, meta)
+            if not self._trimmed:
+                self._trimmed = True
+                self._trim()
         except OSError as error:
             self._warn(f"the cache cannot be written ({error}); going on without it")
 
     def entries(self) -> tuple[CacheEntry, ...]:
         """Files of the cache, oldest first, each read and checked; none of them is changed."""
-        found = [entry for path in self._files(f"*{_SUFFIX}") for entry in _read_entry(path)]
+        paths = [path for *_, path in self._by_age() if path.suffix == _SUFFIX]
+        found = [entry for path in paths for entry in _read_entry(path)]
         return tuple(sorted(found, key=lambda entry: (entry.modified_s, entry.key)))
 
-    def clear(self) -> int:
-        """Delete all entries, damaged ones and temporary files of killed writers; returns how many.
+    def clear(self, older_than_s: float = -math.inf) -> int:
+        """Delete entries of that age, damaged ones too, and temporary files of killed writers.
 
-        Raises StorageError when one cannot be deleted.
+        Returns how many. Raises StorageError when one cannot be deleted.
         """
-        swept = sweep_files(self.directory, _is_ours)
-        files = [*self._files(f"*{_SUFFIX}"), *self._files(f"*{_SUFFIX}{_DAMAGED}")]
+        swept, latest = sweep_files(self.directory, _is_ours), time.time() - older_than_s
+        files = [path for modified_s, _, path in self._by_age() if modified_s <= latest]
         for path in files:
             try:
                 path.unlink(missing_ok=True)
@@ -118,8 +131,25 @@ class Cache:
                 raise StorageError(f"cannot delete {path}: {error.strerror}") from error
         return len(files) + swept
 
-    def _files(self, pattern: str) -> list[Path]:
-        return [p for p in sorted(self.directory.glob(pattern)) if _is_ours(p.name)]
+    def _trim(self) -> None:
+        """Delete the oldest files until all are within the limit; another process may, too."""
+        files = self._by_age()
+        over = sum(size for _, size, _ in files) - raised(CACHE)
+        for _, size, path in files[:-1]:  # one that is larger alone is of use still
+            if over > 0:
+                path.unlink(missing_ok=True)
+                over -= size
+
+    def _by_age(self) -> list[tuple[float, int, Path]]:
+        """When each file was written, its bytes and its path, the oldest first; none is opened."""
+        found = []
+        with contextlib.suppress(OSError), os.scandir(self.directory) as files:
+            for file in files:
+                if _is_ours(file.name) and file.name.endswith((_SUFFIX, _DAMAGED)):
+                    with contextlib.suppress(OSError):  # gone since it was listed
+                        status = file.stat(follow_symlinks=False)
+                        found.append((status.st_mtime, status.st_size, Path(file.path)))
+        return sorted(found)
 
     def _set_aside(self, path: Path, error: str) -> None:
         try:

@@ -76,21 +76,29 @@ def test_the_mat_file_holds_the_same_numbers(name: str, tmp_path: Path) -> None:
     assert there["about"].item() == str(model["about"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(OCTAVE is None, reason="no Octave to run the MATLAB function with")
 @pytest.mark.parametrize("name", NAMES)
 def test_octave_runs_the_matlab_function(name: str, tmp_path: Path) -> None:
     reduced, q, y = example(name)
     ea.save_reduced(reduced, tmp_path / "arm.mat")
-    np.savetxt(tmp_path / "samples.txt", np.hstack([q, y]), fmt="%.17g")
+    far = (np.vstack([q, q[:1] + 1e4, q[:1]]), np.vstack([y, y[:1], np.full_like(y[:1], np.nan)]))
+    np.savetxt(tmp_path / "samples.txt", np.hstack(far), fmt="%.17g")
     script = (
-        f"x = load('samples.txt'); for k = 1:{SAMPLES}; disp(sprintf('%.17g ', "
-        f"arm_frequencies(x(k, 1:{q.shape[1]}), x(k, {q.shape[1]} + 1:end)))); end"
+        f"x = load('samples.txt'); for k = 1:rows(x); [hz, ~, ~, status] = arm_frequencies("
+        f"x(k, 1:{q.shape[1]}), x(k, {q.shape[1]} + 1:end)); "
+        "disp(sprintf('%.17g ', status, hz)); end"
     )
     assert OCTAVE is not None
     command = [OCTAVE, "--no-gui", "--quiet", "--eval", script]
     told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    hz = np.array([line.split() for line in told.stdout.splitlines()], dtype=float)
-    np.testing.assert_allclose(hz, reduced.frequencies(q, y), rtol=AGREE)
+    assert told.returncode == 0, told.stderr
+    found = np.array([line.split() for line in told.stdout.splitlines()], dtype=float)
+    assert not found[:SAMPLES, 0].any()
+    np.testing.assert_allclose(found[:SAMPLES, 1:], reduced.frequencies(q, y), rtol=AGREE)
+    refused = found[found[:, 0] > 0]
+    assert len(refused) >= bool(y.size)  # of angles far away only loops cannot be closed
+    assert np.isnan(refused[:, 1:]).all()
 
 
 # --- C
@@ -127,6 +135,51 @@ def test_the_c_source_compiles_and_agrees(name: str, tmp_path: Path) -> None:
     assert {status for status, _ in answers} == {0}
     hz = np.array([hz for _, hz in answers])
     np.testing.assert_allclose(hz, reduced.frequencies(q, y), rtol=AGREE)
+
+
+PROGRAM = """
+#include "arm.h"
+#include <stdio.h>
+int main(void)
+{
+    double q[ARM_N_Q + 1], y[ARM_N_Y + 1], hz[ARM_N_MODES];
+    for (;;) {
+        for (int i = 0; i < ARM_N_Q + ARM_N_Y; i++)
+            if (scanf("%lf", i < ARM_N_Q ? q + i : y + i - ARM_N_Q) != 1) return 0;
+        printf("%d", arm_frequencies(q, y, hz));
+        for (int i = 0; i < ARM_N_MODES; i++) printf(" %.17g", hz[i]);
+        printf("\\n");
+    }
+}
+"""
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_c_source_stays_within_its_arrays(name: str, tmp_path: Path) -> None:
+    reduced, q, y = example(name)
+    ea.save_reduced(reduced, tmp_path / "arm.c")
+    (tmp_path / "main.c").write_text(PROGRAM)
+    watched = ["-std=c99", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    command = [str(COMPILER), *watched, "main.c", "arm.c", "-o", "program", "-lm"]
+    made = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if "cannot find" in made.stderr:
+        pytest.skip("no sanitizer on this machine")
+    assert not made.returncode, made.stderr
+    rng = np.random.default_rng(1)
+    others = rng.uniform(-10.0, 10.0, (40, q.shape[1])), rng.uniform(-1.0, 1.0, (40, y.shape[1]))
+    strange = [np.full((1, q.shape[1] + y.shape[1]), value) for value in (np.nan, np.inf, 1e300)]
+    rows = np.vstack([np.hstack([q, y]), np.hstack(others), *strange])
+    given = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    told = subprocess.run(
+        [tmp_path / "program"], input=given, capture_output=True, text=True, check=False
+    )
+    assert (told.returncode, told.stderr) == (0, "")
+    found = np.array([line.split() for line in told.stdout.splitlines()], dtype=float)
+    assert len(found) == len(rows)
+    assert not found[:SAMPLES, 0].any()
+    np.testing.assert_allclose(found[:SAMPLES, 1:], reduced.frequencies(q, y), rtol=AGREE)
 
 
 @needs_compiler

@@ -160,7 +160,8 @@ def stacked(
         if motion.tree.riders(name):
             meshes.append(nodes.meshes[name])
             riders.append(Riding.of(meshes[-1].strands[0], whole, n_whole))
-        bases.append(sparse.eye_array(size) if link.reduction is None else link.reduction.basis)
+        basis = sparse.eye_array(size) if link.reduction is None else link.reduction.basis
+        bases.append(sparse.coo_array(basis))
         local, whole = local + len(link.own), whole + size
     stack = StackedLinks(
         pattern(U),
