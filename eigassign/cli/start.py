@@ -39,23 +39,27 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
     "template", type=click.Choice(list(TEMPLATES)), required=False, metavar="[TEMPLATE]"
 )
 @click.option(
-    "--urdf", type=arguments.PATH, help="Write the case of this robot (default: none, a template)."
+    "--urdf", type=arguments.PATH, help="Write the case of this robot (default: a template)."
 )
 @click.option(
-    "--out", type=arguments.PATH, help="Case file, or its folder (default: <template>.yaml)."
+    "--out",
+    type=arguments.PATH,
+    metavar="FOLDER",
+    help="Folder of the case file (default: the working folder). A name that ends in .yaml or .yml "
+    "is that of the case file itself.",
 )
 def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
-    """Write a commented case file that runs as it is, to start from.
+    """Write a commented case file that runs as it is.
 
-    TEMPLATE is planar_arm unless another is named. With --urdf the case is a robot from a URDF
-    file, and what URDF does not know is listed with its lines. Files that exist are never
+    Without TEMPLATE it is planar_arm. With --urdf the case is the robot of a URDF file, and what
+    URDF does not contain is listed with its lines, to be filled in. Existing files are never
     overwritten.
     """
     if template is not None and urdf is not None:
-        raise UsageError(f"name a template or --urdf, not both: {template} is a robot of its own")
+        raise UsageError(f"give a template or --urdf, not both: {template} is another mechanism")
     name = template or "planar_arm" if urdf is None else urdf.stem
-    case = Path(name) if out is None else out / name if out.is_dir() else out
-    case = case if case.suffix else case.with_name(f"{case.name}.yaml")
+    case = Path() if out is None else out
+    case = case if case.suffix in (".yaml", ".yml") else case / f"{name}.yaml"
     if urdf is None:
         beside = sorted(path for path in STARTERS.glob(f"{name}/*"))
         files = {case: STARTERS / f"{name}.yaml"}
@@ -74,7 +78,7 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
         after = ["to fill in:", *asked]
     for path in texts:
         if path.exists() or path.is_symlink():
-            raise StorageError(f"{path} exists and is left alone: choose another name with --out")
+            raise StorageError(f"{path} exists and is left alone: choose another folder with --out")
     for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "x", encoding="utf-8") as file:
@@ -92,12 +96,12 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
 )
 @click.argument("topic", nargs=-1)
 def docs(topic: tuple[str, ...]) -> int:
-    """Show the manual: a page, or the part of a page below a heading.
+    """Show the manual.
 
-    TOPIC is the name of a page, the beginning of a heading, or what stands in brackets behind a
-    link; without it, the list of pages. In a pipe it is the text as it is written, in Markdown.
+    TOPIC is a key, a command, a page or a heading, or the address of a link in the manual, such as
+    case-file.md#targets. Without it, the list of pages is shown. In a pipe the text is Markdown.
     """
-    text = _part(" ".join(topic) or "index")
+    text = in_plain_text(_part(" ".join(topic) or "index"))
     if sys.stdout.isatty():
         from eigassign.output.console import markdown
 
@@ -113,60 +117,67 @@ def _pages() -> dict[str, str]:
 
 
 def _part(topic: str) -> str:
-    """A page by its name, else the part below a heading, by its beginning; or what a link names."""
+    """A page by its name, else the part below a heading: of a key, a command, or any that fits.
+
+    What no heading begins with is shown if it stands below one heading alone.
+    """
     page, _, place = topic.rpartition("/")[2].partition("#")
-    wanted = _folded(place or page.removesuffix(".md"))
-    pages = {_folded(name): text for name, text in _pages().items()}
-    if place and page:
-        pages = {
-            _folded(page.removesuffix(".md")): pages.get(_folded(page.removesuffix(".md")), "")
-        }
-    elif wanted in pages:
-        return pages[wanted]
+    page = page.removesuffix(".md")
+    pages, wanted = _pages(), _folded(place or page)
+    named = next((name for name in pages if _folded(name) == _folded(page)), None)
+    if named and not place:
+        return pages[named]
     found = [
-        (not _is_about(_folded(title), wanted), level, start, text)
-        for text in pages.values()
+        (rank, level, text, start)
+        for text in ([pages[named]] if named else pages.values())
         for level, title, start in _headings(text)
-        if _is_about(_folded(title), wanted) or _folded(title).startswith(wanted)
+        if (rank := _rank(title, place or page, wanted)) is not None
     ]
     if not found:
-        where = _mentions(page or topic)
-        listed = f"; it is mentioned below {', '.join(where)}" if where else ""
-        raise UsageError(
-            f"no page and no heading begins with {topic!r}{listed}: eigassign docs lists the pages"
-        )
-    exact = [one for one in found if not one[0]]
-    _, level, start, text = min(exact or found[:1], key=lambda one: one[1])
+        found, listed = _mentions(topic, pages), ""
+        if len(found) > 1:
+            titles = [repr(text.splitlines()[start].strip("# ")) for *_, text, start in found[:4]]
+            listed = f"; it is mentioned below {', '.join(titles)}"
+        if len(found) != 1:
+            raise UsageError(
+                f"the manual has no page and no heading {topic!r}{listed}: eigassign docs lists "
+                "the pages"
+            )
+    _, level, text, start = min(found, key=lambda one: one[:2])
     ends = [k for other, _, k in _headings(text) if k > start and other <= level]
     return "\n".join(text.splitlines()[start : ends[0] if ends else None])
 
 
-def _is_about(title: str, wanted: str) -> bool:
-    """True for the heading of the topic, or of a part that is told apart by it."""
-    return title == wanted or title.endswith(f" with {wanted}")
+def _rank(title: str, written: str, wanted: str) -> int | None:
+    """How well a heading fits a topic: 0 as a key is written, 1 as a whole, 2 as it begins."""
+    folded = _folded(title)
+    if title == written or title.endswith(f" with {written}"):
+        return 0
+    if folded in (wanted, f"eigassign {wanted}") or folded.endswith(f" with {wanted}"):
+        return 1
+    return 2 if folded.startswith(wanted) else None
 
 
 _OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
 
 
-def _mentions(topic: str) -> list[str]:
-    """The headings below which a word stands most often, without what stands below others."""
-    word = re.compile(rf"\b{re.escape(topic.rstrip('s'))}s?\b", re.IGNORECASE)
-    counts: dict[str, int] = {}
-    for name, text in _pages().items():
-        if name in _OF_THE_CODE:
-            continue
-        lines, starts = text.splitlines(), _headings(text)
+def _mentions(topic: str, pages: dict[str, str]) -> list[tuple[int, int, str, int]]:
+    """Headings that have a word, else those below which it stands, the most often first."""
+    word = re.compile(rf"\b{re.escape(_folded(topic).rstrip('s'))}s?\b")
+    found, titled = [], []
+    for name in pages.keys() - _OF_THE_CODE:
+        lines, starts = pages[name].splitlines(), _headings(pages[name])
         ends = [start for _, _, start in starts[1:]] + [len(lines)]
-        for (_, title, start), end in zip(starts, ends, strict=True):
-            counts[title] = counts.get(title, 0) + len(word.findall("\n".join(lines[start:end])))
-    most = sorted(counts, key=lambda title: -counts[title])[:4]
-    return [repr(title) for title in most if counts[title]]
+        for (level, title, start), end in zip(starts, ends, strict=True):
+            count = len(word.findall(_folded("\n".join(lines[start:end]))))
+            found += [(-count, level, pages[name], start)] if count else []
+            titled += found[-1:] if word.search(_folded(title)) else []
+    return sorted(titled or found, key=lambda one: (one[0], one[1:]))
 
 
 def _folded(text: str) -> str:
     """The text as links spell headings, in lower case without punctuation; blanks for dashes."""
-    return re.sub(r"[^\w ]", "", text.lower().replace("-", " "))
+    return re.sub(r"[^\w\s]", "", re.sub("[-–]", " ", text.lower()))
 
 
 def _headings(text: str) -> list[tuple[int, str, int]]:
@@ -180,6 +191,40 @@ def _headings(text: str) -> list[tuple[int, str, int]]:
     return found
 
 
+# Code, which stays as it is, or a formula of a line of its own, or one in the text.
+_FORMULA = re.compile(r"^```.*?^```|`[^`]*`|\$\$(.+?)\$\$|\$([^$]+)\$", re.DOTALL | re.MULTILINE)
+_ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "hat": "\u0302", "tilde": "\u0303"}
+_RAISED = str.maketrans("0123456789-−T", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻ᵀ")
+_SHOWN = {  # what the formulas of the manual have of TeX, beside characters that are their own sign
+    r"\\tag(\{\d.*?\})": r"    (\1)",
+    r"\\begin\{bmatrix\}\s*": "[",
+    r"\s*\\end\{bmatrix\}": "]",
+    r"\s*\\\\": ";",
+    r"\s*&": ",",
+    r"\\quad": "  ",
+    r"\\sqrt\{(.*?)\}": r"√(\1)",
+    r"\\text|[{}]": "",
+}
+
+
+def in_plain_text(page: str) -> str:
+    """A page with its formulas as text: `B^T` is Bᵀ, and `K_{EE}` K_EE."""
+    return _FORMULA.sub(_in_plain_text, page)
+
+
+def _in_plain_text(found: re.Match[str]) -> str:
+    formula = found[1] or found[2]
+    if formula is None:
+        return found[0]
+    formula = re.sub(r"\\(d?dot|hat|tilde)\{(.)\}", lambda one: one[2] + _ACCENTS[one[1]], formula)
+    formula = re.sub(
+        r"\^(?:\{([-−\dT]+)\}|([\dT]))", lambda n: (n[1] or n[2]).translate(_RAISED), formula
+    )
+    for pattern, shown in _SHOWN.items():
+        formula = re.sub(pattern, shown, formula)
+    return formula if found[2] else re.sub(r"^(?=.)", "    ", formula.strip(), flags=re.MULTILINE)
+
+
 # --- Shell completion
 
 VARIABLE = "_EIGASSIGN_COMPLETE"
@@ -191,16 +236,16 @@ _ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }\n"
     epilog=arguments.examples("eigassign completion bash", "eigassign completion bash --install")
 )
 @click.argument("shell", type=click.Choice(list(SHELLS)), required=False, metavar="[SHELL]")
-@click.option("--install", is_flag=True, help="Set it up for new terminals of this user.")
+@click.option("--install", is_flag=True, help="Set up completion for new terminals of this user.")
 def completion(shell: str | None, install: bool) -> int:
-    """Completion of commands, options and files in bash, zsh or fish (default: that of $SHELL).
+    """Set up completion by tab, in bash, zsh or fish.
 
-    Prints the script; with --install it is written where the shell finds it: a file in your home
-    folder, and in bash and zsh a line in .bashrc or .zshrc.
+    Prints the script of SHELL (default: that of $SHELL). With --install it is written to a file in
+    your home folder, and for bash and zsh a line is added to .bashrc or .zshrc.
     """
     name = shell or Path(os.environ.get("SHELL", "")).name
     if name not in SHELLS:
-        raise UsageError(f"the shell {name or 'of $SHELL'!r} is not known: name bash, zsh or fish")
+        raise UsageError(f"unknown shell {name or '$SHELL'!r}: give bash, zsh or fish")
     script = _script(name)
     if not install:
         click.echo(script)
@@ -212,7 +257,7 @@ def completion(shell: str | None, install: bool) -> int:
         place = home / f".local/share/eigassign/completion.{name}"
         _write(place, script)
         _add_line(home / SHELLS[name], f'[ ! -r "{place}" ] || . "{place}"')
-    click.echo("open a new terminal, and press tab behind eigassign")
+    click.echo("open a new terminal, type eigassign and press tab")
     return 0
 
 
