@@ -17,7 +17,13 @@ from eigassign.study.accuracy import Accuracy, study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
+from eigassign.study.design.judgement import (
+    SolvedDesigns,
+    crossing_warnings,
+    far_off,
+    soft_drives,
+    swap_notes,
+)
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
@@ -219,7 +225,11 @@ def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
+    """Warnings of results that may mislead: doubts, crossing modes, a poor or worse design."""
+    for target in assigned.targets:
+        yield from () if target.asked.is_aim else far_off(target.asked, target.initial_hz)
+    for place, doubt in soft_drives(scene.file, scene.model, scene.path.q[:1]):
+        yield f"{place}: {doubt}"
     modes = tuple(
         sorted({mode for target in assigned.targets for mode in target.asked.modes if mode > 0})
     )

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import (
@@ -21,7 +22,7 @@ from eigassign.case.schema.links import (
     Taper,
 )
 from eigassign.case.schema.mechanism import Body
-from eigassign.case.schema.sections import BareSection
+from eigassign.case.schema.sections import BareSection, CircleSection, Section, TubeSection
 from eigassign.case.schema.targets import (
     AtLeastTarget,
     AtMostTarget,
@@ -29,6 +30,7 @@ from eigassign.case.schema.targets import (
     FrequencyProfile,
 )
 from eigassign.case.schema.trajectory import (
+    Added,
     PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
@@ -42,6 +44,9 @@ MODULUS = (1e6, 1.5e12)  # Pa: soft rubber … above diamond (1.2e12)
 DENSITY = (1.0, 25_000.0)  # kg/m3: aerogel … above osmium (22 590)
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
+# Of the outermost fibre, with the load at the end of its beam: structural steel yields at 0.0011.
+STRAIN = 0.001
+HEAVY = 30.0  # times the beam: the load of the shipped lift is 12 times its platform
 FREQUENCY = (1e-3, 1e6)  # Hz
 ROUND_OFF = 1e-9  # of the terms of a sum
 LARGEST_ERROR = 0.5  # a tolerance of 2 was meant as 2 %
@@ -207,6 +212,106 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
             if not semidefinite(spread(part.inertia)):
                 message = "no body has this inertia: a principal moment exceeds the other two's sum"
                 yield ("mechanism", group, name, "inertia"), message
+
+
+def payloads_can_be_held(document: Document) -> Iterator[Finding]:
+    """No body would bend the beam that carries it beyond what materials bear, lying flat."""
+    mechanism = document.mechanism
+    masses: list[tuple[KeyPath, str, float]] = [
+        (("mechanism", "bodies", name, "mass"), name, body.mass)
+        for name, body in mechanism.bodies.items()
+    ]
+    for place, path, value in _elsewhere(document):
+        group, name, *key = path.split(".")
+        masses += [(place, name, value)] if (group, key) == ("bodies", ["mass"]) else []
+    for place, name, mass in masses:
+        beam = _carrier(document, mechanism.bodies[name].at)
+        if beam is None:
+            continue
+        link = mechanism.links[beam]
+        assert isinstance(link, BeamLink)
+        ends = (_bar(mechanism.sections[section]) for section in _ends(link.section))
+        area, modulus = map(max, zip(*ends, strict=True))
+        material = mechanism.materials[link.material]
+        own = material.density * area * link.length
+        strain = 9.81 * mass * link.length / (material.youngs_modulus * modulus)
+        if strain > STRAIN and mass > HEAVY * own:
+            yield (
+                place,
+                f"{mass:g} kg would strain the beam {beam!r} that carries it by "
+                f"{100 * strain:.2g} % (steel yields at 0.1 %); the beam has {own:.2g} kg. Check "
+                "the mass, which is in kg when bare, and the section",
+            )
+
+
+def _carrier(document: Document, node: str) -> str | None:
+    """The beam that bends under a body on a node: its own, or that of a rigid link it is on."""
+    links, joints = document.mechanism.links, document.mechanism.joints
+    moved = {coordinate.joint for coordinate in document.coordinates.values()}
+    for _ in links:
+        name, _, end = node.partition(".")
+        if isinstance(links[name], BeamLink):
+            return name if end != "start" else None
+        held = [
+            joint.base
+            for key, joint in joints.items()
+            if joint.follower.partition(".")[0] == name
+            and (joint.type == "fixed" or (joint.type == "revolute" and key in moved))
+        ]
+        if not isinstance(links[name], RigidLink) or len(held) != 1 or "." not in held[0]:
+            return None
+        (node,) = held
+    return None
+
+
+def _bar(section: Section) -> tuple[float, float]:
+    """Area and section modulus, m2 and m3; of what is not round the largest that are possible."""
+    depth = section.depth(True)
+    if isinstance(section, BareSection):
+        return section.area, max(section.in_plane, section.inertia_y or 0.0) / (0.5 * depth)
+    if isinstance(section, (CircleSection, TubeSection)):
+        wall = getattr(section, "thickness", None) or 0.5 * depth
+        bore = getattr(section, "inner_diameter", None) or depth - 2.0 * wall
+        return math.pi / 4 * (depth**2 - bore**2), math.pi / 32 * (depth**4 - bore**4) / depth
+    return depth**2, depth**3 / 6.0
+
+
+# --- The design, and load cases
+
+
+def _elsewhere(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
+    """Other values of properties: at the ends of the design, and along trajectories."""
+    for name, entry in document.design.entries.items():
+        if isinstance(entry, Choices):
+            for choice, values in entry.choices.items():
+                for path in entry.properties:
+                    yield ("design", name, "choices", choice, path), path, values[path]
+            continue
+        for key, end in zip(("min", "max"), entry.range, strict=True):
+            key = key if entry.values is None else "values"
+            for path, factor in entry.factors.items():
+                yield ("design", name, key), path, factor * end
+    for place, _, motion in named_trajectories(document.trajectory):
+        for path, value in motion.set.items():
+            amount = value.add if isinstance(value, Added) else value
+            yield (*place, "set", path), path, amount
+
+
+def what_varies_has_the_size_of_machines(document: Document) -> Iterator[Finding]:
+    """What the design and load cases may give is judged like what the file has."""
+    sizes = {"youngs_modulus": (MODULUS, "Pa"), "length": (LENGTH, "m")}
+    found: dict[KeyPath, Finding] = {}  # one for an entry of the design
+    for place, path, value in _elsewhere(document):
+        group, name, key, *_ = path.split(".")
+        if group == "sections" and not isinstance(document.mechanism.sections[name], BareSection):
+            limits, unit = DEPTH, "m"
+        elif key in sizes:
+            limits, unit = sizes[key]
+        else:
+            continue
+        for finding in _outside(value, limits, place, unit):
+            found.setdefault(place[:2], finding)
+    yield from found.values()
 
 
 # --- Joints and places
@@ -401,6 +506,8 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     links_have_the_size_of_machines,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
+    payloads_can_be_held,
+    what_varies_has_the_size_of_machines,
     places_are_in_metres,
     angles_are_in_radians,
     angles_of_joints_have_an_effect,
