@@ -52,12 +52,13 @@ def _require_fit(client: Client, folder: str) -> int:
     """Number of workers; raises UsageError where one could not do its work."""
     threads = client.nthreads()
     if not threads:
-        raise UsageError("--scheduler: there are no workers yet")
+        raise UsageError("--scheduler: it has no workers yet")
     if several := [worker for worker, n in threads.items() if n != 1]:
         raise UsageError(f"--scheduler: worker {several[0]} has several threads; use --nthreads 1")
     for worker, (version, is_there) in client.run(_seen, folder).items():
         if version != __version__:
-            raise UsageError(f"--scheduler: worker {worker} has eigassign {version}, not the same")
+            other = f"eigassign {version}, not {__version__}"
+            raise UsageError(f"--scheduler: worker {worker} has {other}")
         if not is_there:
             raise UsageError(f"--scheduler: worker {worker} does not see the folder {folder}")
     return len(threads)
@@ -79,8 +80,8 @@ def _executor(client: Client, folder: str, _slots: int) -> Iterator[Executor]:
     except Exception as error:  # a task that is cancelled, a stream that is closed
         if isinstance(error, EigassignError) or client.status == "running":
             raise
-        kept = "what is done is kept, and the same command goes on from there"
-        raise StorageError(f"--scheduler: the scheduler was lost: {kept}") from error
+        kept = "cases that are done are kept: repeat the command to continue"
+        raise StorageError(f"--scheduler: the scheduler was lost; {kept}") from error
     finally:
         pool.shutdown(wait=False)  # and what is in flight is cancelled
 

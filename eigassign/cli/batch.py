@@ -227,7 +227,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> 
         def on_start(progress: Progress) -> None:
             total, done = progress.total, progress.done
             if done:
-                reporter.stage(f"{done} of {total} cases are done and current: left out")
+                reporter.stage(f"{done} of {total} cases are done and still current: skipped")
             shown = console.progress("case", total - done, stream=reporter.stream())
             advance.append(stack.enter_context(shown))
 
@@ -258,14 +258,14 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
         rows.insert(_FIRST, ("…", f"{len(todo) - len(rows)} more"))
     if rows:
         print_tables([Table("Cases that would run", ("case", "name"), tuple(rows))])
-    show(f"{_cases(len(todo))} would run, {len(spent)} are done and current")
+    show(f"{_cases(len(todo))} would run, {len(spent)} are done and still current")
     if not rows:
         return 0
     drawn = len(todo) if batch.options.reports == "all" else 0
     folders = 0 if batch.options.columns else len(todo)
     processes = f"{workers.slots} process{'es' if workers.slots > 1 else ''}"
     case_s, memory_mb = _of_first(batch, todo[0], bool(drawn))
-    source = "as those that are done took" if spent else "estimated from the first"
+    source = "as measured so far" if spent else "estimated from the first"
     if spent:
         case_s = sum(spent.values()) / len(spent)
     if case_s is not None:

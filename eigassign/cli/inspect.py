@@ -137,7 +137,7 @@ def _about(seconds: float) -> str:
     if seconds < 1.0:
         return "less than a second"
     rough = float(f"{seconds:.1g}")
-    return f"some {rough:.0f} s" if rough < 100 else f"some {seconds / 60:.0f} min"
+    return f"about {rough:.0f} s" if rough < 100 else f"about {seconds / 60:.0f} min"
 
 
 @click.command(
@@ -262,7 +262,7 @@ def _state_of(name: str, found: RunStatus) -> list[str]:
     return lines
 
 
-_SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there any more"}
+_SINCE = {"same": "as it was", "changed": "changed since", "missing": "missing"}
 
 
 @click.command(

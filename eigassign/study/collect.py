@@ -146,9 +146,9 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     curves = [np.where(np.abs(curve) > small, curve, 0.0) for curve in curves]
     weights = time_weights(path)
     weights = weights / weights.sum()
-    of = WEIGHED if isinstance(g, tuple) else "the motion alone, gravity being none"
+    of = WEIGHED if isinstance(g, tuple) else "the motion alone (gravity: none)"
     if g is None:
-        of = "the motion alone, mechanism.gravity not being given"
+        of = "the motion alone (gravity is not stated)"
     if not isinstance(g, tuple) and not any(curve.any() for curve in curves):
         return ()
 
@@ -258,10 +258,10 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
             else "so is the full expansion: narrow the bounds, expand nearer or to a higher order"
         )
         yield (
-            f"{target.label}: the prediction that the optimum rests on is up to "
-            f"{100 * target.approximation_error:.3g} % off the exact frequency, over the "
-            f"{100 * limit:g} % of validation.max_error ({advice}); the exact frequencies hold, "
-            "but there may be a better design"
+            f"{target.label}: the predicted frequency is up to "
+            f"{100 * target.approximation_error:.3g} % off the exact one, over the {100 * limit:g} "
+            f"% of validation.max_error ({advice}). The exact frequencies hold, but there may be "
+            "a better design"
         )
 
 
@@ -276,8 +276,8 @@ def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     )
     if after > before and _is_feasible(scene):
         yield (
-            "the initial design is nearer to the targets than this optimum is, when both are "
-            "solved exactly: the expansion misleads here; do not use this design"
+            "by exact frequencies the initial design is nearer to the targets than this optimum: "
+            "the expansion misleads here, do not use this design"
         )
 
 

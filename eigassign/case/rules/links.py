@@ -163,7 +163,7 @@ def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Findin
         n, path = max(known, key=lambda each: each[0])
         yield (
             (*path, "elements"),
-            f"{shown(n)}, in the whole mechanism {shown(total)} elements; more than "
+            f"{shown(n)} elements here, {shown(total)} in the whole mechanism: more than "
             f"{raised(MOST_ELEMENTS):g} take minutes and hundreds of MB for each model; "
             f"{how_to_raise(total, MOST_ELEMENTS)}",
         )

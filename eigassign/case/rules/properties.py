@@ -299,11 +299,8 @@ def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
             except NoPropertyError as error:
                 yield (*place, "set", path), str(error)
             if path in owner and not isinstance(value, Mapping):
-                message = (
-                    f"is the design parameter {owner[path]!r}: one of them can have it; what the "
-                    "trajectory has more is {add: …}"
-                )
-                yield (*place, "set", path), message
+                message = f"is the design parameter {owner[path]!r}, which a trajectory cannot set"
+                yield (*place, "set", path), message + ": write {add: …} for what it adds"
 
 
 def value_at(case: Any, path: str) -> float:

@@ -90,8 +90,8 @@ class PathOfDesign:
     def said(self) -> str:
         """The sentence that says what follows what."""
         return (
-            f"the tip keeps its path whatever {', '.join(self.moving)} will be: the joint "
-            "coordinates follow the design"
+            f"the tip keeps its path for every {', '.join(self.moving)}: the coordinates of the "
+            "joints follow the design"
         )
 
     @cached_property

@@ -230,7 +230,7 @@ def crossing_warnings(
         if gap[k] < NEAR:
             yield (
                 f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
-                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design; "
-                "modes are numbered by size, so if they cross there the curve of a mode changes "
-                "from one motion to the other"
+                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design. Modes are "
+                "numbered by size: if they cross there, each number goes on with the motion of the "
+                "other. A mode that is named by its shape keeps it"
             )

@@ -39,7 +39,7 @@ WRONG = [
     Wrong("other dimension", D, "parameter: [sections.rod.diameter, {¦materials.alu.density: 2}], min: 20 mm, max: 40 mm", "design.d.parameter[1].materials.alu.density", "is a density, sections.rod.diameter a length"),
     Wrong("written otherwise", D, "parameter: [sections.rod.diameter, {¦sections.pipe.outer_diameter: 2}], min: 20 mm, max: 40 mm", "design.d.parameter[1].sections.pipe.outer_diameter", "is 0.04 m in this file, where 2 × sections.rod.diameter is 0.06 m: write that there"),
     Wrong("several with another's", D, "parameter: [links.fore.length, ¦bodies.tool.mass], min: 0.1, max: 1", "design.d.parameter[1]", "bodies.tool.mass"),
-    Wrong("set of what is a parameter", TIP, adds("{¦bodies.tool.mass: 3}"), "trajectory.set.bodies.tool.mass", "what the trajectory has more is {add: …}"),
+    Wrong("set of what is a parameter", TIP, adds("{¦bodies.tool.mass: 3}"), "trajectory.set.bodies.tool.mass", "which a trajectory cannot set: write {add: …}"),
     Wrong("amount in another unit", TIP, adds("{bodies.tool.mass: {¦add: 3 mm}}"), "trajectory.set.bodies.tool.mass.add", "which is length"),
     Wrong("no amount", TIP, adds("{¦bodies.tool.mass: {}}"), "trajectory.set.bodies.tool.mass.add", "missing"),
     Wrong("taken away too much", TIP, adds("{¦bodies.tool.mass: {add: -50 g}}"), "trajectory.set.bodies.tool.mass", "must be >= 0 kg, got -0.05"),

@@ -137,7 +137,7 @@ def test_a_missed_target_is_told_what_it_is_and_what_would_help() -> None:
     assert {"What the missed modes are", "What would help"} <= tables
     card = verdict_of(result.results)
     assert card is not None
-    assert any("1 % more of what is no parameter" in more for f in card.findings for more in f.more)
+    assert any("1 % more of these changes it by" in more for f in card.findings for more in f.more)
     assert b'"anatomies"' in to_json(result.results)
 
 
