@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -116,63 +117,54 @@ def _pages() -> dict[str, str]:
     return {p.stem: p.read_text(encoding="utf-8") for p in pages}
 
 
-def _part(topic: str) -> str:
-    """A page by its name, else the part below a heading: of a key, a command, or any that fits.
+_OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
+_BEGINS = 2  # a rank of headings
 
-    What no heading begins with is shown if it stands below one heading alone.
+
+def _part(topic: str) -> str:
+    """A page by its name, else the part below the heading that fits best.
+
+    What no heading begins with is shown where it is found below one heading alone.
     """
     page, _, place = topic.rpartition("/")[2].partition("#")
     page = page.removesuffix(".md")
-    pages, wanted = _pages(), _folded(place or page)
-    named = next((name for name in pages if _folded(name) == _folded(page)), None)
+    named = {name: text for name, text in _pages().items() if _folded(name) == _folded(page)}
     if named and not place:
-        return pages[named]
-    found = [
-        (rank, level, text, start)
-        for text in ([pages[named]] if named else pages.values())
-        for level, title, start in _headings(text)
-        if (rank := _rank(title, place or page, wanted)) is not None
-    ]
-    if not found:
-        found, listed = _mentions(topic, pages), ""
-        if len(found) > 1:
-            titles = [repr(text.splitlines()[start].strip("# ")) for *_, text, start in found[:4]]
-            listed = f"; it is mentioned below {', '.join(titles)}"
-        if len(found) != 1:
-            raise UsageError(
-                f"the manual has no page and no heading {topic!r}{listed}: eigassign docs lists "
-                "the pages"
-            )
-    _, level, text, start = min(found, key=lambda one: one[:2])
+        return next(iter(named.values()))
+    found = sorted(_ranked(named or _pages(), place or page))
+    alike = [one for one in found if one[0] == found[0][0]]
+    if not found or (found[0][0] > _BEGINS and len(alike) > 1):
+        titles = ", ".join(repr(title) for *_, title, _, _ in alike[:4])
+        listed = f"; it is mentioned below {titles}" if titles else ""
+        missing = f"the manual has no page and no heading {topic!r}{listed}"
+        raise UsageError(f"{missing}: eigassign docs lists the pages")
+    _, _, level, _, start, text = found[0]
     ends = [k for other, _, k in _headings(text) if k > start and other <= level]
     return "\n".join(text.splitlines()[start : ends[0] if ends else None])
 
 
-def _rank(title: str, written: str, wanted: str) -> int | None:
-    """How well a heading fits a topic: 0 as a key is written, 1 as a whole, 2 as it begins."""
-    folded = _folded(title)
-    if title == written or title.endswith(f" with {written}"):
-        return 0
-    if folded in (wanted, f"eigassign {wanted}") or folded.endswith(f" with {wanted}"):
-        return 1
-    return 2 if folded.startswith(wanted) else None
+def _ranked(pages: dict[str, str], written: str) -> Iterator[tuple[int, int, int, str, int, str]]:
+    """Headings by how well they fit: rank, minus how often the word stands there, level, title.
 
-
-_OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
-
-
-def _mentions(topic: str, pages: dict[str, str]) -> list[tuple[int, int, str, int]]:
-    """Headings that have a word, else those below which it stands, the most often first."""
-    word = re.compile(rf"\b{re.escape(_folded(topic).rstrip('s'))}s?\b")
-    found, titled = [], []
-    for name in pages.keys() - _OF_THE_CODE:
-        lines, starts = pages[name].splitlines(), _headings(pages[name])
-        ends = [start for _, _, start in starts[1:]] + [len(lines)]
-        for (level, title, start), end in zip(starts, ends, strict=True):
-            count = len(word.findall(_folded("\n".join(lines[start:end]))))
-            found += [(-count, level, pages[name], start)] if count else []
-            titled += found[-1:] if word.search(_folded(title)) else []
-    return sorted(titled or found, key=lambda one: (one[0], one[1:]))
+    0 is a key as it is written, 1 a whole heading, 2 its beginning, 3 a word of it, 4 of the text.
+    """
+    wanted = _folded(written)
+    word = re.compile(rf"\b{re.escape(wanted.rstrip('s'))}s?\b")
+    for name, text in pages.items():
+        lines, heads = text.splitlines(), _headings(text)
+        ends = [start for *_, start in heads[1:]] + [len(lines)]
+        for (level, title, start), end in zip(heads, ends, strict=True):
+            folded, count = _folded(title), len(word.findall(_folded("\n".join(lines[start:end]))))
+            fits = (
+                title == written or title.endswith(f" with {written}"),
+                folded in (wanted, f"eigassign {wanted}") or folded.endswith(f" with {wanted}"),
+                folded.startswith(wanted),
+                word.search(folded) is not None,
+                count > 0 and name not in _OF_THE_CODE,
+            )
+            if any(fits):
+                rank = fits.index(True)
+                yield rank, -count * (rank > _BEGINS), level, title, start, text
 
 
 def _folded(text: str) -> str:

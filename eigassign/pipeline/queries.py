@@ -163,8 +163,7 @@ def _refuse_beyond_bounds(case: BuiltCase, y: Floats) -> None:
         if not column.min - slack <= value <= column.max + slack and value != initial:
             raise UsageError(
                 f"{name} = {value:g} {unit} is outside its bounds, {column.min:g} to "
-                f"{column.max:g} {unit}: for a design there ask with --beyond-bounds "
-                "(in Python beyond_bounds=True)"
+                f"{column.max:g} {unit}: --beyond-bounds allows it (beyond_bounds=True in Python)"
             )
 
 

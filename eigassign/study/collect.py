@@ -260,8 +260,7 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
         yield (
             f"{target.label}: the predicted frequency is up to "
             f"{100 * target.approximation_error:.3g} % off the exact one, over the {100 * limit:g} "
-            f"% of validation.max_error ({advice}). The exact frequencies hold, but there may be "
-            "a better design"
+            f"% of validation.max_error ({advice}): there may be a better design"
         )
 
 

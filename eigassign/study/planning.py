@@ -450,7 +450,7 @@ def choose_order(
     except EigassignError as error:  # an accuracy that is not met, or a design without a pose
         if needed:
             raise
-        why = f"neither an expansion nor a one-shot design: {error}"
+        why = f"there is no expansion, and so no one-shot design: {error}"
         return Plan(q0, y0, 0, modes, (why,))
     more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
     return Plan(q0, y0, found.order, modes, found.reasons, more_q, found.cluster_gap)

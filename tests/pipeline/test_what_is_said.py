@@ -121,6 +121,6 @@ def test_a_limit_that_the_mesh_alone_may_miss_is_not_proved_to_be_out_of_reach()
     assert finely(coarse, 2)[:, 1].max() < lowest * (1.0 - 1e-5)
     assert within.assignment is not None
     assert within.assignment.verdict == "do_not_use"
-    assert "give the links more elements" in within.assignment.reason
+    assert "Give the links more elements" in within.assignment.reason
     assert coarse.results.assignment is not None
     assert coarse.results.assignment.verdict == "unreachable"

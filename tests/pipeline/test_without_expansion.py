@@ -55,7 +55,7 @@ def without(result: Result) -> str:
     assert results.assignment.one_shot is None
     assert results.error is not None
     assert results.error.one_shot is None
-    (note,) = (note for note in results.notes if "an expansion" in note or "one-shot" in note)
+    (note,) = (note for note in results.notes if "no expansion" in note or "one-shot" in note)
     return note
 
 
@@ -79,7 +79,7 @@ def test_an_expansion_is_given_up_after_so_many_looks(tmp_path: Path) -> None:
 def test_the_design_is_the_one_that_is_found_with_an_expansion(tmp_path: Path) -> None:
     with_one, result = solved(tmp_path, shipped()), solved(tmp_path, fine())
     note = without(result)
-    assert note.startswith("neither an expansion nor a one-shot design: ")
+    assert note.startswith("there is no expansion, and so no one-shot design: ")
     before, after = with_one.results.error, result.results.error
     assert before is not None
     assert after is not None
@@ -106,14 +106,14 @@ def test_a_run_folder_and_a_check_say_so(
     case, out = written(tmp_path, fine()), tmp_path / "out"
     assert main(["check", str(case)]) == 0
     told = capsys.readouterr().out
-    assert "neither an expansion nor" in told
+    assert "there is no expansion, and so" in told
     assert "to order" not in told
     assert main(["optimize", str(case), "--out", str(out), "--report", "light"]) == 0
     found = json.loads((out / "results.json").read_text())
     assert (found["approximation"], found["solver"]) == ([], None)
     assert found["error"]["one_shot"] is None
-    assert "neither an expansion nor" in (out / "log.txt").read_text()
-    assert "neither an expansion nor" in (out / "report.html").read_text()
+    assert "there is no expansion, and so" in (out / "log.txt").read_text()
+    assert "there is no expansion, and so" in (out / "report.html").read_text()
 
 
 def test_an_expansion_point_that_cannot_follow_the_path_ends_nothing(tmp_path: Path) -> None:

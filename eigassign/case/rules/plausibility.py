@@ -63,6 +63,13 @@ STOUTNESS = (1e-4, 100.0)
 MODULI = (1.9, 60.0)
 
 
+SIZES = {  # of properties, by their keys
+    "youngs_modulus": (MODULUS, "Pa"),
+    "density": (DENSITY, "kg/m3"),
+    "length": (LENGTH, "m"),
+}
+
+
 def implausible(document: Document) -> Iterator[Finding]:
     """Everything in a valid document that is probably not meant."""
     for warning in WARNINGS:
@@ -83,15 +90,12 @@ def _outside(
 
 
 def materials_are_of_this_world(document: Document) -> Iterator[Finding]:
-    """Moduli and density are those of a solid."""
+    """Materials have mass, and two moduli that belong together."""
     for name, material in document.mechanism.materials.items():
         path: KeyPath = ("mechanism", "materials", name)
         E, G = material.youngs_modulus, material.shear_modulus
-        yield from _outside(E, MODULUS, (*path, "youngs_modulus"), "Pa")
         if material.density == 0:
             yield (*path, "density"), "links of this material are massless"
-        else:
-            yield from _outside(material.density, DENSITY, (*path, "density"), "kg/m3")
         if G is not None and not MODULI[0] <= E / G <= MODULI[1]:
             message = f"E / G is {E / G:.3g}; isotropic materials have 2 (1 + ν), from 2 to 3"
             yield (*path, "shear_modulus"), message
@@ -165,16 +169,14 @@ def _ends(section: str | Taper) -> tuple[str, ...]:
 # --- Links and bodies
 
 
-def links_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
-    """Beams and rigid links are from a millimetre to a hundred metres long."""
+def frames_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
+    """Beams of frames are from a millimetre to a hundred metres long."""
     for name, link in document.mechanism.links.items():
-        path: KeyPath = ("mechanism", "links", name)
-        if isinstance(link, (BeamLink, RigidLink)) and link.length is not None:
-            yield from _outside(link.length, LENGTH, (*path, "length"), "m")
-        elif isinstance(link, FrameLink):
+        if isinstance(link, FrameLink):
             for beam, inner in link.beams.items():
                 length = math.dist(link.nodes[inner.from_node], link.nodes[inner.to_node])
-                yield from _outside(length, LENGTH, (*path, "beams", beam), "m of length")
+                path = ("mechanism", "links", name, "beams", beam)
+                yield from _outside(length, LENGTH, path, "m of length")
 
 
 def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
@@ -196,9 +198,8 @@ def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
             at_most = "at most " if isinstance(sections[thick], BareSection) else ""
             yield (
                 ("mechanism", "links", name, "length"),
-                f"length is {at_most}{slenderness:.2g} times the depth of section "
-                f"{thick!r}; below {SLENDER:g} the Euler–Bernoulli beam, which neglects "
-                "shear, is doubtful; write shear: true",
+                f"length is {at_most}{slenderness:.2g} times the depth of section {thick!r}: below "
+                f"{SLENDER:g} shear matters, which Euler–Bernoulli beams lack: write shear: true",
             )
 
 
@@ -217,51 +218,22 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
 def payloads_can_be_held(document: Document) -> Iterator[Finding]:
     """No body would bend the beam that carries it beyond what materials bear, lying flat."""
     mechanism = document.mechanism
-    masses: list[tuple[KeyPath, str, float]] = [
-        (("mechanism", "bodies", name, "mass"), name, body.mass)
-        for name, body in mechanism.bodies.items()
-    ]
-    for place, path, value in _elsewhere(document):
-        group, name, *key = path.split(".")
-        masses += [(place, name, value)] if (group, key) == ("bodies", ["mass"]) else []
-    for place, name, mass in masses:
-        beam = _carrier(document, mechanism.bodies[name].at)
-        if beam is None:
+    for place, path, mass in _given(document):
+        group, body, key = path.split(".")[:3]
+        name, _, end = mechanism.bodies[body].at.partition(".") if group == "bodies" else ("",) * 3
+        beam = mechanism.links.get(name)
+        if key != "mass" or not isinstance(beam, BeamLink) or end == "start":
             continue
-        link = mechanism.links[beam]
-        assert isinstance(link, BeamLink)
-        ends = (_bar(mechanism.sections[section]) for section in _ends(link.section))
+        ends = (_bar(mechanism.sections[section]) for section in _ends(beam.section))
         area, modulus = map(max, zip(*ends, strict=True))
-        material = mechanism.materials[link.material]
-        own = material.density * area * link.length
-        strain = 9.81 * mass * link.length / (material.youngs_modulus * modulus)
-        if strain > STRAIN and mass > HEAVY * own:
+        material = mechanism.materials[beam.material]
+        strain = 9.81 * mass * beam.length / (material.youngs_modulus * modulus)
+        if strain > STRAIN and mass > HEAVY * material.density * area * beam.length:
             yield (
                 place,
-                f"{mass:g} kg would strain the beam {beam!r} that carries it by "
-                f"{100 * strain:.2g} % (steel yields at 0.1 %); the beam has {own:.2g} kg. Check "
-                "the mass, which is in kg when bare, and the section",
+                f"{mass:g} kg would strain the beam {name!r} that carries it by {100 * strain:.2g} "
+                "% (steel yields at 0.1 %): check the mass (in kg when bare) and the section",
             )
-
-
-def _carrier(document: Document, node: str) -> str | None:
-    """The beam that bends under a body on a node: its own, or that of a rigid link it is on."""
-    links, joints = document.mechanism.links, document.mechanism.joints
-    moved = {coordinate.joint for coordinate in document.coordinates.values()}
-    for _ in links:
-        name, _, end = node.partition(".")
-        if isinstance(links[name], BeamLink):
-            return name if end != "start" else None
-        held = [
-            joint.base
-            for key, joint in joints.items()
-            if joint.follower.partition(".")[0] == name
-            and (joint.type == "fixed" or (joint.type == "revolute" and key in moved))
-        ]
-        if not isinstance(links[name], RigidLink) or len(held) != 1 or "." not in held[0]:
-            return None
-        (node,) = held
-    return None
 
 
 def _bar(section: Section) -> tuple[float, float]:
@@ -276,11 +248,16 @@ def _bar(section: Section) -> tuple[float, float]:
     return depth**2, depth**3 / 6.0
 
 
-# --- The design, and load cases
+# --- Properties, as written and as the design and load cases change them
 
 
-def _elsewhere(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
-    """Other values of properties: at the ends of the design, and along trajectories."""
+def _given(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
+    """Where the file gives a property, its path, and the value there, or at the ends of a range."""
+    for group in ("materials", "links", "bodies"):
+        for name, part in getattr(document.mechanism, group).items():
+            for key in (*SIZES, "mass"):
+                if isinstance(value := getattr(part, key, None), float):
+                    yield ("mechanism", group, name, key), f"{group}.{name}.{key}", value
     for name, entry in document.design.entries.items():
         if isinstance(entry, Choices):
             for choice, values in entry.choices.items():
@@ -293,24 +270,19 @@ def _elsewhere(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
                 yield ("design", name, key), path, factor * end
     for place, _, motion in named_trajectories(document.trajectory):
         for path, value in motion.set.items():
-            amount = value.add if isinstance(value, Added) else value
-            yield (*place, "set", path), path, amount
+            yield (*place, "set", path), path, value.add if isinstance(value, Added) else value
 
 
-def what_varies_has_the_size_of_machines(document: Document) -> Iterator[Finding]:
-    """What the design and load cases may give is judged like what the file has."""
-    sizes = {"youngs_modulus": (MODULUS, "Pa"), "length": (LENGTH, "m")}
+def properties_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
+    """Moduli, densities and lengths, and what dimensions of sections may become."""
     found: dict[KeyPath, Finding] = {}  # one for an entry of the design
-    for place, path, value in _elsewhere(document):
-        group, name, key, *_ = path.split(".")
+    for place, path, value in _given(document):
+        group, name, key = path.split(".")[:3]
+        limits, unit = SIZES.get(key, ((-math.inf, math.inf), ""))
         if group == "sections" and not isinstance(document.mechanism.sections[name], BareSection):
             limits, unit = DEPTH, "m"
-        elif key in sizes:
-            limits, unit = sizes[key]
-        else:
-            continue
-        for finding in _outside(value, limits, place, unit):
-            found.setdefault(place[:2], finding)
+        for finding in _outside(value, limits, place, unit) if value or key != "density" else ():
+            found.setdefault(place[:2] if place[0] == "design" else place, finding)
     yield from found.values()
 
 
@@ -412,9 +384,8 @@ def joints_hold_something_new(document: Document) -> Iterator[Finding]:
             verb = "joins" if len(others) == 1 else "join"
             yield (
                 ("mechanism", "joints", name),
-                f"is redundant: {held} {verb} {joint.base} and {joint.follower} already, so that "
-                "it holds nothing new where it allows the same motion; leave it out, or was "
-                "another node meant?",
+                f"is redundant: {held} {verb} {joint.base} and {joint.follower} already. Leave it "
+                "out, or was another node meant?",
             )
         else:
             joined.setdefault(base, {})[follower] = name
@@ -503,11 +474,11 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     bare_sections_can_exist,
     sections_have_the_size_of_beams,
     materials_and_sections_are_used,
-    links_have_the_size_of_machines,
+    properties_have_the_size_of_machines,
+    frames_have_the_size_of_machines,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
     payloads_can_be_held,
-    what_varies_has_the_size_of_machines,
     places_are_in_metres,
     angles_are_in_radians,
     angles_of_joints_have_an_effect,

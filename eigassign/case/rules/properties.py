@@ -42,10 +42,8 @@ _GROUPS = {
     "springs": "spring",
 }
 _FORMS = (
-    "expected materials.<name>.<property>, sections.<name>.<property>, links.<name>.length, "
-    "bodies.<name>.<property>, springs.<name>.<property>, coordinates.<name>.drive.stiffness or "
-    "coordinates.<name>.drive.inertia; of places joints.<name>.position.0, joints.<name>.angle, "
-    "bodies.<name>.offset.0 and the like"
+    "expected materials.<name>.<property>, or the same of sections, links, bodies and springs, "
+    "coordinates.<name>.drive.stiffness or .inertia, joints.<name>.position.0 or .angle"
 )
 _VECTORS = {  # of which components can vary
     "joints": {"position": PLACE, "orientation": ANGLE},
@@ -333,11 +331,8 @@ def parameters_agree_with_the_file(tree: Tree, case: Any) -> Iterator[Finding]:
                 unit = f" {prop.dimension.si}".rstrip() if prop and prop.dimension else ""
                 yield (
                     place,
-                    (
-                        f"is {value:.12g}{unit} in this file, where {column.factors[path]:.12g} × "
-                        f"{column.parameter} is {wanted:.12g}{unit}: write that there, or another "
-                        "factor"
-                    ),
+                    f"is {value:.12g}{unit} in this file, where {column.factors[path]:.12g} × "
+                    f"{column.parameter} is {wanted:.12g}{unit}: write that, or another factor",
                 )
 
 

@@ -46,7 +46,7 @@ class FitSource:
         if not error < np.inf:
             raise AccuracyError(f"the error of {what} is not known in the region")
         if accuracy is not None and error > SHARE * accuracy:
-            raise AccuracyError(f"{what} has an error of {error:.1e}, too much for {accuracy:.1e}")
+            raise AccuracyError(f"{what} leaves an error of {error:.1e}, above {accuracy:.1e}")
         return error
 
 

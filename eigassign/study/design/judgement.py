@@ -143,10 +143,10 @@ def far_off(asked: Requirement, hz: Floats) -> Iterator[str]:
     low, high = asked.lower.min(), asked.upper.max()
     if len(asked.mode_terms) == 1 and (hz.max() < low / FAR or hz.min() > FAR * high):
         near, edge = (hz.max(), low) if hz.max() < low else (hz.min(), high)
+        off = max(near / edge, edge / near)
         yield (
-            f"{asked.label}: the initial design has {near:.4g} Hz, a factor of "
-            f"{max(near / edge, edge / near):,.0f} away. Check the unit (60 rpm are 1 Hz), the "
-            "number of the mode, and the stiffnesses and masses of the mechanism"
+            f"{asked.label}: the initial design has {near:.4g} Hz, a factor of {off:,.0f} off. "
+            "Check the unit (60 rpm are 1 Hz), the mode, stiffnesses and masses"
         )
 
 
@@ -164,9 +164,8 @@ def soft_drives(file: CaseFile, model: Model, q: Floats) -> Iterator[tuple[str, 
         sliding = file.coordinate_units[list(shares).index(name)] == "m"
         yield (
             f"coordinates.{name}.drive.stiffness",
-            f"mode 1 has {100 * shares[name]:.2f} % of its strain in this drive, beside which the "
-            f"links hardly bend: check the stiffness (a bare number is in "
-            f"{'N/m' if sliding else 'N m/rad'})",
+            f"mode 1 has {100 * shares[name]:.2f} % of its strain in this drive, the links hardly "
+            f"bend: check the stiffness (a bare number is in {'N/m' if sliding else 'N m/rad'})",
         )
 
 
@@ -230,7 +229,6 @@ def crossing_warnings(
         if gap[k] < NEAR:
             yield (
                 f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
-                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design. Modes are "
-                "numbered by size: if they cross there, each number goes on with the motion of the "
-                "other. A mode that is named by its shape keeps it"
+                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design. If they "
+                "cross, each number goes on with the motion of the other: name a mode by its shape"
             )

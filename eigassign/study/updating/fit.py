@@ -407,8 +407,7 @@ def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     if share[worst] > 0.5:  # half of what the measurement itself leaves open
         yield (
             f"the mesh puts the frequency of {problem.measured[worst].label} off by "
-            f"{share[worst]:.2g} of its standard deviation, which falsifies the parameters: give "
-            "the links more elements, or auto"
+            f"{share[worst]:.2g} standard deviations: give the links more elements, or auto"
         )
 
 

@@ -93,18 +93,6 @@ def test_a_slip_is_warned_of_at_its_place(old: str, new: str, message: str) -> N
     ]
 
 
-def test_a_payload_in_a_gripper_is_carried_by_the_arm_that_holds_it() -> None:
-    text = edited("hand: {length: 0.3, material: alu, section: bar, elements: 1}",
-                  "hand: {type: rigid, length: 0.3}")  # fmt: skip
-    text = text.replace("mass: 0.1}", "mass: 900}").replace("bar: {area", "bare: {area")
-    found = [message for *_, message in warnings_of(text) if "would strain" in message]
-    assert len(found) == 1
-    assert "the beam 'fore' that carries it" in found[0]
-    text = text.replace("{type: fixed, base: fore.end", "{type: revolute, base: fore.end")
-    text = text.replace("q2: {joint", "q3: {joint: wrist}\n  q2: {joint")
-    assert any("'fore' that carries it" in message for *_, message in warnings_of(text))
-
-
 def test_an_ordinary_arm_gives_no_warning() -> None:
     assert warnings_of(TEXT) == []
 

@@ -199,4 +199,9 @@ def test_a_part_is_of_a_named_trajectory_where_there_are_several(tmp_path: Path)
     several = "trajectory:\n" + 2 * "  - {q: [[0, 0], [1, 1]], duration: 1}\n"
     target = "  - {mode: 1, at_least: 3, ¦during: [0.1, 0.2]}\n"
     text = edited(motion, several).replace(T, target)
-    check(text, "targets[0].during", "needs the trajectory that is meant, as trajectory (1, 2)", tmp_path)
+    check(
+        text,
+        "targets[0].during",
+        "needs the trajectory that is meant, as trajectory (1, 2)",
+        tmp_path,
+    )

@@ -134,9 +134,8 @@ class _Wrenches:
             elif not known:
                 raise MechanismError(
                     f"mechanism.joints.{waiting[0].joint}",
-                    "closes a loop at nodes where other loops close too, so that the forces of the "
-                    "weight between them are not known: give each loop nodes of its own, or write "
-                    "gravity: none",
+                    "closes a loop at nodes where other loops close, which leaves forces of the "
+                    "weight unknown: give each loop nodes of its own, or write gravity: none",
                 )
 
     def _is_complete(self, link: str, *waiting: JointEdge) -> bool:
