@@ -167,8 +167,9 @@ def _check_rigid_loops(
             half = " and half a turn" if values[n] < -2.0 else ""
             raise MechanismError(
                 path,
-                f"closes a loop whose two sides do not meet: {_spelt(gap)}{half} apart. Correct "
-                "its positions, lengths and angles, or give one of its joints a freedom",
+                f"closes a loop whose two sides do not meet: {_spelt(gap)}{half} apart, where "
+                f"{MEETS:g} m and rad pass as rounding. Correct its positions, lengths and angles, "
+                "or give one of its joints a freedom",
             )
 
 

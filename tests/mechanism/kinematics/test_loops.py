@@ -423,7 +423,7 @@ def test_bennetts_linkage_works_where_its_dimensions_agree(q: float) -> None:
 
 
 def test_bennetts_linkage_is_refused_where_its_dimensions_do_not_agree() -> None:
-    with pytest.raises(MechanismError, match="6 conditions, of which J2, J3, J4 can meet 3"):
+    with pytest.raises(MechanismError, match="Of 6 conditions J2, J3, J4 can meet 3"):
         built(bennett(1e-4))
 
 
