@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LIMP = (
-    "the stiffness matrix is not positive definite: a link or drive is limp, or at this pose the "
-    "springs resist fewer motions than elsewhere, or its weight buckles it"
+    "the stiffness matrix is not positive definite: a link or drive has no stiffness, the springs "
+    "hold fewer motions at this pose than elsewhere, or the weight buckles the mechanism"
 )
 
 
@@ -85,8 +85,7 @@ class MissingMassError(MechanismError):
         modes = f"only {most} modes" if most != 1 else "only 1 mode"
         super().__init__(
             "mechanism",
-            f"has {modes} with mass, or with enough of it to be told from round-off: "
-            "give it mass or ask for fewer",
+            f"has {modes} whose mass is more than round-off: add mass, or ask for fewer modes",
         )
 
 
@@ -120,7 +119,7 @@ class LostModeError(EigassignError):
         self.candidates = candidates
         self.step = step
         nearest = " and ".join(map(str, candidates)) or "none of the modes"
-        super().__init__(message or f"no mode has the shape followed; nearest: {nearest}")
+        super().__init__(message or f"no mode has the shape that is followed; nearest: {nearest}")
 
 
 class InfeasibleError(EigassignError):

@@ -128,15 +128,16 @@ def percent(fraction: float) -> str:
     return f"{100.0 * fraction:#.3g}".rstrip(".") + " %"
 
 
-def at_most(fraction: float) -> str:
-    """A bound, rounded up to two digits: ``0.031 %``, ``below 0.001 %``."""
+def at_most(fraction: float, how: str = "at most") -> str:
+    """A bound, rounded up to two digits: ``at most 0.031 %``, ``below 0.001 %``."""
     if not math.isfinite(fraction):
         return "an unknown amount"
     if fraction < 1e-5:
         return "below 0.001 %"
     digits = 1 - math.floor(math.log10(100.0 * fraction))
     step = 10.0**-digits
-    return f"{math.ceil(100.0 * fraction / step - 1e-9) * step:.{max(digits, 0)}f} %"
+    amount = math.ceil(100.0 * fraction / step - 1e-9) * step
+    return f"{how} {amount:.{max(digits, 0)}f} %".lstrip()
 
 
 def seconds(value: float) -> str:

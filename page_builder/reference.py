@@ -285,8 +285,8 @@ def options(command: click.Command, name: str) -> list[tuple[str, str]]:
 
 
 def marked(text: str) -> str:
-    """One line; what has a placeholder, such as results/<case>, as code."""
-    return re.sub(r"[\w/.]*<\w+>[\w/.]*(?<!\.)", r"`\g<0>`", " ".join(text.split()))
+    """One line; what has a placeholder, such as results/<case>, and $VARIABLES as code."""
+    return re.sub(r"[\w/.]*<\w+>[\w/.]*(?<!\.)|\$[A-Z_]+", r"`\g<0>`", " ".join(text.split()))
 
 
 def tabulated(found: list[tuple[str, str]]) -> str:

@@ -65,10 +65,9 @@ def best_candidate(
             return candidate, certificate
     least = min((certificate for _, certificate in judged), key=lambda found: found.worst)
     raise AccuracyError(
-        f"the quadratic program's best answer has residuals primal "
-        f"{least.primal_residual:.1e}, dual {least.dual_residual:.1e}, gap "
-        f"{least.gap:.1e} where {ACCEPT:.0e} is accepted; wider bounds, or constraints "
-        "further from contradicting each other, may help"
+        f"the quadratic program was not solved to {ACCEPT:.0e}: primal residual "
+        f"{least.primal_residual:.1e}, dual {least.dual_residual:.1e}, gap {least.gap:.1e}. Widen "
+        "the bounds, or relax constraints that nearly contradict each other"
     )
 
 

@@ -119,7 +119,7 @@ def _differences(batch: Batch, rows: Mapping[int, CaseOutcome]) -> Iterator[Case
             is_of_a_case = os.path.lexists(place / OUTCOME)
             if listed is None and not (is_of_a_case and recorded(place) is None):
                 continue
-            now = outcome_of(case, "error", message="its files are not as its run has left them")
+            now = outcome_of(case, "error", message="its files were changed or lost since its run")
         if now != row:
             yield now
 
@@ -171,7 +171,7 @@ def _adopt(batch: Batch, before: Header | None) -> None:
             )
         if foreign:
             raise StorageError(
-                f"{folder} holds another batch (of {', '.join(before.files[:3])}); it was left "
+                f"{folder} holds another batch (of {', '.join(before.files[:3])}), which is left "
                 "alone. Choose another folder with --out, or use --force to move its list aside"
             )
     if foreign:
@@ -310,6 +310,6 @@ def summarise(
         except OSError as error:
             raise StorageError(
                 f"{folder}: the summaries cannot be written: {error.strerror}; "
-                f"eigassign merge {quoted(folder)} makes them anew"
+                f"eigassign merge {quoted(folder)} writes them again"
             ) from error
     return rows

@@ -58,7 +58,7 @@ def _require_fit(client: Client, folder: str) -> int:
     """Number of workers; raises UsageError where one could not do its work."""
     threads = client.nthreads()
     if not threads:
-        raise UsageError("--scheduler: there are no workers yet")
+        raise UsageError("--scheduler: it has no workers yet")
     if several := [worker for worker, n in threads.items() if n != 1]:
         raise UsageError(f"--scheduler: worker {several[0]} has several threads; use --nthreads 1")
     try:
@@ -69,7 +69,8 @@ def _require_fit(client: Client, folder: str) -> int:
         raise UsageError(f"--scheduler: the workers cannot run eigassign: {error}") from error
     for worker, (version, is_there) in seen.items():
         if version != __version__:
-            raise UsageError(f"--scheduler: worker {worker} has eigassign {version}, not the same")
+            other = f"eigassign {version}, not {__version__}"
+            raise UsageError(f"--scheduler: worker {worker} has {other}")
         if not is_there:
             raise UsageError(f"--scheduler: worker {worker} does not see the folder {folder}")
     return len(threads)

@@ -49,8 +49,8 @@ class FolderLock:
             if not join:
                 os.lseek(self._file, 0, os.SEEK_SET)
                 others = os.read(self._file, 1000).decode(errors="replace").splitlines()
-                message = f"another batch is at work in {self._folder} ({', '.join(others)})"
-                raise StorageError(f"{message}: wait for it, use --out, or work along with --join")
+                message = f"another batch is running in {self._folder} ({', '.join(others)}): wait"
+                raise StorageError(f"{message} for it, use another --out, or help it with --join")
             while not self._try(_PRESENCE, shared=True):
                 time.sleep(0.1)
         else:

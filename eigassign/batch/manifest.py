@@ -65,7 +65,7 @@ def read_header(folder: Path) -> Header | None:
     try:
         found = json_value(read_bytes(folder / HEADER, TABLE))
         if found["format"] != FORMAT:
-            raise UsageError(f"{folder / HEADER} is of another version of eigassign: use --out")
+            raise UsageError(f"{folder / HEADER} is of another version: use another --out")
         lists = {name: found[name] for name in ("shard", "files", "keys")}
         header = Header(**{**found, **{name: tuple(given) for name, given in lists.items()}})
         (i, n), texts = header.shard, (header.plan, header.version, header.summarised)
@@ -81,7 +81,7 @@ def read_header(folder: Path) -> Header | None:
     except OSError as error:
         raise StorageError(f"{folder / HEADER}: cannot be read: {error.strerror}") from error
     except (ValueError, LookupError, TypeError) as error:
-        raise UsageError(f"{folder / HEADER} is damaged: move it aside, or use --out") from error
+        raise UsageError(f"{folder / HEADER} is damaged: use another --out") from error
 
 
 def write_header(folder: Path, header: Header) -> None:

@@ -43,12 +43,12 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> InOrder:
     shards = []
     for folder in folders or (out,):
         if (found := read_header(folder)) is None:
-            raise UsageError(f"{folder}: no folder of a batch, there is no batch.json")
+            raise UsageError(f"{folder} is not the folder of a batch: it has no batch.json")
         shards.append(_Shard(folder, found, InOrder(folder, found)))
     if not folders:
         if lost := shards[0].lost():
             some = ", ".join(lost[:5]) + (", …" if len(lost) > 5 else "")
-            message = f"files of {some} are not as their runs have left them: run the batch again"
+            message = f"files of {some} were changed or lost: run the batch again"
             raise UsageError(f"{out}: {message}")
         with folder_lock(out) as lock:
             return summarise(out, shards[0].header, anew=True, alone=lock.summaries)

@@ -256,7 +256,7 @@ def cases_in(paths: Sequence[Path]) -> list[Path]:
     if not paths:
         paths = sorted(p for p in Path("cases").glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
         if not paths:
-            raise UsageError("cases: no such file or folder, or no case files in it; name some")
+            raise UsageError("there are no case files in ./cases: name the cases")
     for path in paths:
         if not path.exists():
             raise UsageError(f"{path}: no such file or folder")

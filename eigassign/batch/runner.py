@@ -59,7 +59,7 @@ def run(
             take_up(batch)
             lock.share()
         elif read_header(folder) != batch.header:
-            raise StorageError(f"{folder}: the batch at work there is not this one")
+            raise StorageError(f"{folder}: a batch of other cases is running there")
         progress = Progress(batch, lock)
         on_start(progress)
         try:
@@ -94,12 +94,12 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
         run_all(workers if total > _CHECKED else where, tasks, check, keep, _lost_in_check)
     if wrong:
         problems = [variant_problem(plan, *each) for each in first]
-        many = f"{wrong} of {total} variants are no valid cases: nothing was run"
+        many = f"{wrong} of {total} variants are not valid: nothing was run"
         raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
 
 
 def _lost_in_check(variant: Variant) -> NoReturn:
-    what = "the process that checked it was killed, perhaps for want of memory"
+    what = "the process that checked it was killed, perhaps because memory ran out"
     raise StorageError(f"{variant.path}: {variant.name}: {what}")
 
 
@@ -122,7 +122,7 @@ def _run(
 
     def lose(variant: Variant) -> None:
         why = "memory or time" if batch.options.seconds else "memory"
-        message = f"the process that ran it was killed, perhaps for want of {why}"
+        message = f"the process that ran it was killed, perhaps because {why} ran out"
         keep([variant], [outcome_of(variant, "error", message=message)])
 
     work = partial(run_cases, options=batch.options)

@@ -157,7 +157,7 @@ def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
         later = variants.keys[k + 1 :]
         other = next((o for o in later if path[: len(paths[o])] == paths[o]), None)
         if other is not None:
-            what = "is the same key" if paths[other] == path else "replaces it: write that first"
+            what = "is the same key" if paths[other] == path else "overwrites it: write that first"
             place = ("sweep", "file") if variants.file else ("sweep", "parameters", key)
             yield place, f"{other!r} {what}"
 
@@ -173,7 +173,7 @@ def _repeated(variants: Variants) -> Iterator[Finding]:
             continue
         if variants.file:
             line, other = variants.lines[k], variants.lines[first]
-            yield ("sweep", "file"), f"{variants.file}:{line}: the values of line {other} again"
+            yield ("sweep", "file"), f"{variants.file}:{line}: has the values of line {other}"
         else:
             why = f"variant {k + 1} has the values of variant {first + 1}"
             yield ("sweep", "parameters"), why
@@ -194,7 +194,7 @@ def _set(settings: Sequence[str]) -> dict[str, object]:
         if not equals or not key or not values:
             _refuse(setting, "expected KEY=VALUE,VALUE or KEY=MIN..MAX:COUNT")
         if key in found:
-            _refuse(key, "is given twice: write all its values behind one")
+            _refuse(key, "is given twice: write all values behind one --set")
         found[key] = _values(key, values)
     return found
 
@@ -202,7 +202,7 @@ def _set(settings: Sequence[str]) -> dict[str, object]:
 def _values(key: str, values: str) -> object:
     if span := _RANGE.fullmatch(values):
         if span["count"] is None:
-            _refuse(key, f"how many values? {values}:5 are five, with both ends")
+            _refuse(key, f"the number of values is missing: {values}:5 means five, with both ends")
         ends = {"min": resolve(span["min"]), "max": resolve(span["max"])}
         return {**ends, "count": int(span["count"])}
     try:

@@ -46,7 +46,7 @@ from eigassign.study.build import build_model
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-ANEW = "set up anew for every design: answers the runs along the trajectory only"
+ANEW = "is set up again for every design, and answers only whole trajectories"
 
 
 def compare_methods(
@@ -66,9 +66,9 @@ def compare_methods(
     asked, notes = replace(question.asked, evaluations=n or one), list(skipped_notes(skipped))
     largest = max([*effort.training, *(k ** len(bench.names) for k in effort.nodes)])
     if bench.most_solves < largest:
-        notes.append(f"no grid or surrogate is trained on over {bench.most_solves} exact solves")
+        notes.append(f"grids and surrogates have {bench.most_solves} exact solves at most")
     if "Kriging" not in [family for family, *_ in surrogate_families()]:
-        notes.append("no Kriging: it is charted where scikit-learn is installed")
+        notes.append("Kriging is left out: it needs scikit-learn")
     file = scene.file
     return Chart(
         title=file.title, case_name=file.path.stem, case_sha256=file.sha256,

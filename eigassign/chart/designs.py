@@ -58,12 +58,12 @@ def chart_designs(
     if not (wanted and all(plain) and len(lower) and np.isfinite(upper - lower).all()) or limited:
         return (), ()
     if scene.path.follows_design:
-        return (), ("no designs are charted where the coordinates follow the design",)
+        return (), ("searches of a design are left out: the coordinates follow the design",)
     path = scene.path.chosen(scene.path.spread(max(5, int(effort.most_s / 40.0 / solve_s))))
     runs, notes, samples = list[DesignRun](), list[str](), len(scene.path.q)
     if len(path.q) < samples:
-        few = f"designs are charted on {len(path.q)} of {samples} samples"
-        notes.append(f"{few} of the trajectory, for an exact solve takes long")
+        few = f"searches of a design see {len(path.q)} of {samples} samples"
+        notes.append(f"{few}, because an exact solve takes long")
     task = Task(replace(scene, trajectory=path), requirements_of(scene.file, path))
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
     ways: dict[str, Callable[[Task], Reached]] = {

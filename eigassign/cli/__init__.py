@@ -77,7 +77,7 @@ def _invoke(arguments: list[str]) -> int:
 
 
 class _InOrder(click.Group):
-    """Lists its commands in the order in which they are needed, each with a whole sentence."""
+    """Lists its commands in the order in which they are needed, those of every day first."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         return list(self.commands)
@@ -91,8 +91,9 @@ class _InOrder(click.Group):
 
     def format_commands(self, _context: click.Context, formatter: click.HelpFormatter) -> None:
         rows = [(name, each.get_short_help_str(200)) for name, each in self.commands.items()]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
+        for heading, some in (("Commands", rows[: len(FIRST)]), ("More", rows[len(FIRST) :])):
+            with formatter.section(heading):
+                formatter.write_dl(some)
 
 
 @click.group(
@@ -110,15 +111,13 @@ def cli() -> None:
     """Assign the natural frequencies of moving, flexible mechanisms along their trajectory.
 
     \b
-    Exit codes: 0 fine; 1 infeasible, over the asked tolerance, or some cases
-    failed; 2 wrong usage or wrong input; 3 environment or I/O; 4 a bug of
-    eigassign; 130 and 143 interrupted and terminated.
+    Exit codes: 0 success; 1 no usable design, an accuracy missed, or a case
+    failed; 2 wrong usage or case file; 3 disk, memory or permissions; 4 a bug
+    of eigassign; 130 and 143 interrupted and terminated.
     """
 
 
-for command in (
-    *(init, check, modes, optimize, expand, update, validate, chart, batch, merge),
-    *(status, export, animate),
-    *(cache, schema, docs, completion),
-):
+FIRST = (init, check, optimize, update, batch, docs)
+MORE = (modes, expand, validate, chart, merge, status, export, animate, cache, schema, completion)
+for command in (*FIRST, *MORE):
     cli.add_command(command)

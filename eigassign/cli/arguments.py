@@ -104,44 +104,45 @@ pose = several(
     click.option(
         "--q",
         metavar="VALUES",
-        help="Pose, as '1.817, 5.312' or '104 deg, 304 deg' (default: the case's expansion point, "
-        "or where its trajectory starts).",
+        help="Pose, such as '1.817, 5.312' or '104 deg, 304 deg' (default: the expansion point of "
+        "the case, or the start of its trajectory).",
     ),
     click.option(
         "--y",
         metavar="VALUES",
-        help="Design, as '0.125, 0.125' or '125 g, 0' (default: as written in the case).",
+        help="Design, such as '0.125, 0.125' or '125 g, 0' (default: as the case file has it).",
     ),
 )
-json = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+json = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 common = several(
-    click.option("--quiet", is_flag=True, help="Only errors on stderr."),
-    click.option("-v", "--verbose", count=True, help="More on stderr (-vv: all)."),
-    click.option("--debug", is_flag=True, help="Show the traceback of an error."),
+    click.option("--quiet", is_flag=True, help="Print only errors on stderr."),
+    click.option("-v", "--verbose", count=True, help="Print more on stderr (-vv: everything)."),
+    click.option("--debug", is_flag=True, help="Print the traceback of an error."),
     click.option(
         "--allow-outside",
         is_flag=True,
-        help="Cases may name files that do not lie below their own folder.",
+        help="Let cases name files outside their own folder.",
     ),
 )
 cache_dir = click.option(
     "--cache-dir",
     type=PATH,
+    metavar="FOLDER",
     help="Cache folder (default: $EIGASSIGN_CACHE_DIR, else the user's cache folder).",
 )
 caching = several(
     click.option(
         "--no-cache",
         is_flag=True,
-        help="Neither read nor write the cache. $EIGASSIGN_CACHE says what is cached: always, "
-        "never, or auto, what takes more than 0.1 s to compute (the default).",
+        help="Neither read nor write the cache. $EIGASSIGN_CACHE is auto (keep what takes over "
+        "0.1 s to compute; the default), always or never.",
     ),
     cache_dir,
 )
 force = click.option(
     "--force",
     is_flag=True,
-    help="Move what is in the way aside, whatever it is; without it the command stops.",
+    help="Rename whatever is in the way (to <name>.1); without --force the command stops.",
 )
 figures = click.option(
     "--figures",
@@ -149,7 +150,7 @@ figures = click.option(
     metavar="FORMATS",
     default="png",
     show_default=True,
-    help="Formats of the figures: png, svg, pdf, a comma between; or none.",
+    help="Formats of the figures: png, svg, pdf, separated by commas; or none.",
 )
 
 
@@ -158,8 +159,8 @@ against = several(
         "--against",
         type=PATH,
         metavar="PREVIOUS",
-        help="Name what has moved since: a results folder, results.json, summary.json, or what "
-        "validate --json printed (default: nothing is compared).",
+        help="Compare with an earlier result, and list what has changed: a result folder, "
+        "results.json, summary.json, or the output of validate --json (default: no comparison).",
     ),
     click.option(
         "--tolerance",
@@ -167,26 +168,26 @@ against = several(
         metavar="HZ",
         default=0.01,
         show_default=True,
-        help="How far frequencies may be from those of --against.",
+        help="Difference up to which frequencies count as unchanged.",
     ),
 )
 
 
-def report_of(usual: str) -> Callable[[F], F]:
-    """``--report`` with its default."""
-    return click.option(
-        "--report",
-        type=click.Choice(["full", "light", "none"]),
-        default=usual,
-        show_default=True,
-        help="report.html: full moves and zooms (5 MB); light has pictures, no script; or none.",
-    )
+report = click.option(
+    "--report",
+    type=click.Choice(["full", "light", "none"]),
+    default="full",
+    show_default=True,
+    help="Report: full is interactive (5 MB), light has pictures only (1 MB), or none.",
+)
 
 
-report = report_of("full")
+def out(usual: str) -> Callable[[F], F]:
+    """``--out``: in every command the folder of its result, with its default."""
+    said = f"Folder of the result (default: {usual})."
+    return click.option("--out", type=PATH, metavar="FOLDER", help=said)
 
 
-def running(folder: str = "results/<case>", usual: str = "full") -> Callable[[F], F]:
-    """The options of a command that leaves a run folder: ``folder`` and ``usual`` by default."""
-    out = click.option("--out", type=PATH, help=f"Folder of the run (default: {folder}).")
-    return several(out, caching, force, figures, report_of(usual))
+def writing(folder: str) -> Callable[[F], F]:
+    """The options of a command that leaves a folder with figures and a report."""
+    return several(out(folder), force, figures, report)

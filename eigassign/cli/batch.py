@@ -40,14 +40,15 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     "settings",
     metavar="KEY=VALUES",
     multiple=True,
-    help="Values of a key, as V1,V2 or MIN..MAX:COUNT; several are a grid (default: the sweep).",
+    help="Values of a key, as V1,V2 or MIN..MAX:COUNT; several --set make a grid (default: the "
+    "sweep of the case).",
 )
-@click.option("--dry-run", is_flag=True, help="List what would run, with its time and files.")
-@click.option("--jobs", type=click.IntRange(1), help="Processes (default: one per core).")
+@click.option("--dry-run", is_flag=True, help="Say what would run, and how long; run nothing.")
+@click.option("--jobs", type=click.IntRange(1), help="Number of processes (default: one per core).")
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Run on the workers of this dask.distributed scheduler (default: on this machine).",
+    help="Run on the workers of this dask.distributed scheduler (default: this machine).",
 )
 @click.option(
     "--shard",
@@ -55,35 +56,34 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     metavar="I/N",
     default="1/1",
     show_default=True,
-    help="Run the I-th of N parts, in a folder of its own; merge makes one batch of them.",
+    help="Run part I of N, in a folder of its own; join the parts with merge.",
 )
-@click.option("--join", is_flag=True, help="Work along with a batch that is at work there.")
+@click.option("--join", is_flag=True, help="Help a batch that is already running in the folder.")
 @click.option(
     "--reports",
     type=click.Choice(["none", "failed", "all"]),
-    help="Cases with figures and a light report (default: all up to 50 cases, else failed); "
-    "those that are done without theirs run again.",
+    help="Which cases get figures and a light report (default: all up to 50 cases, else failed); "
+    "cases that are done but lack theirs run again.",
 )
 @click.option(
     "--columns",
     is_flag=True,
-    help="No folder a case, but columns.h5 and columns.csv; so it is above 10 000 cases.",
+    help="Write columns.h5 and columns.csv instead of a folder for each case; always above 10 000 "
+    "cases.",
 )
 @click.option(
     "--case-time",
     type=arguments.LIMIT,
     metavar="SECONDS",
-    help="End a case that takes longer (default: never).",
+    help="Stop a case that takes longer (default: never).",
 )
 @click.option(
     "--case-memory",
     type=arguments.LIMIT,
     metavar="MB",
-    help="End a case that takes more (default: never).",
+    help="Stop a case that needs more memory (default: never).",
 )
-@click.option(
-    "--out", type=arguments.PATH, help="Folder (default: results, or results/<case>_sweep)."
-)
+@arguments.out("results, or results/<case>_sweep of one swept case")
 @arguments.against
 @arguments.caching
 @arguments.force
@@ -97,13 +97,13 @@ def batch(
     join: bool,
     **how: Any,
 ) -> int:
-    """Optimize many cases in parallel: files, folders searched for *.yaml and *.yml, and sweeps.
+    """Optimize many cases, and the variants of a sweep, in parallel.
 
-    Every case gets its own folder below --out, beside index.html, summary.csv, summary.json and
-    junit.xml. A case file with a
-    sweep, or with --set, is run once for each variant. Cases that are done and current are left
-    out, so that the same command goes on where it was interrupted. A failed case does not stop the
-    others; exit code 1 if any failed, or has moved from --against.
+    PATHS are case files, and folders that are searched for *.yaml and *.yml. A case with a sweep,
+    or with --set, runs once for each variant. Every case has its own folder in --out, beside
+    index.html, summary.csv, summary.json and junit.xml. Cases that are done and still current are
+    skipped: repeat the command to continue after an interruption. A failed case does not stop the
+    others. Exit code 1 if a case failed, or differs from --against.
     """
     from eigassign.batch.limits import require_limits_here
     from eigassign.batch.plan import cases_in, plan_of
@@ -171,10 +171,12 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
 @arguments.against
 @arguments.common
 def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
-    """Make one batch of the SHARDS of batch --shard, in FOLDER; or its summaries anew, without any.
+    """Join the parts of a batch that ran separately.
 
-    A shard that is missing, not finished, or of another batch is an error. The folders of the cases
-    stay where they are. Exit code 1 if any case failed, or has moved from --against.
+    FOLDER is the folder of the result. SHARDS are the folders of the parts, written by batch
+    --shard; the folders of their cases stay where they are. Without SHARDS, the summaries in FOLDER
+    are written again, from the cases that it has. It is an error if a part is missing, unfinished
+    or of another batch. Exit code 1 if a case failed, or differs from --against.
     """
     from eigassign.batch.merge import merge_shards
 
@@ -226,7 +228,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> 
         def on_start(progress: Progress) -> None:
             total, done = progress.total, progress.done
             if done:
-                reporter.stage(f"{done} of {total} cases are done and current: left out")
+                reporter.stage(f"{done} of {total} cases are done and still current: skipped")
             shown = console.progress("case", total - done, stream=reporter.stream())
             advance.append(stack.enter_context(shown))
 
@@ -259,14 +261,14 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
         rows.insert(_FIRST, ("…", f"{len(todo) - len(rows)} more"))
     if rows:
         print_tables([Table("Cases that would run", ("case", "name"), tuple(rows))])
-    show(f"{_cases(len(todo))} would run, {len(spent)} are done and current")
+    show(f"{_cases(len(todo))} would run, {len(spent)} are done and still current")
     if not rows:
         return 0
     drawn = len(todo) if batch.options.reports == "all" else 0
     folders = 0 if batch.options.columns else len(todo)
     processes = f"{workers.slots} process{'es' if workers.slots > 1 else ''}"
     case_s, memory_mb = _of_first(batch, todo[0], bool(drawn))
-    source = "as those that are done took" if spent else "estimated from the first"
+    source = "as measured so far" if spent else "estimated from the first"
     if spent:
         case_s = sum(spent.values()) / len(spent)
     if case_s is not None:

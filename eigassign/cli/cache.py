@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.group(epilog=arguments.examples("eigassign cache list", "eigassign cache clear"))
 def cache() -> None:
-    """The expansions kept from earlier runs."""
+    """Show or clear what was kept from earlier runs."""
 
 
 @cache.command("path", epilog=arguments.examples("eigassign cache path"))
@@ -40,7 +40,7 @@ def cache_path(cache_dir: Path | None) -> int:
 )
 @arguments.cache_dir
 def cache_clear(older_than_s: float | None, cache_dir: Path | None) -> int:
-    """Delete what is in the cache.
+    """Delete all files in the cache, or old ones.
 
     Above 1 GB the oldest files go by themselves.
     """
@@ -53,7 +53,7 @@ def cache_clear(older_than_s: float | None, cache_dir: Path | None) -> int:
 @cache.command("list", epilog=arguments.examples("eigassign cache list"))
 @arguments.cache_dir
 def cache_list(cache_dir: Path | None) -> int:
-    """List what is in the cache, oldest first."""
+    """List the files in the cache, oldest first."""
     from eigassign.output.console import print_tables
     from eigassign.output.tables import Table
 
@@ -74,5 +74,5 @@ def _cache(directory: Path | None) -> Cache:
 
     found = default_directory() if directory is None else directory
     if found is None:
-        raise UsageError("there is no home folder to keep a cache in: use --cache-dir")
+        raise UsageError("there is no home folder for a cache: name one with --cache-dir")
     return Cache(found)

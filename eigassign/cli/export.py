@@ -36,12 +36,12 @@ from eigassign.files import folder_name
 def export(
     case: Path, file: Path, modes: tuple[int, ...], accuracy: float, as_json: bool, **how: Any
 ) -> int:
-    """Write a reduced model: frequencies at any q and y, without mesh and mechanism.
+    """Write a reduced model for NumPy, MATLAB or C.
 
-    The ending of FILE says for whom: .npz is read by NumPy alone, .mat by MATLAB and Octave, .c
-    compiles as C99, .h5 is read by eigassign. It is as accurate as --accuracy says along the
-    trajectory and over the bounds of the design, by its own error estimate. Files that are there
-    are replaced.
+    The model gives frequencies at any pose q and design y without mesh and mechanism. The ending of
+    FILE decides its format: .npz for NumPy, .mat for MATLAB and Octave, .c for C99, .h5 for
+    eigassign. Its estimated error is below --accuracy along the trajectory and within the bounds of
+    the design. An existing FILE is replaced.
     """
     from eigassign.pipeline.export import export as exported
     from eigassign.study.built_case import load_case
@@ -71,10 +71,10 @@ def export(
 @arguments.case
 @click.argument("file", required=False, type=arguments.PATH)
 @click.option(
-    "--mode", type=click.IntRange(1), help="A mode's shape (default: the motion instead)."
+    "--mode", type=click.IntRange(1), help="Animate the shape of this mode (default: the motion)."
 )
 @arguments.pose
-@click.option("--trajectory", metavar="NAME", help="One of several (default: the first).")
+@click.option("--trajectory", metavar="NAME", help="Which trajectory (default: the first).")
 @arguments.common
 def animate(
     case: Path,
@@ -85,10 +85,10 @@ def animate(
     trajectory: str | None,
     **how: Any,
 ) -> int:
-    """Animate the motion along the trajectory, or with --mode the shape of a mode.
+    """Animate the motion, or a mode.
 
-    FILE is a GIF, or an animated PNG by its ending; results/<case>_motion.gif or
-    results/<case>_mode_1.gif without one. A file that is there is replaced.
+    FILE ends in .gif, or in .png for an animated PNG; without FILE it is results/<case>_motion.gif,
+    or results/<case>_mode_1.gif of mode 1. An existing FILE is replaced.
     """
     from eigassign.pipeline.animation import animate as animated
     from eigassign.study.built_case import load_case

@@ -33,17 +33,17 @@ LEFT_BY = ("run", "update", "batch", "chart")
     )
 )
 @click.argument("cases", nargs=-1, required=True, type=arguments.PATH)
-@click.option("--draw", is_flag=True, help="Draw the mechanism, in results/<case>_check.")
+@click.option("--draw", is_flag=True, help="Draw the mechanism, into results/<case>_check.")
 @arguments.force
 @arguments.figures
 @arguments.json
 @arguments.common
 def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int:
-    """Check case files: every problem with its line, what a run will take, and what to do next.
+    """Check case files, and say what a run will take.
 
-    A problem is shown as file:line:column: key: what is wrong; the first variants of a sweep are
-    checked too. A case in order gets plausibility warnings, its degrees of freedom, the
-    coefficients of its expansion, and about how much memory and how many seconds a run will take.
+    Lists every problem as file:line:column: key: message, also those of the first 100 variants of a
+    sweep. For a valid case it prints warnings of implausible values, the degrees of freedom, errors
+    of the model, and how much time and memory a run takes.
     """
     from eigassign.pipeline import outlook
     from eigassign.pipeline.queries import check as checked
@@ -143,7 +143,7 @@ def _about(seconds: float) -> str:
     if seconds < 1.0:
         return "less than a second"
     rough = float(f"{seconds:.1g}")
-    return f"some {rough:.0f} s" if rough < 100 else f"some {seconds / 60:.0f} min"
+    return f"about {rough:.0f} s" if rough < 100 else f"about {seconds / 60:.0f} min"
 
 
 @click.command(
@@ -155,14 +155,10 @@ def _about(seconds: float) -> str:
 )
 @arguments.case
 @arguments.pose
-@click.option("--beyond-bounds", is_flag=True, help="Also a design outside its bounds.")
-@click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
-@click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
-@click.option(
-    "--out",
-    type=arguments.PATH,
-    help="Draw their shapes, in this folder (default: results/<case>_modes).",
-)
+@click.option("--beyond-bounds", is_flag=True, help="Accept a design outside its bounds.")
+@click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="How many.")
+@click.option("--draw", is_flag=True, help="Draw the mode shapes.")
+@arguments.out("results/<case>_modes; --out asks for the drawings too")
 @arguments.force
 @arguments.figures
 @arguments.json
@@ -177,10 +173,10 @@ def modes(
     draw: bool,
     **how: Any,
 ) -> int:
-    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
+    """Show exact natural frequencies and mode shapes at one pose.
 
-    Of a case with load cases, what these set may follow the coordinates in --q. A bare angle
-    beyond two turns is refused, as it was probably meant in deg.
+    Only elastic modes are listed; rigid-body modes are counted. Properties that load cases set may
+    follow the coordinates in --q. An angle above two turns needs its unit, rad or deg.
     """
     from eigassign.pipeline import queries
 
@@ -233,11 +229,11 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
 @arguments.json
 @arguments.common
 def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
-    """Verify run folders: is every file as it was written, and is the case still the same?
+    """Verify that result folders are as they were written.
 
-    The hashes in run.json are compared with the files of the folder, the case file and the files
-    that it names, and the version with the one installed. Exit code 0 where all agree; 1 where
-    something was changed, or is missing; 2 where there is no finished run.
+    Compares the hashes in run.json with the files of the folder, the case file and the files that
+    the case names, and the version with the installed one. Exit code 0 if all agree, 1 if something
+    has changed or is missing, 2 if there is no finished run.
     """
     from eigassign.output.store.run_record import run_status
 
@@ -272,7 +268,7 @@ def _state_of(name: str, found: RunStatus) -> list[str]:
     return lines
 
 
-_SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there any more"}
+_SINCE = {"same": "as it was", "changed": "changed since", "missing": "missing"}
 
 
 @click.command(
@@ -283,9 +279,10 @@ _SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there
 )
 @click.argument("of", type=click.Choice(["case", *LEFT_BY]), default="case")
 def schema(of: str) -> int:
-    """Print the JSON Schema of case files, for editors, or of the file of results that OF leaves.
+    """Print the JSON Schema of case files or results.
 
-    A run and an update leave results.json, a batch summary.json, a chart chart.json.
+    That of case files is for editors; run and update mean results.json, batch summary.json, and
+    chart chart.json.
     """
     if of == "case":
         from eigassign.case.schema.document import json_schema

@@ -32,15 +32,17 @@ if TYPE_CHECKING:
     type=click.Choice(["none", "cheap", "all"]),
     default="cheap",
     show_default=True,
-    help="What the answer means, in how much depth: all adds error against mass or price.",
+    help="How much of what the answer means is studied: all adds the error against mass or price.",
 )
-@arguments.running()
+@arguments.writing("results/<case>")
+@arguments.caching
 @arguments.json
 @arguments.common
 def optimize(case: Path, as_json: bool, **how: Any) -> int:
-    """Assign the frequencies: the best design, proved by exact solves, in a run folder.
+    """Find the best design, solve it exactly, and write a report.
 
-    Exit code 1 where the limits are infeasible, or an accuracy that was asked for is missed.
+    Exit code 1 if the verdict is unreachable, infeasible or do not use, or if the error is above
+    assignment.max_error.
     """
     from eigassign.pipeline import run
 
@@ -54,24 +56,26 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
     )
 )
 @arguments.case
-@click.option("--order", type=click.IntRange(1, 20), help="Order (default: the case's).")
-@click.option("--linear", is_flag=True, help="Keep the partially linearised set only.")
+@click.option("--order", type=click.IntRange(1, 20), help="Order (default: that of the case).")
+@click.option("--linear", is_flag=True, help="Only terms that are linear in the design.")
 @click.option(
     "--mode",
     "modes",
     type=click.IntRange(1),
     multiple=True,
-    help="Mode, repeatable (default: the case's).",
+    help="Mode to expand; repeatable (default: those of the case).",
 )
-@arguments.running("results/<case>_expansion")
+@arguments.writing("results/<case>_expansion")
+@arguments.caching
 @arguments.json
 @arguments.common
 def expand(
     case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
 ) -> int:
-    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder.
+    """Write the Taylor expansion of eigenvalues, and its accuracy.
 
-    The coefficients are in coefficients.json and coefficients.h5.
+    The expansion is in the coordinates q and the design y. Its coefficients are in
+    coefficients.json and coefficients.h5.
     """
     from eigassign.pipeline import run
 
@@ -138,18 +142,16 @@ def _show(outcome: Outcome, as_json: bool) -> None:
     )
 )
 @arguments.case
-@click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_update).")
-@arguments.force
-@arguments.figures
-@arguments.report
+@arguments.writing("results/<case>_update")
 @arguments.json
 @arguments.common
 def update(case: Path, as_json: bool, **how: Any) -> int:
-    """Find the design parameters that explain the case's measured frequencies.
+    """Fit the parameters to measured frequencies.
 
-    Least squares on exact frequencies, with intervals, what cannot be told from the measurements,
-    and the residual of each; updated.yaml is the case with the values found. Exit code 1 where the
-    measurements are not explained, or do not identify the parameters.
+    Finds by least squares the design parameters whose exact frequencies come nearest to the
+    measurements of the case. Reports their intervals, the residual of each measurement, and what
+    the measurements cannot determine; updated.yaml is the case with the values found. Exit code 1
+    if the measurements are not explained, or do not determine the parameters.
     """
     from eigassign.pipeline import update as updating
 
@@ -183,7 +185,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     "--junit",
     type=arguments.PATH,
     metavar="FILE",
-    help="Write it for CI servers too (default: no file).",
+    help="Also write the results in JUnit format, for CI servers (default: no file).",
 )
 @arguments.against
 @arguments.caching
@@ -197,11 +199,12 @@ def validate(
     as_json: bool,
     **how: Any,
 ) -> int:
-    """Compare both expansions with exact frequencies, along the trajectory and over boxes.
+    """Compare the expansion with exact frequencies.
 
-    CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
-    Exit code 1 where an expansion is further off than the case's validation.max_error, or an exact
-    frequency further than --tolerance from what it was in --against.
+    Compares the full expansion, and the one that is linear in the design, along the trajectory,
+    within the bounds of the design, and at random points. CASES are files or folders; without any,
+    the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case, or
+    an exact frequency differs from --against by more than --tolerance.
     """
     from eigassign.batch.plan import cases_in
     from eigassign.output import previous
@@ -263,36 +266,33 @@ def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str,
 )
 @arguments.case
 @click.option(
-    "--quick", is_flag=True, help="In ten seconds to a minute: fewer methods, points and repeats."
+    "--quick", is_flag=True, help="Fewer methods, points and repeats: ten seconds to a minute."
 )
 @click.option(
     "--accuracy",
     type=arguments.ACCURACY,
-    help="Advise for this worst relative error (default: several).",
+    help="Advise for this largest relative error (default: for several).",
 )
 @click.option(
     "--budget",
     "budget_s",
     type=arguments.POSITIVE,
-    help="Advise for so many seconds (default: any).",
+    help="Advise for this many seconds in all (default: no limit).",
 )
 @click.option(
     "--evaluations",
     type=arguments.COUNT,
-    help="Advise for so many evaluations (default: one trajectory, and many).",
+    help="Advise for this many evaluations (default: for one trajectory, and for many).",
 )
-@click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_chart).")
-@arguments.force
-@arguments.figures
-@arguments.report
+@arguments.writing("results/<case>_chart")
 @arguments.json
 @arguments.common
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
-    """Chart time against accuracy of every way to the frequencies of this case.
+    """Compare time and accuracy of all methods on one case.
 
-    Exact solves, expansions, reduced models, interpolation and surrogates, all against the same
-    exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
-    report.html, and says what to choose.
+    Times exact solves, expansions, reduced models, interpolation and surrogates on this machine,
+    and compares them with the same exact frequencies. Compares meshes, and methods that search for
+    a design. Writes figures, chart.json and report.html, and says which method to choose.
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request

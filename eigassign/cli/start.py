@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -39,23 +40,27 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
     "template", type=click.Choice(list(TEMPLATES)), required=False, metavar="[TEMPLATE]"
 )
 @click.option(
-    "--urdf", type=arguments.PATH, help="Write the case of this robot (default: none, a template)."
+    "--urdf", type=arguments.PATH, help="Write the case of this robot (default: a template)."
 )
 @click.option(
-    "--out", type=arguments.PATH, help="Case file, or its folder (default: <template>.yaml)."
+    "--out",
+    type=arguments.PATH,
+    metavar="FOLDER",
+    help="Folder of the case file (default: the working folder). A name that ends in .yaml or .yml "
+    "is that of the case file itself.",
 )
 def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
-    """Write a commented case file that runs as it is, to start from.
+    """Write a commented case file that runs as it is.
 
-    TEMPLATE is planar_arm unless another is named. With --urdf the case is a robot from a URDF
-    file, and what URDF does not know is listed with its lines. Files that exist are never
+    Without TEMPLATE it is planar_arm. With --urdf the case is the robot of a URDF file, and what
+    URDF does not contain is listed with its lines, to be filled in. Existing files are never
     overwritten.
     """
     if template is not None and urdf is not None:
-        raise UsageError(f"name a template or --urdf, not both: {template} is a robot of its own")
+        raise UsageError(f"give a template or --urdf, not both: {template} is another mechanism")
     name = template or "planar_arm" if urdf is None else urdf.stem
-    case = Path(name) if out is None else out / name if out.is_dir() else out
-    case = case if case.suffix else case.with_name(f"{case.name}.yaml")
+    case = Path() if out is None else out
+    case = case if case.suffix in (".yaml", ".yml") else case / f"{name}.yaml"
     if urdf is None:
         beside = sorted(path for path in STARTERS.glob(f"{name}/*"))
         files = {case: STARTERS / f"{name}.yaml"}
@@ -74,7 +79,7 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
         after = ["to fill in:", *asked]
     for path in texts:
         if path.exists() or path.is_symlink():
-            raise StorageError(f"{path} exists and is left alone: choose another name with --out")
+            raise StorageError(f"{path} exists and is left alone: choose another folder with --out")
     for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "x", encoding="utf-8") as file:
@@ -92,12 +97,12 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
 )
 @click.argument("topic", nargs=-1)
 def docs(topic: tuple[str, ...]) -> int:
-    """Show the manual: a page, or the part of a page below a heading.
+    """Show the manual.
 
-    TOPIC is the name of a page, the beginning of a heading, or what stands in brackets behind a
-    link; without it, the list of pages. In a pipe it is the text as it is written, in Markdown.
+    TOPIC is a key, a command, a page or a heading, or the address of a link in the manual, such as
+    case-file.md#targets. Without it, the list of pages is shown. In a pipe the text is Markdown.
     """
-    text = _part(" ".join(topic) or "index")
+    text = in_plain_text(_part(" ".join(topic) or "index"))
     if sys.stdout.isatty():
         from eigassign.output.console import markdown
 
@@ -112,61 +117,59 @@ def _pages() -> dict[str, str]:
     return {p.stem: p.read_text(encoding="utf-8") for p in pages}
 
 
+_OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
+_BEGINS = 2  # a rank of headings
+
+
 def _part(topic: str) -> str:
-    """A page by its name, else the part below a heading, by its beginning; or what a link names."""
+    """A page by its name, else the part below the heading that fits best.
+
+    What no heading begins with is shown where it is found below one heading alone.
+    """
     page, _, place = topic.rpartition("/")[2].partition("#")
-    wanted = _folded(place or page.removesuffix(".md"))
-    pages = {_folded(name): text for name, text in _pages().items()}
-    if place and page:
-        pages = {
-            _folded(page.removesuffix(".md")): pages.get(_folded(page.removesuffix(".md")), "")
-        }
-    elif wanted in pages:
-        return pages[wanted]
-    found = [
-        (not _is_about(_folded(title), wanted), level, start, text)
-        for text in pages.values()
-        for level, title, start in _headings(text)
-        if _is_about(_folded(title), wanted) or _folded(title).startswith(wanted)
-    ]
-    if not found:
-        where = _mentions(page or topic)
-        listed = f"; it is mentioned below {', '.join(where)}" if where else ""
-        raise UsageError(
-            f"no page and no heading begins with {topic!r}{listed}: eigassign docs lists the pages"
-        )
-    exact = [one for one in found if not one[0]]
-    _, level, start, text = min(exact or found[:1], key=lambda one: one[1])
+    page = page.removesuffix(".md")
+    named = {name: text for name, text in _pages().items() if _folded(name) == _folded(page)}
+    if named and not place:
+        return next(iter(named.values()))
+    found = sorted(_ranked(named or _pages(), place or page))
+    alike = [one for one in found if one[0] == found[0][0]]
+    if not found or (found[0][0] > _BEGINS and len(alike) > 1):
+        titles = ", ".join(repr(title) for *_, title, _, _ in alike[:4])
+        listed = f"; it is mentioned below {titles}" if titles else ""
+        missing = f"the manual has no page and no heading {topic!r}{listed}"
+        raise UsageError(f"{missing}: eigassign docs lists the pages")
+    _, _, level, _, start, text = found[0]
     ends = [k for other, _, k in _headings(text) if k > start and other <= level]
     return "\n".join(text.splitlines()[start : ends[0] if ends else None])
 
 
-def _is_about(title: str, wanted: str) -> bool:
-    """True for the heading of the topic, or of a part that is told apart by it."""
-    return title == wanted or title.endswith(f" with {wanted}")
+def _ranked(pages: dict[str, str], written: str) -> Iterator[tuple[int, int, int, str, int, str]]:
+    """Headings by how well they fit: rank, minus how often the word stands there, level, title.
 
-
-_OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
-
-
-def _mentions(topic: str) -> list[str]:
-    """The headings below which a word stands most often, without what stands below others."""
-    word = re.compile(rf"\b{re.escape(topic.rstrip('s'))}s?\b", re.IGNORECASE)
-    counts: dict[str, int] = {}
-    for name, text in _pages().items():
-        if name in _OF_THE_CODE:
-            continue
-        lines, starts = text.splitlines(), _headings(text)
-        ends = [start for _, _, start in starts[1:]] + [len(lines)]
-        for (_, title, start), end in zip(starts, ends, strict=True):
-            counts[title] = counts.get(title, 0) + len(word.findall("\n".join(lines[start:end])))
-    most = sorted(counts, key=lambda title: -counts[title])[:4]
-    return [repr(title) for title in most if counts[title]]
+    0 is a key as it is written, 1 a whole heading, 2 its beginning, 3 a word of it, 4 of the text.
+    """
+    wanted = _folded(written)
+    word = re.compile(rf"\b{re.escape(wanted.rstrip('s'))}s?\b")
+    for name, text in pages.items():
+        lines, heads = text.splitlines(), _headings(text)
+        ends = [start for *_, start in heads[1:]] + [len(lines)]
+        for (level, title, start), end in zip(heads, ends, strict=True):
+            folded, count = _folded(title), len(word.findall(_folded("\n".join(lines[start:end]))))
+            fits = (
+                title == written or title.endswith(f" with {written}"),
+                folded in (wanted, f"eigassign {wanted}") or folded.endswith(f" with {wanted}"),
+                folded.startswith(wanted),
+                word.search(folded) is not None,
+                count > 0 and name not in _OF_THE_CODE,
+            )
+            if any(fits):
+                rank = fits.index(True)
+                yield rank, -count * (rank > _BEGINS), level, title, start, text
 
 
 def _folded(text: str) -> str:
     """The text as links spell headings, in lower case without punctuation; blanks for dashes."""
-    return re.sub(r"[^\w ]", "", text.lower().replace("-", " "))
+    return re.sub(r"[^\w\s]", "", re.sub("[-–]", " ", text.lower()))
 
 
 def _headings(text: str) -> list[tuple[int, str, int]]:
@@ -180,6 +183,40 @@ def _headings(text: str) -> list[tuple[int, str, int]]:
     return found
 
 
+# Code, which stays as it is, or a formula of a line of its own, or one in the text.
+_FORMULA = re.compile(r"^```.*?^```|`[^`]*`|\$\$(.+?)\$\$|\$([^$]+)\$", re.DOTALL | re.MULTILINE)
+_ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "hat": "\u0302", "tilde": "\u0303"}
+_RAISED = str.maketrans("0123456789-−T", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻ᵀ")
+_SHOWN = {  # what the formulas of the manual have of TeX, beside characters that are their own sign
+    r"\\tag(\{\d.*?\})": r"    (\1)",
+    r"\\begin\{bmatrix\}\s*": "[",
+    r"\s*\\end\{bmatrix\}": "]",
+    r"\s*\\\\": ";",
+    r"\s*&": ",",
+    r"\\quad": "  ",
+    r"\\sqrt\{(.*?)\}": r"√(\1)",
+    r"\\text|[{}]": "",
+}
+
+
+def in_plain_text(page: str) -> str:
+    """A page with its formulas as text: `B^T` is Bᵀ, and `K_{EE}` K_EE."""
+    return _FORMULA.sub(_in_plain_text, page)
+
+
+def _in_plain_text(found: re.Match[str]) -> str:
+    formula = found[1] or found[2]
+    if formula is None:
+        return found[0]
+    formula = re.sub(r"\\(d?dot|hat|tilde)\{(.)\}", lambda one: one[2] + _ACCENTS[one[1]], formula)
+    formula = re.sub(
+        r"\^(?:\{([-−\dT]+)\}|([\dT]))", lambda n: (n[1] or n[2]).translate(_RAISED), formula
+    )
+    for pattern, shown in _SHOWN.items():
+        formula = re.sub(pattern, shown, formula)
+    return formula if found[2] else re.sub(r"^(?=.)", "    ", formula.strip(), flags=re.MULTILINE)
+
+
 # --- Shell completion
 
 VARIABLE = "_EIGASSIGN_COMPLETE"
@@ -191,16 +228,16 @@ _ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }\n"
     epilog=arguments.examples("eigassign completion bash", "eigassign completion bash --install")
 )
 @click.argument("shell", type=click.Choice(list(SHELLS)), required=False, metavar="[SHELL]")
-@click.option("--install", is_flag=True, help="Set it up for new terminals of this user.")
+@click.option("--install", is_flag=True, help="Set up completion for new terminals of this user.")
 def completion(shell: str | None, install: bool) -> int:
-    """Completion of commands, options and files in bash, zsh or fish (default: that of $SHELL).
+    """Set up completion by tab, in bash, zsh or fish.
 
-    Prints the script; with --install it is written where the shell finds it: a file in your home
-    folder, and in bash and zsh a line in .bashrc or .zshrc.
+    Prints the script of SHELL (default: that of $SHELL). With --install it is written to a file in
+    your home folder, and for bash and zsh a line is added to .bashrc or .zshrc.
     """
     name = shell or Path(os.environ.get("SHELL", "")).name
     if name not in SHELLS:
-        raise UsageError(f"the shell {name or 'of $SHELL'!r} is not known: name bash, zsh or fish")
+        raise UsageError(f"unknown shell {name or '$SHELL'!r}: give bash, zsh or fish")
     script = _script(name)
     if not install:
         click.echo(script)
@@ -212,7 +249,7 @@ def completion(shell: str | None, install: bool) -> int:
         place = home / f".local/share/eigassign/completion.{name}"
         _write(place, script)
         _add_line(home / SHELLS[name], f'[ ! -r "{place}" ] || . "{place}"')
-    click.echo("open a new terminal, and press tab behind eigassign")
+    click.echo("open a new terminal, type eigassign and press tab")
     return 0
 
 

@@ -139,7 +139,7 @@ def _interior(parts: ReducedLinks, k: int, kappa: Floats, mu: Floats) -> _LinkIn
     K_ii, M_ii = (sparse.csc_array(A[i][:, i]) for A in (K, M))
     factor = kept_factor(K_ii)
     if factor is None:
-        raise AccuracyError("a reduced link is limp at a design that was looked at")
+        raise AccuracyError("a reduced link has no stiffness at one of the designs")
     X = np.hstack([np.asarray(A[i] @ T) for A in (M, K)])
     solved = factor.solve(X)
     drawn = np.empty((n_b, X.shape[1]))

@@ -109,7 +109,7 @@ class EarlierResult:
         caption += f"tolerance {self._tolerance:g} Hz."
         if gone := [case for case in self._before if case not in self._seen]:
             some = ", ".join(gone[:5]) + (", …" if len(gone) > 5 else "")
-            caption += f" Cases that are not here any more: {len(gone)} ({some})."
+            caption += f" Cases that are missing now: {len(gone)} ({some})."
         title = f"{'Moved' if self.moves else 'Nothing moved'} since {self._path}"
         return facts_table(title, self.moves, "case what before now hz", caption)
 

@@ -118,7 +118,7 @@ def headline(results: RunResults) -> str | None:
     if "one shot" in _stages(results) and error.one_shot is not None:
         beside = f" (one shot: {said(error.one_shot.max_relative)})"
     before, after = said(error.initial.max_relative), said(error.exact.max_relative)
-    distance = f"{what}: {before} before, {after} after{beside}, by exact eigenvalues."
+    distance = f"{what}: {before} before, {after} after{beside}, solved exactly."
     worst = max((each.initial.max_relative for each in limits), default=0.0)
     if not alone and worst > MET:
         left = _violation(max(each.exact.max_relative for each in limits))
@@ -166,9 +166,9 @@ def design(results: RunResults) -> Table:
 def objective(results: RunResults) -> Table:
     """What is to be light, high or wide, before and after."""
     row = results.assignment
-    caption = f"Along {results.along}, at the samples and between those that are far apart."
+    caption = f"Along {results.along}, also between samples that are far apart."
     if row is not None and row.robust is not None and row.objective != "lightest":
-        caption += " The least of the deviations that were searched, too."
+        caption += " The least of all deviations that were searched."
     rows = () if row is None or row.aim is None else (row.aim,)
     return facts_table("Objective", rows, "label before after", caption)
 
@@ -206,7 +206,7 @@ def errors(results: RunResults) -> Table:
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
     if len({target.asked.weight for target in wanted}) > 1:
-        caption += " All: every target alike, without the weights."
+        caption += " All: all targets, with equal weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
 
 
@@ -231,7 +231,7 @@ def drives(results: RunResults) -> Table:
     """What every drive exerts: its peak, where that is, and rms, before and after."""
     rows = results.drives
     of = rows[0].of if rows else ""
-    caption = f"Of {of}, along {results.along}; the links rigid, springs at rest."
+    caption = f"Of {of}, along {results.along}, by rigid links; springs carry nothing."
     names = "name handy initial.peak initial.at initial.rms optimal.peak optimal.at optimal.rms"
     headings = {
         f"{design}.{fact}": f"{fact} {when}"
@@ -248,8 +248,8 @@ def anatomy(results: RunResults) -> Table:
     each = (row for one in results.meaning.anatomies for row in one.parts)
     rows = [row for row in each if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
     names = "mode part strain strain_largest strain_at kinetic kinetic_largest kinetic_at"
-    caption = "Shares of the energies of modes that are missed, with the answer: means over samples"
-    caption += ", and the largest. Of strain the weight has a negative share where it softens."
+    caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
+    caption += "the largest. The weight has a negative share of strain where it softens."
     return facts_table("What the missed modes are", rows, names, caption)
 
 
@@ -257,8 +257,8 @@ def helps(results: RunResults) -> Table:
     """What properties that are no parameters do to the modes of missed targets."""
     rows = [row for one in results.meaning.anatomies for row in one.properties[:MOST_HELPS]]
     names = "mode property percent_per_percent percent_per_percent_largest at"
-    caption = "By how many per cent a frequency rises for a per cent more of what is no parameter, "
-    caption += "the coordinates as they are: the most effective, by exact slopes."
+    caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
+    caption += "the coordinates unchanged. The most effective ones, by exact slopes."
     return facts_table("What would help", rows, names, caption)
 
 
@@ -279,9 +279,8 @@ def clearances(results: RunResults) -> Table:
     """Bands to keep out of: how many modes are below each, and whether that was checked."""
     rows = results.assignment.clearances if results.assignment else ()
     caption = (
-        "Of all modes at every sample, and between the samples. Room is the distance to the "
-        "nearest edge, relative to it. The model puts the mode above the band too high, by no "
-        "more than stated: the room counts from there."
+        "All modes, at every sample and between samples. Room is the distance to the nearest "
+        "edge, relative to the edge, after the error of the model is subtracted."
     )
     return facts_table("Clearance", rows, "label below room raised clear", caption)
 
@@ -331,7 +330,7 @@ def optima(results: RunResults) -> Table:
          *_by_name(results, each.design))
         for k, each in enumerate(row.local_optima, 1)
     )  # fmt: skip
-    caption = f"From {row.starts} starts; the first is the answer."
+    caption = f"Found from {row.starts} starts; the first is the answer."
     return Table("Local optima", columns, rows, caption)
 
 
@@ -363,8 +362,8 @@ def sensitivity(results: RunResults) -> Table:
              *(f"{share + 0.0:.3g}" for share in shares))
         )  # fmt: skip
     caption = (
-        "Slopes of exact frequencies at the optimum, as means over the samples: by how many Hz a "
-        "frequency rises for a unit more, and by how many per cent for a per cent more."
+        "How the exact frequency rises at the optimum with one unit more of the parameter, and in "
+        "% with 1 % more: means over the samples."
     )
     return Table("Sensitivity", columns, tuple(rows), caption)
 
@@ -376,9 +375,9 @@ def limits(results: RunResults) -> Table:
 
 def reach(results: RunResults) -> Table:
     """The range of each target's curve within the bounds, over all samples."""
-    caption = "Over all designs within the bounds, at any sample; proved."
+    caption = "All designs within the bounds, at any sample (proved)."
     if any(row.how == "bounded" for row in results.meaning.reach):
-        caption += " Distances of two modes lie between these, and need not reach them."
+        caption += " Distances of two modes lie in between, but may not reach the ends."
     rows, names = results.meaning.reach, "label lowest_hz highest_hz error"
     return facts_table("Reach", rows, names, caption, error="least error")
 
@@ -397,9 +396,9 @@ def robust(results: RunResults) -> Table:
     if row is None:
         return Table("Robust", (), ())
     caption = (
-        f"Missed at the worst deviation within the tolerances that a search found, and of "
-        f"{row.draws} random ones; alone is the optimum without deviations. Robust instead of "
-        f"alone: {row.words}."
+        f"Missed at the worst deviation that a search found within the tolerances, and at the "
+        f"worst of {row.draws} random ones. Alone: the optimum without deviations. From alone to "
+        f"robust: {row.words}."
     )
     names = "label unit nominal robust nominal_worst worst drawn"
     return facts_table("Robust", row.targets, names, caption)
@@ -417,14 +416,14 @@ def trade_off(results: RunResults) -> Table:
         added = round(point.amount - found.initial, 12) + 0.0  # not −0
         cells = (number(point.amount), number(added), percent(point.error))
         rows.append((*cells, *_by_name(results, point.design)))
-    caption = "The best design found for each; the last is the answer."
+    caption = "The best design that was found for each; the last is the answer."
     return Table("Trade-off", columns, tuple(rows), caption)
 
 
 def approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and over maps."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
-    caption = "Worst relative error in Hz against exact eigenvalues."
+    caption = "Worst relative error of the frequency, against exact solves."
     rows = []
     for study in results.studies:
         places: list[tuple[str, Comparison]] = []
@@ -443,7 +442,7 @@ def solver(results: RunResults) -> Table:
     """The solver's status, and the residuals of its answer, recomputed from the data."""
     rows = () if results.solver is None else (results.solver,)
     names = "status iterations primal_residual dual_residual gap"
-    caption = "Residuals recomputed from the data of the scaled program."
+    caption = "Residuals, computed again from the data of the scaled program."
     return facts_table("Solver", rows, names, caption)
 
 
@@ -460,9 +459,9 @@ def weight(results: RunResults) -> Table:
         return Table("Weight", (), ())
     rows = [row for row in found.sag if row.most][:SAGGING]
     where = f"over {found.poses} poses of the {found.design} design"
-    caption = f"Where each is farthest off, {where}"
+    caption = f"The largest sag of each, {where}"
     if found.buckling is not None:
-        caption += f"; the weight is at most {percent(found.buckling)} of that which buckles it"
+        caption += f"; the weight is at most {percent(found.buckling)} of the buckling load"
     return facts_table("Sag under the weight", rows, "node sag most", f"{caption}.")
 
 
@@ -486,7 +485,7 @@ _KINDS: dict[str, tuple[Callable[[RunResults], Table], ...]] = {
 def validation_table(rows: Sequence[ValidationRow]) -> Table:
     """Errors of both expansions, and whether the full one is within the case's tolerance."""
     names = "case mode where points order worst_taylor worst_linearised limit passed"
-    return facts_table("Validation", rows, names, "Worst relative error in Hz.")
+    return facts_table("Validation", rows, names, "Worst relative error of the frequency.")
 
 
 def modes_table(
@@ -516,7 +515,7 @@ def modes_table(
     for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
         if errors is not None:
             columns[f"{cause}: too high by {about}"] = [
-                at_most(e) if math.isfinite(e) else "cannot be bounded" for e in errors
+                at_most(e, "") if math.isfinite(e) else "cannot be bounded" for e in errors
             ]
     if weight is not None:
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import (
     design_limits,
     requirements_of,
@@ -32,6 +33,7 @@ from eigassign.pipeline.run_files import new_run_folder
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
+from eigassign.study.design.judgement import far_off, soft_drives
 from eigassign.study.meaning.levers import anatomies
 from eigassign.study.pictures import drawing
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
@@ -161,8 +163,7 @@ def _refuse_beyond_bounds(case: BuiltCase, y: Floats) -> None:
         if not column.min - slack <= value <= column.max + slack and value != initial:
             raise UsageError(
                 f"{name} = {value:g} {unit} is outside its bounds, {column.min:g} to "
-                f"{column.max:g} {unit}: for a design there ask with --beyond-bounds "
-                "(in Python beyond_bounds=True)"
+                f"{column.max:g} {unit}: --beyond-bounds allows it (beyond_bounds=True in Python)"
             )
 
 
@@ -224,9 +225,10 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     notes += () if trajectory is None else trajectory.notes
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
+    asked: Sequence[Requirement] = ()
     if trajectory is not None:
         path = with_instants(file, trajectory)
-        requirements_of(file, path)
+        asked = requirements_of(file, path)
         design_limits(file, model, path)
     notes += read_measurements(case)[1]
     plan, warnings = None, file.warnings
@@ -242,7 +244,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         weight = study_weight(file, model, plan.modes, q[:1], y, "initial")  # quick
         notes += weight.lines
         warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
-    _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
+    warnings += tuple(_doubts(case, asked, None if trajectory is None else trajectory.q[:1]))
     takes = None if plan is None else outlook(case, plan, trajectory)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
@@ -262,14 +264,24 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     )
 
 
-def _require_regular(case: BuiltCase, q: Floats | None) -> None:
-    """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
-    if q is None:
-        q = some_pose(case)[None]
+def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> Iterator[Problem]:
+    """What a colleague would ask of the lowest modes at one pose.
+
+    Exact solves: a mechanism without mass or stiffness is found here, at its line.
+    """
+    file, model = case.file, case.model()
+    q = some_pose(case)[None] if q is None else q
+    ours = [one for one in asked if not one.is_aim and not one.followed and one.mode_terms]
+    count = max((mode for one in ours for mode, _ in one.mode_terms), default=1)
     try:
-        case.model().frequencies(q, case.initial_design, 1)
+        hz = model.frequencies(q, case.initial_design, count)[0]
+        for place, doubt in soft_drives(file, model, q):
+            yield file.problem(place, doubt)
     except UsageError as error:
-        raise CaseError((case.file.problem("mechanism", str(error)),)) from error
+        raise CaseError((file.problem("mechanism", str(error)),)) from error
+    for one in ours:
+        for doubt in far_off(one, hz[[mode - 1 for mode, _ in one.mode_terms]]):
+            yield file.problem(f"{one.place}.{one.kind}", doubt)
 
 
 # --- ``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions

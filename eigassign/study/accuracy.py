@@ -115,8 +115,8 @@ def _rounding_note(scene: Scene, y: Floats) -> str:
 def rounding_line(lost: float) -> str:
     """The largest relative round-off of the exact frequencies, in words."""
     if not np.isfinite(lost):
-        return "round-off of the exact frequencies: not known; they may be nothing else"
-    return f"round-off of the exact frequencies: below {lost:.1g} relative"
+        return "round-off of the exact frequencies: not known; they may be only round-off"
+    return f"round-off of the exact frequencies: below {lost:.1g}, relative"
 
 
 def judged_mesh(
@@ -153,14 +153,14 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
-    about = "at most" if model.has_bounds else "estimated at"
+    about = "at most" if model.has_bounds else "about"
     finer = ", and solids a finer mesh" * (model.solids is not None)
     return [
-        f"mode {mode}: discretisation error {about} {at_most(error)} (too high), {where} of "
+        f"mode {mode}: the mesh raises its frequency by {at_most(error, about)}, {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
-        else f"mode {mode}: discretisation error not known, {where} of the {found.design} design: "
-        f"give the links more elements, or auto{finer}"
+        else f"mode {mode}: the mesh is too coarse for an error, {where} of the {found.design} "
+        f"design: give the links more elements, or auto{finer}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
 
@@ -174,12 +174,9 @@ def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
         where = f"at {len(q)} samples {where}"
     lines = []
     for mode, error in zip(scene.modes, estimate, strict=True):
-        stated = (
-            "cannot be vouched for" if not np.isfinite(error) else f"{100 * error:.2g} % at most"
-        )
+        stated = "not known" if not np.isfinite(error) else f"{100 * error:.2g} % at most"
         lines.append(
-            f"mode {mode}: approximation error of the full expansion {where}, initial design, "
-            f"estimated without exact solves: {stated}"
+            f"mode {mode}: estimated error of the full expansion {where}, initial design: {stated}"
         )
     return lines
 
@@ -203,19 +200,18 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
     x = x[far_from_buckling(model, x, most=1.0)]  # bounds may lie beyond what stands
     n_q = len(model.q_names)
     if not len(x):
-        raise AccuracyError("no design stands that the reduced links could be judged at")
+        raise AccuracyError("reduced links cannot be judged: all designs buckle or fall")
     error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0)
     stood = len(np.unique(x[:, n_q:], axis=0))
     where = f"{len(few)} poses" + (f" and {stood} designs" if stood > 1 else "")
     for mode, worst in zip(modes, error, strict=True):
         if not np.isfinite(worst):
             raise AccuracyError(
-                f"mode {mode}: what the reduced links leave out cannot be bounded over {where}: "
-                "raise reduce_to"
+                f"mode {mode}: the error of the reduced links has no bound over {where}: raise "
+                "reduce_to"
             )
     return [
-        f"mode {mode}: truncation error of the reduced links at most {at_most(worst)} (too "
-        f"high), over {where}"
+        f"mode {mode}: reduced links raise its frequency by {at_most(worst)}, over {where}"
         for mode, worst in zip(modes, error, strict=True)
     ]
 
@@ -250,7 +246,7 @@ def study_motion(scene: Scene, y: Floats, hz: Floats) -> MotionStudy | None:
         if most < NEGLIGIBLE * limit:
             note = (
                 f"slow motion: the neglected velocity terms change λ of the optimal design by "
-                f"less than about {most:.1g}"
+                f"less than {most:.1g}, relative"
             )
             return MotionStudy(most, note, None)
     if names:
@@ -263,15 +259,15 @@ def study_motion(scene: Scene, y: Floats, hz: Floats) -> MotionStudy | None:
 
 def _rough_study(simple: float | None, names: tuple[str, ...], limit: float) -> MotionStudy:
     """Superelements: their inner dofs have no directions, so only the simple estimate is left."""
-    why = f"the inner dofs of {', '.join(names)} have no directions"
+    why = f"the directions of inner dofs of {', '.join(names)} are not known"
     if simple is None:
-        warning = f"what the neglected velocity terms change is not known: {why}"
+        warning = f"the effect of the motion's speed is not known, because {why}"
         return MotionStudy(np.inf, "", warning)
     change = 0.5 * simple  # of a frequency
     text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
     if change <= limit:
-        return MotionStudy(change, f"speed of the motion: {text}, roughly, for {why}", None)
-    warning = f"the motion may not be slow: {text}, roughly, for {why}; over {100 * limit:g} %"
+        return MotionStudy(change, f"speed of the motion: {text}, a rough estimate: {why}", None)
+    warning = f"the motion may not be slow: {text}, over {100 * limit:g} % (rough: {why})"
     return MotionStudy(change, "", warning)
 
 
@@ -321,7 +317,7 @@ def _motion_study(change: float, limit: float, along: str) -> MotionStudy:
     if change <= limit:
         return MotionStudy(change, f"speed of the motion: {text} along {along}", None)
     warning = (
-        f"the motion is not slow: {text} along {along}, over {100 * limit:g} %"
-        "; the frequencies are those of the mechanism held still at each pose"
+        f"the motion is not slow: {text} along {along}, over {100 * limit:g} %. The frequencies "
+        "are those of the mechanism held still at each pose"
     )
     return MotionStudy(change, "", warning)

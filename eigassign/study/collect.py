@@ -17,7 +17,13 @@ from eigassign.study.accuracy import Accuracy, study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
+from eigassign.study.design.judgement import (
+    SolvedDesigns,
+    crossing_warnings,
+    far_off,
+    soft_drives,
+    swap_notes,
+)
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.given import given
 from eigassign.study.pictures.drawing import draw_poses, rest_pose
@@ -145,9 +151,9 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     curves = [np.where(np.abs(curve) > small, curve, 0.0) for curve in curves]
     weights = time_weights(path)
     weights = weights / weights.sum()
-    of = WEIGHED if isinstance(g, tuple) else "the motion alone, gravity being none"
+    of = WEIGHED if isinstance(g, tuple) else "the motion alone (gravity: none)"
     if g is None:
-        of = "the motion alone, mechanism.gravity not being given"
+        of = "the motion alone (gravity is not stated)"
     if not isinstance(g, tuple) and not any(curve.any() for curve in curves):
         return ()
 
@@ -222,7 +228,11 @@ def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
+    """Warnings of results that may mislead: doubts, crossing modes, a poor or worse design."""
+    for target in assigned.targets:
+        yield from () if target.asked.is_aim else far_off(target.asked, target.initial_hz)
+    for place, doubt in soft_drives(scene.file, scene.model, scene.path.q[:1]):
+        yield f"{place}: {doubt}"
     modes = tuple(
         sorted({mode for target in assigned.targets for mode in target.asked.modes if mode > 0})
     )
@@ -251,10 +261,9 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
             else "so is the full expansion: narrow the bounds, expand nearer or to a higher order"
         )
         yield (
-            f"{target.label}: the prediction that the optimum rests on is up to "
-            f"{100 * target.approximation_error:.3g} % off the exact frequency, over the "
-            f"{100 * limit:g} % of validation.max_error ({advice}); the exact frequencies hold, "
-            "but there may be a better design"
+            f"{target.label}: the predicted frequency is up to "
+            f"{100 * target.approximation_error:.3g} % off the exact one, over the {100 * limit:g} "
+            f"% of validation.max_error ({advice}): there may be a better design"
         )
 
 
@@ -269,8 +278,8 @@ def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     )
     if after > before and _is_feasible(scene):
         yield (
-            "the initial design is nearer to the targets than this optimum is, when both are "
-            "solved exactly: the expansion misleads here; do not use this design"
+            "by exact frequencies the initial design is nearer to the targets than this optimum: "
+            "the expansion misleads here, do not use this design"
         )
 
 

@@ -352,9 +352,8 @@ def reach_warnings(scene: Scene, along: Iterable[tuple[float, int]]) -> tuple[st
     off = f"is {100 * worst:.3g} % off" if np.isfinite(worst) else "gives no frequency (λ < 0)"
     return (
         f"the expansion of order {scene.expansions.full_order} {off} in mode {mode} along the "
-        f"trajectory, where {100 * limit:g} % are accepted (validation.max_error): the motion goes "
-        "beyond what one point reaches. Write expansion: {order: auto}, which takes the order, and "
-        "several points where need be; exact frequencies do not depend on it",
+        f"trajectory, and {100 * limit:g} % are accepted (validation.max_error). Write expansion: "
+        "{order: auto}, which also takes several points; exact frequencies do not depend on it",
     )
 
 

@@ -112,16 +112,14 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     if trajectory is None:
         if n == 0:
             return np.zeros(0), ""
-        message = "auto needs a trajectory to be central in, and the case has none: give values"
+        message = "auto takes a pose of the trajectory, and the case has none: give values"
         raise _wrong(file, "expansion.q", message)
     poses = trajectory.q.copy()
     poses[:, n:] = 0.0
     k = central_sample(poses @ joint_map(model).T)
     q0 = with_middle_loads(file, trajectory.q[k, :n])
     point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
-    few = len(poses[:: 1 + len(poses) // MANY_SAMPLES])
-    seen = "" if few == len(poses) else f" (of {few})"
-    why = f"the most central: no other sample is nearer to its farthest one{seen}{of_loads}"
+    why = f"the middle of the motion{of_loads}"
     return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
 
 
@@ -164,7 +162,7 @@ def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
         try:
             model.require_standing(q0, y0)
         except MechanismError as error:
-            why = f"the initial one, for the middle of the bounds {error.message}"
+            why = f"the initial one, because the middle of the bounds {error.message}"
             y0 = initial_design(file)
             return y0, f"{_design(file, model, y0)}, {why}"
     return y0, f"{_design(file, model, y0)}, the middle of the bounds"
@@ -184,7 +182,7 @@ def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, .
         more = set(modes) - set(given)
         return modes, f"{shown}, those of the file and those with a target" if more else ""
     if not target_modes(file):
-        return modes, "expanded mode: 1, the lowest, for there is no target on a mode"
+        return modes, "expanded mode: 1, the lowest, because no target names a mode"
     return modes, f"{shown}, those with a target"
 
 
@@ -198,7 +196,7 @@ def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
     for mode in modes:
         if mode > available:
             where = places.get(mode, "expansion.modes")
-            message = f"mode {mode} asked for; with these elements the model has 1 to {available}"
+            message = f"there is no mode {mode}: with these elements the model has {available}"
             raise _wrong(file, where, message)
 
 
@@ -207,7 +205,7 @@ def _outside(
 ) -> list[str]:
     """Notes on an expansion point that lies outside what it is meant to stand for."""
     notes = [
-        f"the expansion design has {name} = {value:g} outside its bounds {p.min:g} … {p.max:g}"
+        f"the expansion design has {name} = {value:g}, outside its bounds {p.min:g} to {p.max:g}"
         for (name, p), value in zip(file.design.parameters.items(), y0, strict=True)
         if not p.min <= value <= p.max
     ]
@@ -215,7 +213,7 @@ def _outside(
         s, s0 = trajectory.q @ joint_map(model).T, joint_map(model) @ q0
         reach = np.ptp(s, axis=0)
         if np.any((s0 < s.min(axis=0) - reach) | (s0 > s.max(axis=0) + reach)):
-            notes.append("the expansion point is farther from the trajectory than that travels")
+            notes.append("the expansion point is farther from the trajectory than that is long")
     return notes
 
 
@@ -358,11 +356,11 @@ def confirmed(
             reasons.append(line)
             break
         if attempt == ATTEMPTS:
-            raise AccuracyError(f"nothing was found that leaves {accuracy:.1e}: {line}")
-        reasons.append(f"{line}, chosen anew")
+            raise AccuracyError(f"no choice met the accuracy {accuracy:.1e}: {line}")
+        reasons.append(f"{line}, chosen again")
         seen, looks = every, looks - found.looks
         if len(seen.x) > looks:
-            raise AccuracyError(f"the expansion chosen at few poses and designs errs: {line}")
+            raise AccuracyError(f"the expansion chosen at few poses and designs is off: {line}")
     return replace(found, reasons=tuple(reasons))
 
 
@@ -399,10 +397,10 @@ def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
     few, n_q = spread(x, POSES), len(model.q_names)
     worst = model.truncation_error(few[:, :n_q], few[:, n_q:], modes).max()
     if worst > share:
-        stated = f"{worst:.1e}" if np.isfinite(worst) else "an error that cannot be bounded"
+        stated = f"of {worst:.1e}" if np.isfinite(worst) else "that cannot be bounded"
         raise AccuracyError(
-            f"the reduced links leave {stated}, of the {asked_accuracy(file):.1e} asked for "
-            f"{share:.1e} is theirs: raise reduce_to, or write reduce_to: auto"
+            f"the reduced links have an error {stated}, and may have {share:.1e} of the accuracy "
+            f"{asked_accuracy(file):.1e}: raise reduce_to, or write reduce_to: auto"
         )
 
 
@@ -457,7 +455,7 @@ def choose_order(
     except EigassignError as error:  # an accuracy that is not met, or a design without a pose
         if needed:
             raise
-        why = f"no expansion, so that nothing is told of one, nor a one-shot design: {error}"
+        why = f"there is no expansion, and so no one-shot design: {error}"
         return Plan(q0, y0, 0, modes, (why,))
     more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
     return Plan(q0, y0, found.order, modes, found.reasons, more_q, found.cluster_gap)

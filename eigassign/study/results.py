@@ -674,7 +674,7 @@ class ModeAnatomy:
         said = f"{self.mode}: strain is in {self.most('strain', 3)}; motion in "
         said += self.most("kinetic", 3)
         helped = self.helped(3)
-        more = f"; 1 % more of what is no parameter changes it by: {helped}" if helped else ""
+        more = f"; 1 % more of these changes it by: {helped}" if helped else ""
         return (said + more).replace(" -", " −")
 
 

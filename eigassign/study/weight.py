@@ -53,18 +53,18 @@ def study_weight(
     """What gravity changes of ``modes`` at poses q (n, n_q) of one ``design`` y (n_y,)."""
     gravity = file.mechanism.gravity
     if gravity == "none":
-        return WeightStudy(None, ("gravity is left out on purpose (mechanism.gravity: none)",))
+        return WeightStudy(None, ("gravity is left out (mechanism.gravity: none)",))
     try:
         row = _row(model, modes, q, y, design, None if gravity is None else np.array(gravity))
     except EigassignError as error:
-        return WeightStudy(None, (), (f"what gravity changes is not known: {error}",))
+        return WeightStudy(None, (), (f"the effect of gravity is not known: {error}",))
     where = f", {f'over {len(q)} poses' if len(q) > 1 else 'at one pose'} of the {design} design"
     where = "" if design == GIVEN else where
-    whole, of_modes = (
-        tuple(f"{line}{where}" for line in lines) for lines in (_of_whole(row), _of_modes(row))
-    )
+    each = zip(row.modes, row.change, strict=True)
+    of_modes = tuple(f"mode {n}: {_said(row, change, 'it')}{where}" for n, change in each)
+    whole = tuple(f"{line}{where}" for line in _of_whole(row))
     if model.n_rigid and gravity is None:
-        whole += ("stated gravity lets free coordinates swing or fall, and counts these as modes",)
+        whole += ("with gravity stated, free coordinates swing or fall, and count as modes",)
     return WeightStudy(row, whole, tuple(_warnings(file, row)), of_modes)
 
 
@@ -106,12 +106,12 @@ def weight_doubt(
     if change > accepted:
         yield f"{said}, and {100 * accepted:.3g} % are accepted{_advice(file)}"
     if asks and row is None and file.mechanism.gravity != "none":
-        yield "what gravity changes is not known"
+        yield "the effect of gravity is not known"
     if row is not None and _bent(row) > accepted:
         yield f"{_large(row)}, and {100 * accepted:.3g} % are accepted"
     if file.design.torque and file.mechanism.gravity is None:
         yield (
-            "drives are limited, and the case does not state gravity, which they carry"
+            "the drives have limits, and carry a weight that the case does not state"
             f"{_advice(file)}"
         )
 
@@ -123,23 +123,31 @@ def _warnings(file: CaseFile, row: WeightRow) -> Iterator[str]:
     if _bent(row) > WARNED:
         yield _large(row)
     if row.buckling is not None and row.buckling > NEAR_BUCKLING:
-        yield (
-            f"the weight is {100 * row.buckling:.3g} % of that which buckles the mechanism: beyond "
-            f"{100 * NEAR_BUCKLING:g} % what is linear in it is too little"
-        )
+        most = f"above {100 * NEAR_BUCKLING:g} % frequencies that are linear in it are inaccurate"
+        yield f"{_share(row.buckling)}: {most}"
 
 
 def _worst(row: WeightRow, modes: Collection[int]) -> tuple[str, float]:
     """What gravity changes most of these modes, in words and relative."""
     own = [each for each in zip(row.change, row.modes, strict=True) if each[1] in modes]
     change, mode = max(own, key=itemgetter(0), default=(0.0, 0))
-    most = f"{100 * change:.2g} %"
-    if row.gravity is None:
-        how = f"which may change mode {mode} by up to about {most}"
-        how = how if np.isfinite(change) else f"under which mode {mode} may buckle or fall"
-        return f"the case does not state gravity, {how}", change
-    how = f"by about {most}" if np.isfinite(change) else "by more than can be told"
-    return f"the links sag, which changes mode {mode} {how} and is not in its frequency", change
+    return _said(row, change, f"mode {mode}"), change
+
+
+def _said(row: WeightRow, change: float, mode: str) -> str:
+    """What gravity changes of a mode's frequency, in which it is not."""
+    known, most = np.isfinite(change), f"{100 * max(change, SAID):.2g} %"
+    least = "less than " if change < SAID else ""
+    if row.gravity is not None:
+        told = f"{least or 'about '}{most}" if known else "an unknown amount"
+        return f"sag, which is not in the frequency, changes {mode} by {told}"
+    if not known:
+        return f"under gravity, which is not stated, {mode} may buckle or fall"
+    return f"gravity, which is not stated, changes {mode} by {least or 'up to '}{most}"
+
+
+def _share(buckling: float) -> str:
+    return f"the weight is {100 * buckling:.3g} % of the buckling load"
 
 
 def _bent(row: WeightRow) -> float:
@@ -149,8 +157,8 @@ def _bent(row: WeightRow) -> float:
 
 def _large(row: WeightRow) -> str:
     return (
-        f"the links turn by up to {np.degrees(row.turn or 0.0):.2g}° under the weight: what is of "
-        f"second order in that, which no number contains, may be some {100 * _bent(row):.2g} %"
+        f"the links turn by up to {np.degrees(row.turn or 0.0):.2g}° under the weight: the sag is "
+        f"so large that frequencies may be off by about {100 * _bent(row):.2g} %"
     )
 
 
@@ -159,25 +167,7 @@ def _advice(file: CaseFile) -> str:
     if file.mechanism.gravity is not None:
         return ""
     down = "[0, -9.81]" if file.mechanism.space == "planar" else "[0, 0, -9.81]"
-    return (
-        f": write mechanism.gravity: {down}, or none if the machine lies flat or this is on purpose"
-    )
-
-
-def _of_modes(row: WeightRow) -> Iterator[str]:
-    for mode, change in zip(row.modes, row.change, strict=True):
-        known, most = np.isfinite(change), f"{100 * max(change, SAID):.2g} %"
-        if row.gravity is not None:
-            told = f"{'less than' if change < SAID else 'about'} {most}"
-            told = told if known else "more than can be told"
-            yield f"mode {mode}: the links' sag, which is left out, changes it by {told}"
-        elif known:
-            told = (
-                f"{'less than' if change < SAID else 'up to about'} {most}, whichever way is down"
-            )
-            yield f"mode {mode}: gravity, which is not stated, changes it by {told}"
-        else:
-            yield f"mode {mode}: under gravity, which is not stated, it may buckle or fall"
+    return f": write mechanism.gravity: {down}, or none if the machine lies flat"
 
 
 def _of_whole(row: WeightRow) -> Iterator[str]:
@@ -185,4 +175,4 @@ def _of_whole(row: WeightRow) -> Iterator[str]:
     if row.sag:
         yield f"{row.sag[0].node} sags by {row.sag[0].most:.3g} m under the weight"
     if row.buckling is not None:
-        yield f"the weight is {100 * row.buckling:.3g} % of that which buckles the mechanism"
+        yield _share(row.buckling)

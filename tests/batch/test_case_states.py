@@ -295,7 +295,7 @@ def test_a_shard_with_a_damaged_case_is_not_finished(tmp_path: Path) -> None:
     cut(folders[1] / "mass=0.5" / "results.json")
     with pytest.raises(UsageError, match=r"shard 2/2, is not finished: 1 of 2 cases$"):
         merge_shards(whole.folder, folders)
-    with pytest.raises(UsageError, match=r"files of mass=0\.5 are not as .*: run the batch"):
+    with pytest.raises(UsageError, match=r"files of mass=0\.5 were changed or lost: run the batch"):
         merge_shards(whole.folder, [])
     assert summaries(whole.folder) == before
     (folders[0] / "manifest.jsonl").unlink()

@@ -173,7 +173,7 @@ def test_a_header_of_more_cases_than_memory_holds_costs_none(tmp_path: Path) -> 
 def test_no_folder_of_a_batch_and_a_shard_as_target_are_refused(tmp_path: Path) -> None:
     shards = [shard(tmp_path / str(i), i, 2) for i in (1, 2)]
     (tmp_path / "empty").mkdir()
-    assert "no folder of a batch" in refused(tmp_path / "out", tmp_path / "empty")
+    assert "is not the folder of a batch" in refused(tmp_path / "out", tmp_path / "empty")
     assert "or one of the shards" in refused(shards[0], *shards)
 
 

@@ -148,7 +148,7 @@ def test_nothing_runs_where_one_variant_is_no_case(tmp_path: Path) -> None:
     with pytest.raises(CaseError) as error:
         ran(batch)
     said = [str(problem) for problem in error.value.problems]
-    assert said[0].endswith("2 of 3 variants are no valid cases: nothing was run")
+    assert said[0].endswith("2 of 3 variants are not valid: nothing was run")
     assert said[1] == f"--set: {MASS}: mass=-1: must be >= 0 kg, got -1"
     assert not batch.folder.exists()
 
@@ -277,7 +277,7 @@ def test_a_second_batch_is_refused_or_works_along(tmp_path: Path) -> None:
     other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
     while not log.exists():
         time.sleep(0.01)
-    with pytest.raises(StorageError, match=f"at work in .*process {other} on .*--join"):
+    with pytest.raises(StorageError, match=f"running in .*process {other} on .*--join"):
         ran(batch)
     ran(batch, instant(batch.folder, heard, 1), join=True)
     assert os.waitpid(other, 0)[1] == 0

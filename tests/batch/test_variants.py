@@ -82,7 +82,7 @@ def test_the_rows_of_a_file_are_variants(tmp_path: Path) -> None:
         (f"{MASS}\n1\n2,3\n", "runs.csv:3: 2 values for 1 columns"),
         (f"{MASS},{WANTED}\n1,\n", "runs.csv:2: 1 values for 2 columns"),
         (f"{MASS}\n", "a header and rows are expected"),
-        (f"{MASS},{WANTED}\n1 g,2\n\n1g,2\n", "runs.csv:4: the values of line 2 again"),
+        (f"{MASS},{WANTED}\n1 g,2\n\n1g,2\n", "runs.csv:4: has the values of line 2"),
         ("tool_mass.mass\n1\n", "runs.csv:1: column tool_mass.mass: no such key; did you mean"),
     ],
 )
@@ -137,11 +137,11 @@ def test_a_wrong_setting_is_a_problem_of_its_option() -> None:
     assert "--set: mass: expected KEY=VALUE" in refused("mass")
     assert "is given twice" in refused(f"{MASS}=1", f"{MASS}=2")
     assert "1 is given twice" in refused(f"{MASS}=1,1")
-    assert "how many values" in refused(f"{MASS}=1..2")
+    assert "the number of values is missing" in refused(f"{MASS}=1..2")
     assert "max must be larger" in refused(f"{MASS}=2..1:3")
     assert "not valid YAML" in refused(f"{MASS}=[1")
     assert f"'{WANTED}' is the same key" in refused("targets[0].frequency=1", f"{WANTED}=2")
-    assert "replaces it" in refused(f"{MASS}=1,2", "mechanism.bodies={}")
+    assert "overwrites it" in refused(f"{MASS}=1,2", "mechanism.bodies={}")
     assert len(given("targets.0={mode: 1, frequency: 1}", f"{WANTED}=2,3")) == 2
 
 

@@ -64,7 +64,7 @@ def test_linear_constraints_bind_every_way_on_few_samples_where_solves_are_dear(
     effort = replace(TINY, most_s=30.0)
     runs, notes = chart_designs(scene, effort, 0.1, lambda line: None)
     assert notes == (
-        "designs are charted on 7 of 152 samples of the trajectory, for an exact solve takes long",
+        "searches of a design see 7 of 152 samples, because an exact solve takes long",
     )
     for run in runs:
         assert sum(run.design) <= 0.2 + 1e-6, run.method

@@ -163,8 +163,8 @@ def test_kriging_is_left_out_without_scikit_learn_and_no_set_up_may_take_too_lon
     monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
     hasty = replace(TINY, most_s=1e-9, expansion_points=(1,), accuracies=())
     made = compare_methods(arm, hasty, Request(), lambda line: None)
-    assert "no Kriging: it is charted where scikit-learn is installed" in made.notes
-    assert "no grid or surrogate is trained on over 4 exact solves" in made.notes
+    assert "Kriging is left out: it needs scikit-learn" in made.notes
+    assert "grids and surrogates have 4 exact solves at most" in made.notes
     assert any("RBF quintic 4 has no answer: RBF, quintic:" in note for note in made.notes)
     assert any("response surface, cubic: 20 coefficients from 4" in note for note in made.notes)
     assert any("have no answer: Taylor 1 full took" in note for note in made.notes)

@@ -89,7 +89,7 @@ def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
     assert main([*sweep, "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert [line.split()[0] for line in out.splitlines()[3:11]] == list("12345…89")
-    assert "9 cases would run, 0 are done and current\ntime     about " in out
+    assert "9 cases would run, 0 are done and still current\ntime     about " in out
     assert "a case, estimated from the first\nmemory   about 150 MB in each of 1 process\n" in out
     assert "files    198 more, about 6.58 MB, in results/a_sweep\n" in out
     assert not Path("results").exists()
@@ -98,8 +98,8 @@ def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
     capsys.readouterr()
     assert main([*sweep, "--dry-run"]) == 0
     out = capsys.readouterr().out
-    assert "8 cases would run, 1 are done and current" in out
-    assert "a case, as those that are done took" in out
+    assert "8 cases would run, 1 are done and still current" in out
+    assert "a case, as measured so far" in out
 
 
 @pytest.mark.parametrize(

@@ -242,7 +242,7 @@ def test_a_target_out_of_reach_ends_with_1_and_says_what_can_be_reached(capsys: 
     assert main(["optimize", "far.yaml", *LITTLE]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("Unreachable: mode 1 at 100 Hz")
-    assert re.search(r"eigassign: unreachable: mode 1 .* between 1\d\d.\d and 1\d\d.\d Hz", err)
+    assert re.search(r"eigassign: unreachable: mode 1 .* \(between 1\d\d.\d and 1\d\d.\d Hz", err)
 
 
 LIMITS_ONLY = (

@@ -35,7 +35,7 @@ def test_every_starter_is_listed_once_and_has_its_file() -> None:
 
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_starter_is_written_with_its_name_and_is_in_order(name: str, capsys: Captured) -> None:
-    assert main(["init", name, "--out", "new/mine"]) == 0
+    assert main(["init", name, "--out", "new/mine.yaml"]) == 0
     out = capsys.readouterr().out
     assert "new/mine.yaml written\n" in out
     assert "next: eigassign check new/mine.yaml --draw\n" in out
@@ -78,6 +78,22 @@ def test_init_overwrites_nothing(capsys: Captured) -> None:
     assert "eigassign check sub/gantry.yaml" in Path("sub/gantry.yaml").read_text()
 
 
+def test_out_is_a_folder_or_the_name_of_the_case_file(capsys: Captured) -> None:
+    assert main(["init", "gantry", "--out", "machines/new.2"]) == 0  # made where it is missing
+    assert "machines/new.2/gantry.yaml written" in capsys.readouterr().out
+    assert main(["init", "gantry", "--out", "machines/mine.yml"]) == 0
+    assert sorted(path.name for path in Path("machines").iterdir()) == ["mine.yml", "new.2"]
+
+
+def test_the_first_help_page_shows_six_commands_and_the_rest_below(capsys: Captured) -> None:
+    _, _, commands = helped("eigassign", capsys).partition("\nCommands:\n")
+    first, _, more = commands.partition("\nMore:\n")
+    more, _, _ = more.partition("Examples:")
+    listed = [re.findall(r"^  (\w+)  +\w.*[.]$", part, re.MULTILINE) for part in (first, more)]
+    assert listed[0] == ["init", "check", "optimize", "update", "batch", "docs"]
+    assert [*listed[0], *listed[1]] == list(cli.commands)  # each in one line
+
+
 def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
     def shown(*topic: str) -> str:
         assert main(["docs", *topic]) == 0
@@ -94,6 +110,12 @@ def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
     assert shown("set-up").startswith("## Set-up")
     assert shown("keep_out").startswith("### targets, with keep_out")
     assert "#### keep_out" in shown("keep_out")
+    assert shown("links").startswith("### links\n")  # the keys, not the prose of a guide
+    assert "#### links, type: beam" in shown("links")
+    assert shown("Links").startswith("## Links\n\nTake lengths")
+    assert shown("update").startswith("## eigassign update\n")
+    assert shown("urdf").startswith("## Robots from URDF\n")  # no heading begins so, one has it
+    assert shown("dmig").startswith("#### links, type: superelement\n")  # one text has it
     assert main(["docs", "no such thing"]) == 2
     assert "eigassign docs lists the pages" in capsys.readouterr().err
     assert main(["docs", "waypoints"]) == 2

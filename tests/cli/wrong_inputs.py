@@ -316,7 +316,7 @@ def wrong_inputs() -> Iterator[Wrong]:
     yield Wrong(
         "a mode beyond the model",
         _edited(("mode: 1,", "mode: 500,"), ("modes: [1]", "modes: [500]")),
-        "the model has 1 to 12",
+        "the model has 12",
         "optimize",
     )
     yield Wrong(

@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -29,12 +30,19 @@ PAGES = [
     *sorted((ROOT / "benchmarks" / "results").glob("*.md")),
 ]
 MOST_WORDS = 1500
-_SPEC = importlib.util.spec_from_file_location("reference", ROOT / "page_builder" / "reference.py")
-assert _SPEC is not None
-assert _SPEC.loader is not None
-reference = importlib.util.module_from_spec(_SPEC)
-sys.modules["reference"] = reference
-_SPEC.loader.exec_module(reference)
+
+
+def builder(name: str) -> ModuleType:
+    """A script of page_builder as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "page_builder" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+reference = builder("reference")
 
 
 def page_id(page: Path) -> str:
@@ -223,6 +231,25 @@ def test_what_a_link_names_is_a_topic_of_the_terminal(
             assert main(["docs", link]) == 0
             shown = capsys.readouterr().out.splitlines()[0]
             assert not anchor or anchor in anchors_of(shown), link
+
+
+@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=page_id)
+def test_formulas_are_text_in_the_terminal(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["docs", page.stem]) == 0
+    shown = re.sub(r"^```.*?^```|`[^`]*`", "", capsys.readouterr().out, flags=re.DOTALL | re.M)
+    assert re.findall(r"\$|\\[a-z]+|[_^]\{", shown) == []
+    if page.stem == "theory":
+        assert "\n\n    K = Bᵀ k B,    M = Bᵀ m B     (1)\n\n" in shown
+        assert "φ_F = −M_FF⁻¹ M_FE φ_E" in shown
+        assert "[K_0 − λ_0 M_0, −M_0 φ_0; −φ_0ᵀ M_0, 0] [φ_γ; λ_γ] = [r_γ; s_γ]" in shown
+        assert "stiffness and mass matrix of [u; q̇], order n_u + n_q" in shown
+
+
+def test_every_how_to_page_has_its_picture_and_all_are_small() -> None:
+    pages = {page.stem: read(page) for page in (MANUAL / "how-to").glob("*.md")}
+    assert set(builder("pictures").PICTURES) == set(pages)
+    assert [name for name, text in pages.items() if f"]({name}.png)" not in text] == []
+    assert sum(path.stat().st_size for path in MANUAL.rglob("*.png")) < 1e6
 
 
 def test_every_case_shipped_is_listed() -> None:

@@ -25,6 +25,9 @@ def test_the_site_is_built_and_its_links_lead_somewhere(tmp_path: Path) -> None:
     pages = set((tmp_path / "site").rglob("*.html"))
     manual = {p.relative_to(ROOT).with_suffix(".html") for p in ROOT.glob("eigassign/docs/**/*.md")}
     assert {page for page in manual if tmp_path / "site" / page not in pages} == set()
+    theory = (tmp_path / "site" / "eigassign" / "docs" / "theory.html").read_text(encoding="utf-8")
+    assert theory.count("<math") > 200
+    assert re.findall(r"\$|\\[a-z]+|<mtext>\\", re.sub("<pre>.*?</pre>", "", theory)) == []
     for page in pages:
         text = page.read_text(encoding="utf-8")
         for link in re.findall(r'(?:href|src)="(?!https?:|data:|#)([^"#?]*)', text):

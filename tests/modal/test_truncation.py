@@ -181,7 +181,7 @@ def test_auto_leaves_small_links_whole_and_says_so(tmp_path: Path) -> None:
     small = Case(few)
     assert small.model().reduced is None
     assert small.reduction is not None
-    assert small.reduction.reasons[-1] == "not reduced, it does not pay: one, two"
+    assert small.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
 
 
 def test_an_automatic_order_refuses_links_reduced_too_far(tmp_path: Path) -> None:
@@ -189,7 +189,7 @@ def test_an_automatic_order_refuses_links_reduced_too_far(tmp_path: Path) -> Non
     coarse = Case(with_reduction(case.file, {"one": 60.0, "two": 60.0}))
     x = np.array([[0.1, 1.0, 0.2]])
     assert coarse.model().truncation_error(x[:, :2], x[:, 2:], (1, 2)).max() > 0.25e-4
-    with pytest.raises(AccuracyError, match=r"reduced links leave .* is theirs: raise reduce_to"):
+    with pytest.raises(AccuracyError, match=r"reduced links have an error .*: raise reduce_to"):
         plan_expansion(coarse.file, coarse.model(), coarse.trajectory)
 
 
@@ -197,7 +197,7 @@ def test_a_run_states_what_its_reduced_links_leave_out(tmp_path: Path) -> None:
     case = automatic(tmp_path, 12)
     for answer in (check(case.file.path), expand_case(case.file.path, Options(out=tmp_path / "r"))):
         notes = getattr(answer, "notes", None) or answer.results.notes
-        said = [n for n in notes if "truncation error of the reduced links at most" in n]
+        said = [n for n in notes if "reduced links raise its frequency by at most" in n]
         assert [n[:7] for n in said] == ["mode 1:", "mode 2:"]
     found = modes(case.file.path, [0.1, 1.0], [0.2], 2)
     assert found.truncation_error is not None
@@ -208,6 +208,6 @@ def test_a_run_is_refused_where_the_truncation_cannot_be_bounded(tmp_path: Path)
     text = automatic(tmp_path, modes=[5]).file.path.read_text()
     text = text.replace('"reduce_to": "auto"', '"reduce_to": 1e-3')
     (tmp_path / "far.yaml").write_text(text)
-    with pytest.raises(AccuracyError, match=r"cannot be bounded over .*: raise reduce_to"):
+    with pytest.raises(AccuracyError, match=r"has no bound over .*: raise reduce_to"):
         expand_case(tmp_path / "far.yaml", Options(out=tmp_path / "r"))
     assert not (tmp_path / "r").exists()

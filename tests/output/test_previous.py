@@ -75,7 +75,7 @@ def test_cases_that_are_gone_are_named_and_do_not_count_as_moved(tmp_path):
     rows = [replace(ROW, name=name) for name in ("arm", *"abcdef")]
     found = compared(summary(tmp_path / "summary.json", *rows), Known.of_outcome(ROW))
     assert found.moves == []
-    assert "Cases that are not here any more: 6 (a, b, c, d, e, …)." in found.table().caption
+    assert "Cases that are missing now: 6 (a, b, c, d, e, …)." in found.table().caption
 
 
 def test_a_run_compares_with_its_own_results_and_a_folder_of_runs_with_each(tmp_path):

@@ -65,9 +65,7 @@ def test_every_place_says_what_the_drives_carry_before_and_after() -> None:
 def test_without_weight_the_motion_is_told_alone_and_without_both_nothing() -> None:
     head = HEAD.replace("  gravity: [0, -9.81]\n", "")
     result, _ = solved(head=head)
-    assert {row.of for row in result.results.drives} == {
-        "the motion alone, mechanism.gravity not being given"
-    }
+    assert {row.of for row in result.results.drives} == {"the motion alone (gravity is not stated)"}
     assert "drives" not in [plan.name for plan in run_figures(result.results)]
     limited, _ = solved(DESIGN + "  torque: {q1: {max: 50 N m}}\n", head=head)
     assert "drives" in [plan.name for plan in run_figures(limited.results)]

@@ -310,7 +310,7 @@ def test_what_has_no_effect_stays_and_what_has_the_same_changes_least() -> None:
     # both at the elbow: the change is shared
     assert result.design["second"] - 0.02 == pytest.approx(result.design["m1"], abs=1e-6)
     notes = " ".join(result.results.notes)
-    assert "nothing that is asked depends on foot" in notes
+    assert "no target depends on foot" in notes
     assert "m1, second have the same effect" in notes
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from run_cases import SHIPPED, automatic, chain, shipped, without, written
 
+import eigassign
 from eigassign.errors import CaseError, UsageError
-from eigassign.pipeline import check, modes
+from eigassign.pipeline import Options, check, modes, optimize
 
 
 def test_modes_are_taken_where_the_case_says_unless_asked_elsewhere() -> None:
@@ -100,3 +101,76 @@ def test_modes_need_no_measurements_and_check_misses_them_at_their_line(tmp_path
         CaseError, match=r"measurements\.file: .*lost\.csv: cannot be read: No such"
     ):
         check(path)
+
+
+SHIPPED_CASES = [
+    *sorted(SHIPPED.parent.glob("*.yaml")),
+    *sorted(Path(eigassign.__file__).parent.glob("starters/*.yaml")),
+]
+WARNED = {  # what is said of shipped cases on purpose: stout links, and a boom under its load
+    "arm_3r": ["below 10 shear matters"],
+    "crane_boom": ["the sag is so large", "buckling load"],
+    "luffing_boom": ["gravity, which is not stated, changes mode 1"],
+}
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, marks=pytest.mark.slow) if "casting" in p.stem else p for p in SHIPPED_CASES],
+    ids=lambda p: p.stem,
+)
+def test_no_shipped_case_is_doubted(path: Path) -> None:
+    found = [str(warning) for warning in check(path).warnings]
+    expected = WARNED.get(path.stem, [])
+    assert len(found) == len(expected)
+    assert all(words in said for words, said in zip(expected, found, strict=True))
+
+
+def doubted(folder: Path, *edits: tuple[str, str]) -> list[str]:
+    """Warnings of the planar starter with these edits."""
+    text = (Path(eigassign.__file__).parent / "starters/planar_arm.yaml").read_text()
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return [str(warning).partition(":")[2] for warning in check(written(folder, text)).warnings]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("{stiffness: 8 kN m/rad}}", "{stiffness: 8}}", "of its strain in this drive"),
+        ("{stiffness: 20 kN m/rad}}", "{stiffness: 20}}", "a bare number is in N m/rad"),
+        ("frequency: 15 Hz", "frequency: 900", "the initial design has 12.7"),
+        ("frequency: 15 Hz", "frequency: 1.1", "a factor of 12 off. Check the unit (60 rpm"),
+        ("frequency: 15 Hz", "at_least: 900", "mode 1 at least 900 Hz: the initial design has"),
+        ("frequency: 15 Hz", "at_most: 1", "mode 1 at most 1 Hz: the initial design has"),
+    ],
+)
+def test_a_slip_that_shows_in_the_modes_is_asked_about(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    found = [warning for warning in doubted(tmp_path, (old, new)) if said in warning]
+    assert len(found) == 1
+    key = "coordinates" if "stiffness" in new else "targets[0]"
+    assert key in found[0]
+
+
+def test_what_is_unusual_and_shows_in_the_modes_is_no_slip(tmp_path: Path) -> None:
+    soft = ("{stiffness: 8 kN m/rad}}", "{stiffness: 500}}")  # a belt
+    assert not any("strain" in warning for warning in doubted(tmp_path, soft))
+    rigid = [
+        (f"{{length: {mm} mm, material: aluminium, section: {s}, elements: 4}}",
+         f"{{type: rigid, length: {mm} mm, mass: 1, inertia: 0.01, center: [{mm // 2} mm, 0]}}")
+        for mm, s in ((600, "upper_tube"), (450, "fore_tube"))
+    ]  # fmt: skip
+    rigid += [("diameter: {parameter: sections.upper_tube.outer_diameter, min: 35 mm, max: 50 mm}",
+               "mass: {parameter: bodies.payload.mass, min: 0, max: 2}")]  # fmt: skip
+    assert not any("strain" in warning for warning in doubted(tmp_path, *rigid))
+    far = ("{mode: 1, frequency: 15 Hz}", "{mode: 1, frequency: 110}")
+    assert not any("factor" in warning for warning in doubted(tmp_path, far))
+
+
+def test_a_run_tells_of_it_too(tmp_path: Path) -> None:
+    case = written(tmp_path, shipped(("190 Hz", "19 kHz")))
+    found = optimize(case, Options(out=tmp_path / "out", study="none")).results.warnings
+    assert any("mode 1 at 19000 Hz: the initial design has" in str(w) for w in found)

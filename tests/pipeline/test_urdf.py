@@ -271,7 +271,7 @@ def test_init_writes_a_case_that_runs_and_lists_what_is_to_be_filled_in(
     assert main(["check", "crane.yaml"]) == 0
     assert main(["init", "--urdf", "crane.urdf"]) == 3  # it exists
     assert main(["init", "gantry", "--urdf", "crane.urdf"]) == 2
-    assert "name a template or --urdf, not both" in capsys.readouterr().err
+    assert "give a template or --urdf, not both" in capsys.readouterr().err
 
 
 def test_a_joint_that_moves_no_mass_is_locked_and_said(

@@ -61,7 +61,7 @@ def without(result: Result) -> str:
 
 def test_a_full_turn_of_a_crank_is_kept_clear_of_a_band(tmp_path: Path) -> None:
     result = solved(tmp_path, crank())
-    assert "no expansion tried reaches 5.0e-04: the nearest left" in without(result)
+    assert "no expansion tried reaches 5.0e-04: the best has an error of" in without(result)
     assert result.results.assignment is not None
     assert result.results.assignment.verdict == "reached"
     assert all(row.clear for row in result.results.assignment.clearances)
@@ -79,7 +79,7 @@ def test_an_expansion_is_given_up_after_so_many_looks(tmp_path: Path) -> None:
 def test_the_design_is_the_one_that_is_found_with_an_expansion(tmp_path: Path) -> None:
     with_one, result = solved(tmp_path, shipped()), solved(tmp_path, fine())
     note = without(result)
-    assert note.startswith("no expansion, so that nothing is told of one, nor a one-shot design: ")
+    assert note.startswith("there is no expansion, and so no one-shot design: ")
     before, after = with_one.results.error, result.results.error
     assert before is not None
     assert after is not None
@@ -106,14 +106,14 @@ def test_a_run_folder_and_a_check_say_so(
     case, out = written(tmp_path, fine()), tmp_path / "out"
     assert main(["check", str(case)]) == 0
     told = capsys.readouterr().out
-    assert "no expansion, so that" in told
+    assert "there is no expansion, and so" in told
     assert "to order" not in told
     assert main(["optimize", str(case), "--out", str(out), "--report", "light"]) == 0
     found = json.loads((out / "results.json").read_text())
     assert (found["approximation"], found["solver"]) == ([], None)
     assert found["error"]["one_shot"] is None
-    assert "no expansion, so that" in (out / "log.txt").read_text()
-    assert "no expansion, so that" in (out / "report.html").read_text()
+    assert "there is no expansion, and so" in (out / "log.txt").read_text()
+    assert "there is no expansion, and so" in (out / "report.html").read_text()
 
 
 def test_an_expansion_point_that_cannot_follow_the_path_ends_nothing(tmp_path: Path) -> None:

@@ -72,11 +72,11 @@ def test_without_coordinates_that_matter_the_middle_sample_is_taken() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (HEAD, "expansion.q: auto needs a trajectory"),
+        (HEAD, "expansion.q: auto takes a pose of the trajectory"),
         (changed(("[1.817, 5.312]", "[1.817]")), "expansion.q: .*needs 2 entries"),
         (changed(("y: [0.125, 0.125]", "y: [0.125]")), "expansion.y: .*needs 2 entries"),
-        (changed(("modes: [1]", "modes: [1, 22]")), "expansion.modes.*1 to 21"),
-        (automatic(("mode: 1", "mode: 22")), r"targets\[0\].mode.*1 to 21"),
+        (changed(("modes: [1]", "modes: [1, 22]")), "expansion.modes.*no mode 22: .* has 21"),
+        (automatic(("mode: 1", "mode: 22")), r"targets\[0\].mode.*no mode 22: .* has 21"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused_at_its_key(
@@ -103,7 +103,7 @@ def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.3], order: 3}\n")
     assert plan.y0.shape == (0,)
     assert (plan.order, plan.modes) == (3, (1,))
-    assert any("there is no target on a mode" in note for note in plan.notes)
+    assert any("because no target names a mode" in note for note in plan.notes)
 
 
 def test_order_and_modes_can_be_overridden(tmp_path: Path) -> None:
@@ -114,8 +114,8 @@ def test_order_and_modes_can_be_overridden(tmp_path: Path) -> None:
 def test_a_point_outside_what_it_stands_for_is_noted(tmp_path: Path) -> None:
     text = changed(("y: [0.125, 0.125]", "y: [0.5, 0.125]"), ("q: [1.817, 5.312]", "q: [1.8, 7]"))
     notes = " / ".join(plan_of(tmp_path, text).notes)
-    assert "m1 = 0.5 outside its bounds 0 … 0.25" in notes
-    assert "farther from the trajectory than that travels" in notes
+    assert "m1 = 0.5, outside its bounds 0 to 0.25" in notes
+    assert "farther from the trajectory than that is long" in notes
 
 
 def test_of_many_values_the_first_are_shown() -> None:

@@ -153,7 +153,7 @@ def test_an_order_that_does_not_reach_along_the_trajectory_is_answered_with_auto
 ) -> None:
     scene = scene_of(tmp_path, SHIPPED)
     (warning,) = reach_warnings(scene, [(0.01, 1), (0.03, 2)])
-    assert "order 4 is 3 % off in mode 2 along the trajectory, where 2 % are accepted" in warning
+    assert "order 4 is 3 % off in mode 2 along the trajectory, and 2 % are accepted" in warning
     assert "Write expansion: {order: auto}" in warning
     (warning,) = reach_warnings(scene, [(np.inf, 1), (0.03, 2)])
     assert "gives no frequency (λ < 0) in mode 1" in warning

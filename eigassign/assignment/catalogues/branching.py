@@ -331,8 +331,8 @@ def none_found(problem: CatalogueProblem, nodes: int, exhausted: bool) -> Eigass
         listed = ", ".join(map(repr, names))
         return InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
     return AccuracyError(
-        f"catalogues: no combination that meets all limits was found in {nodes} nodes; "
-        "allow more, shorten the lists or relax a limit"
+        f"catalogues: no combination met all limits in {nodes} nodes of the search: allow more "
+        "time, shorten the lists or relax a limit"
     )
 
 

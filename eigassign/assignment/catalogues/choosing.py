@@ -314,9 +314,7 @@ def choose(
     except KeyboardInterrupt:
         ended = End.INTERRUPTED
     if not exact.fixed and exact.solved(exact.nearest(exact.root, starts[0])) is None:
-        raise AccuracyError(
-            "catalogues: no combination was met that the mechanism can be solved at"
-        )
+        raise AccuracyError("catalogues: the mechanism has no modes with any of the combinations")
     best = best_first(sorted(exact.fixed), exact.worth)[:KEEP]
     optima = tuple(exact.fixed[rows] for rows in best)
     settled, count = search is not None and each and exact.is_listed, prod(map(len, exact.root))
@@ -426,7 +424,7 @@ class _Exact(CatalogueProblem):
 
     def relax(self, node: Node, near: Floats | None) -> Relaxed | None:
         self.nodes += 1
-        self.progress(f"catalogues: node {self.nodes}")
+        self.progress(f"catalogues: {self.nodes} nodes searched")
         bounds, rows = hull(self.catalogues, node, self.bounds)
         constraints = (*self.problem.constraints, *rows)
         problem = replace(

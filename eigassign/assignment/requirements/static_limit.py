@@ -61,8 +61,8 @@ class Way:
         if not np.isfinite(w).all():
             coordinates = self.model.poses.case.coordinates.items()
             free = " and ".join(name for name, c in coordinates if c.moves == "free")
-            message = "gives way freely along this direction, for nothing holds"
-            message = f"{self.target.place.at} {message} {free}: give a drive stiffness, or lock it"
+            message = f"moves freely in this direction, because nothing holds {free}: give it a"
+            message = f"{self.target.place.at} {message} drive stiffness, or lock it"
             raise MechanismError(self.place, message)
         size = np.linalg.norm(w, axis=1)
         along = w / np.where(size > 0.0, size, 1.0)[:, None]

@@ -47,7 +47,7 @@ def gravity_pulls(tree: Tree) -> Iterator[Finding]:
     """No gravity at all is `none`: said on purpose."""
     given = at(tree, "mechanism", "gravity")
     if isinstance(given, tuple) and given and not any(given):
-        yield ("mechanism", "gravity"), "pulls nowhere: write none to leave it out on purpose"
+        yield ("mechanism", "gravity"), "pulls nowhere: write none to leave gravity out"
 
 
 RULES: tuple[Rule, ...] = (

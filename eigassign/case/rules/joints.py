@@ -71,7 +71,7 @@ def beams_carry_one_rider(tree: Tree) -> Iterator[Finding]:
         if base in riders:
             message = (
                 f"{riders[base]!r} travels along {base!r} already, and a beam carries one carriage "
-                "or nut: divide the beam into two with a fixed joint between them, one for each"
+                "or nut: make it two beams, with a fixed joint between them"
             )
             yield (*_JOINTS, joint, "base"), message
         riders.setdefault(base, joint)
@@ -84,8 +84,8 @@ def nuts_are_on_their_shaft(tree: Tree) -> Iterator[Finding]:
             number(value, PLACE) for value in entries(body, "position")[1:]
         ):
             message = (
-                "a nut stands on the axis of its shaft: of its position only the first component "
-                "may differ from zero; place what it carries by the nodes of its follower"
+                "a nut stands on the axis of its shaft, so that only the first component of its "
+                "position may differ from zero: place what it carries by the nodes of its follower"
             )
             yield (*_JOINTS, joint, "position"), message
 

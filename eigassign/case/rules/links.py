@@ -160,12 +160,11 @@ def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Findin
     known = [(n, path) for path, n in given if type(n) is int and n in allowed]
     total = sum(n for n, _ in known)
     if total > raised(MOST_ELEMENTS):
-        n, path = max(known, key=lambda each: each[0])
+        _, path = max(known, key=lambda each: each[0])
         yield (
             (*path, "elements"),
-            f"{shown(n)}, in the whole mechanism {shown(total)} elements; more than "
-            f"{raised(MOST_ELEMENTS):g} take minutes and hundreds of MB for each model; "
-            f"{how_to_raise(total, MOST_ELEMENTS)}",
+            f"the mechanism has {shown(total)} elements: more than {raised(MOST_ELEMENTS):g} take "
+            f"minutes and hundreds of MB; {how_to_raise(total, MOST_ELEMENTS)}",
         )
 
 

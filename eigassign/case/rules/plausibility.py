@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import (
@@ -21,7 +22,7 @@ from eigassign.case.schema.links import (
     Taper,
 )
 from eigassign.case.schema.mechanism import Body
-from eigassign.case.schema.sections import BareSection
+from eigassign.case.schema.sections import BareSection, CircleSection, Section, TubeSection
 from eigassign.case.schema.targets import (
     AtLeastTarget,
     AtMostTarget,
@@ -29,6 +30,7 @@ from eigassign.case.schema.targets import (
     FrequencyProfile,
 )
 from eigassign.case.schema.trajectory import (
+    Added,
     PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
@@ -42,6 +44,9 @@ MODULUS = (1e6, 1.5e12)  # Pa: soft rubber … above diamond (1.2e12)
 DENSITY = (1.0, 25_000.0)  # kg/m3: aerogel … above osmium (22 590)
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
+# Of the outermost fibre, with the load at the end of its beam: structural steel yields at 0.0011.
+STRAIN = 0.001
+HEAVY = 30.0  # times the beam: the load of the shipped lift is 12 times its platform
 FREQUENCY = (1e-3, 1e6)  # Hz
 ROUND_OFF = 1e-9  # of the terms of a sum
 LARGEST_ERROR = 0.5  # a tolerance of 2 was meant as 2 %
@@ -56,6 +61,13 @@ SHEAR = (0.05, 1.2)  # κ: thin-walled profiles … solid ones (5/6, 9/10), with
 STOUTNESS = (1e-4, 100.0)
 # E / G = 2 (1 + ν) lies between 2 and 3 for ν from 0 to 0.5; fibres along the beam raise it.
 MODULI = (1.9, 60.0)
+
+
+SIZES = {  # of properties, by their keys
+    "youngs_modulus": (MODULUS, "Pa"),
+    "density": (DENSITY, "kg/m3"),
+    "length": (LENGTH, "m"),
+}
 
 
 def implausible(document: Document) -> Iterator[Finding]:
@@ -78,15 +90,12 @@ def _outside(
 
 
 def materials_are_of_this_world(document: Document) -> Iterator[Finding]:
-    """Moduli and density are those of a solid."""
+    """Materials have mass, and two moduli that belong together."""
     for name, material in document.mechanism.materials.items():
         path: KeyPath = ("mechanism", "materials", name)
         E, G = material.youngs_modulus, material.shear_modulus
-        yield from _outside(E, MODULUS, (*path, "youngs_modulus"), "Pa")
         if material.density == 0:
             yield (*path, "density"), "links of this material are massless"
-        else:
-            yield from _outside(material.density, DENSITY, (*path, "density"), "kg/m3")
         if G is not None and not MODULI[0] <= E / G <= MODULI[1]:
             message = f"E / G is {E / G:.3g}; isotropic materials have 2 (1 + ν), from 2 to 3"
             yield (*path, "shear_modulus"), message
@@ -160,16 +169,14 @@ def _ends(section: str | Taper) -> tuple[str, ...]:
 # --- Links and bodies
 
 
-def links_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
-    """Beams and rigid links are from a millimetre to a hundred metres long."""
+def frames_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
+    """Beams of frames are from a millimetre to a hundred metres long."""
     for name, link in document.mechanism.links.items():
-        path: KeyPath = ("mechanism", "links", name)
-        if isinstance(link, (BeamLink, RigidLink)) and link.length is not None:
-            yield from _outside(link.length, LENGTH, (*path, "length"), "m")
-        elif isinstance(link, FrameLink):
+        if isinstance(link, FrameLink):
             for beam, inner in link.beams.items():
                 length = math.dist(link.nodes[inner.from_node], link.nodes[inner.to_node])
-                yield from _outside(length, LENGTH, (*path, "beams", beam), "m of length")
+                path = ("mechanism", "links", name, "beams", beam)
+                yield from _outside(length, LENGTH, path, "m of length")
 
 
 def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
@@ -191,9 +198,8 @@ def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
             at_most = "at most " if isinstance(sections[thick], BareSection) else ""
             yield (
                 ("mechanism", "links", name, "length"),
-                f"length is {at_most}{slenderness:.2g} times the depth of section "
-                f"{thick!r}; below {SLENDER:g} the Euler–Bernoulli beam, which neglects "
-                "shear, is doubtful; write shear: true",
+                f"length is {at_most}{slenderness:.2g} times the depth of section {thick!r}: below "
+                f"{SLENDER:g} shear matters, which Euler–Bernoulli beams lack: write shear: true",
             )
 
 
@@ -207,6 +213,77 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
             if not semidefinite(spread(part.inertia)):
                 message = "no body has this inertia: a principal moment exceeds the other two's sum"
                 yield ("mechanism", group, name, "inertia"), message
+
+
+def payloads_can_be_held(document: Document) -> Iterator[Finding]:
+    """No body would bend the beam that carries it beyond what materials bear, lying flat."""
+    mechanism = document.mechanism
+    for place, path, mass in _given(document):
+        group, body, key = path.split(".")[:3]
+        name, _, end = mechanism.bodies[body].at.partition(".") if group == "bodies" else ("",) * 3
+        beam = mechanism.links.get(name)
+        if key != "mass" or not isinstance(beam, BeamLink) or end == "start":
+            continue
+        ends = (_bar(mechanism.sections[section]) for section in _ends(beam.section))
+        area, modulus = map(max, zip(*ends, strict=True))
+        material = mechanism.materials[beam.material]
+        strain = 9.81 * mass * beam.length / (material.youngs_modulus * modulus)
+        if strain > STRAIN and mass > HEAVY * material.density * area * beam.length:
+            yield (
+                place,
+                f"{mass:g} kg would strain the beam {name!r} that carries it by {100 * strain:.2g} "
+                "% (steel yields at 0.1 %): check the mass (in kg when bare) and the section",
+            )
+
+
+def _bar(section: Section) -> tuple[float, float]:
+    """Area and section modulus, m2 and m3; of what is not round the largest that are possible."""
+    depth = section.depth(True)
+    if isinstance(section, BareSection):
+        return section.area, max(section.in_plane, section.inertia_y or 0.0) / (0.5 * depth)
+    if isinstance(section, (CircleSection, TubeSection)):
+        wall = getattr(section, "thickness", None) or 0.5 * depth
+        bore = getattr(section, "inner_diameter", None) or depth - 2.0 * wall
+        return math.pi / 4 * (depth**2 - bore**2), math.pi / 32 * (depth**4 - bore**4) / depth
+    return depth**2, depth**3 / 6.0
+
+
+# --- Properties, as written and as the design and load cases change them
+
+
+def _given(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
+    """Where the file gives a property, its path, and the value there, or at the ends of a range."""
+    for group in ("materials", "links", "bodies"):
+        for name, part in getattr(document.mechanism, group).items():
+            for key in (*SIZES, "mass"):
+                if isinstance(value := getattr(part, key, None), float):
+                    yield ("mechanism", group, name, key), f"{group}.{name}.{key}", value
+    for name, entry in document.design.entries.items():
+        if isinstance(entry, Choices):
+            for choice, values in entry.choices.items():
+                for path in entry.properties:
+                    yield ("design", name, "choices", choice, path), path, values[path]
+            continue
+        for key, end in zip(("min", "max"), entry.range, strict=True):
+            key = key if entry.values is None else "values"
+            for path, factor in entry.factors.items():
+                yield ("design", name, key), path, factor * end
+    for place, _, motion in named_trajectories(document.trajectory):
+        for path, value in motion.set.items():
+            yield (*place, "set", path), path, value.add if isinstance(value, Added) else value
+
+
+def properties_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
+    """Moduli, densities and lengths, and what dimensions of sections may become."""
+    found: dict[KeyPath, Finding] = {}  # one for an entry of the design
+    for place, path, value in _given(document):
+        group, name, key = path.split(".")[:3]
+        limits, unit = SIZES.get(key, ((-math.inf, math.inf), ""))
+        if group == "sections" and not isinstance(document.mechanism.sections[name], BareSection):
+            limits, unit = DEPTH, "m"
+        for finding in _outside(value, limits, place, unit) if value or key != "density" else ():
+            found.setdefault(place[:2] if place[0] == "design" else place, finding)
+    yield from found.values()
 
 
 # --- Joints and places
@@ -307,9 +384,8 @@ def joints_hold_something_new(document: Document) -> Iterator[Finding]:
             verb = "joins" if len(others) == 1 else "join"
             yield (
                 ("mechanism", "joints", name),
-                f"is redundant: {held} {verb} {joint.base} and {joint.follower} already, so that "
-                "it holds nothing new where it allows the same motion; leave it out, or was "
-                "another node meant?",
+                f"is redundant: {held} {verb} {joint.base} and {joint.follower} already. Leave it "
+                "out, or was another node meant?",
             )
         else:
             joined.setdefault(base, {})[follower] = name
@@ -398,9 +474,11 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     bare_sections_can_exist,
     sections_have_the_size_of_beams,
     materials_and_sections_are_used,
-    links_have_the_size_of_machines,
+    properties_have_the_size_of_machines,
+    frames_have_the_size_of_machines,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
+    payloads_can_be_held,
     places_are_in_metres,
     angles_are_in_radians,
     angles_of_joints_have_an_effect,

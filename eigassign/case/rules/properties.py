@@ -42,10 +42,8 @@ _GROUPS = {
     "springs": "spring",
 }
 _FORMS = (
-    "expected materials.<name>.<property>, sections.<name>.<property>, links.<name>.length, "
-    "bodies.<name>.<property>, springs.<name>.<property>, coordinates.<name>.drive.stiffness or "
-    "coordinates.<name>.drive.inertia; of places joints.<name>.position.0, joints.<name>.angle, "
-    "bodies.<name>.offset.0 and the like"
+    "expected materials.<name>.<property>, or the same of sections, links, bodies and springs, "
+    "coordinates.<name>.drive.stiffness or .inertia, joints.<name>.position.0 or .angle"
 )
 _VECTORS = {  # of which components can vary
     "joints": {"position": PLACE, "orientation": ANGLE},
@@ -60,6 +58,14 @@ DRIVEN = {  # of a drive: what it is where the joint turns, and where it slides
     "inertia": (quantity("rotary inertia", at_least=0), quantity("mass", at_least=0)),
     "motor_inertia": (quantity("rotary inertia", at_least=0),) * 2,
     "ratio": (Quantity(above=0), quantity("transmission", above=0)),
+}
+# By what a bare number is in: the unit that is easily left out, and its size.
+_MEANT = {
+    "m": ("mm", 1e-3),
+    "kg": ("g", 1e-3),
+    "Pa": ("GPa", 1e9),
+    "N/m": ("kN/m", 1e3),
+    "N m/rad": ("kN m/rad", 1e3),
 }
 # real numbers that the mechanism is built with
 _FIXED = {("links", "roll"), ("links", "reduce_to"), ("springs", "angle"), ("joints", "lead")}
@@ -291,11 +297,8 @@ def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
             except NoPropertyError as error:
                 yield (*place, "set", path), str(error)
             if path in owner and not isinstance(value, Mapping):
-                message = (
-                    f"is the design parameter {owner[path]!r}: one of them can have it; what the "
-                    "trajectory has more is {add: …}"
-                )
-                yield (*place, "set", path), message
+                message = f"is the design parameter {owner[path]!r}, which a trajectory cannot set"
+                yield (*place, "set", path), message + ": write {add: …} for what it adds"
 
 
 def value_at(case: Any, path: str) -> float:
@@ -328,11 +331,8 @@ def parameters_agree_with_the_file(tree: Tree, case: Any) -> Iterator[Finding]:
                 unit = f" {prop.dimension.si}".rstrip() if prop and prop.dimension else ""
                 yield (
                     place,
-                    (
-                        f"is {value:.12g}{unit} in this file, where {column.factors[path]:.12g} × "
-                        f"{column.parameter} is {wanted:.12g}{unit}: write that there, or another "
-                        "factor"
-                    ),
+                    f"is {value:.12g}{unit} in this file, where {column.factors[path]:.12g} × "
+                    f"{column.parameter} is {wanted:.12g}{unit}: write that, or another factor",
                 )
 
 
@@ -345,26 +345,24 @@ def starts_outside(tree: Tree, case: Any) -> Iterator[Finding]:
     found = [known_property(tree, column.parameter) for column in design.parameters.values()]
     units = [p.dimension.si if p and p.dimension else "" for p in found]
     start = [value_at(case, column.parameter) for column in design.parameters.values()]
-    catalogued = {k for catalogue in design.catalogues for k in catalogue.columns}
-    why = "; the optimum will lie inside"
+    listed_only = {k for catalogue in design.catalogues for k in catalogue.columns}
+    slips = set[int]()
     for k, (name, column) in enumerate(design.parameters.items()):
-        value, unit = start[k], units[k]
-        if k in catalogued or column.min <= value <= column.max:
+        value, unit, bounds = start[k], units[k], f"[{column.min:g}, {column.max:g}]"
+        if column.min <= value <= column.max:
+            continue
+        why, (meant, size) = "the optimum will lie inside", _MEANT.get(unit, ("", 0.0))
+        if size * column.min <= value <= size * column.max:
+            why = f"a bare number is in {unit}: was {bounds} {meant} meant?"
+            slips.add(k)
+        elif k in listed_only:
             continue
         message = f"initial value {value:g} {unit} of {column.parameter} is outside "
-        bounds = f"[{column.min:g}, {column.max:g}] {unit}"
-        small = {"m": "mm", "kg": "g"}.get(unit)
-        if small and column.min <= 1e3 * value <= column.max:
-            bare = (
-                f"; a bare number is in {unit}: was [{column.min:g}, {column.max:g}] {small} meant?"
-            )
-            yield ("design", name), message + bounds + bare
-        else:
-            yield ("design", name), message + bounds + why
+        yield ("design", name), f"{message}{bounds} {unit}; {why}"
     for catalogue in design.catalogues:
         own = tuple(start[k] for k in catalogue.columns)
-        if own not in catalogue.rows:
-            message = f"the initial value is none of those listed, {listed(catalogue.choices)}"
+        if own not in catalogue.rows and not slips.intersection(catalogue.columns):
+            message = f"the initial value is none of those listed: {listed(catalogue.choices)}"
             yield ("design", catalogue.name), message
 
 

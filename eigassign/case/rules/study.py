@@ -56,7 +56,7 @@ def trajectories_have_names_of_their_own(tree: Tree) -> Iterator[Finding]:
         if name is None:
             continue
         if same := seen.get(name.casefold()):
-            hint = "" if same == name else f": {same!r} (they name files, where case may be lost)"
+            hint = "" if same == name else f": {same!r} (some file systems ignore upper case)"
             yield (*path, "name"), f"a trajectory has this name already{hint}"
         seen.setdefault(name.casefold(), name)
 
@@ -72,7 +72,7 @@ def branches_are_ranges_of_driven_joints(tree: Tree) -> Iterator[Finding]:
                 yield path, unknown("joint with one freedom", joint, ranged)
             elif joint not in driven:
                 known = listed([name for name in ranged if name in driven])
-                yield path, f"no coordinate moves this joint (mechanism.assembly does); use {known}"
+                yield path, f"no coordinate moves this joint, but the loop does; use {known}"
             elif text(tree, "mechanism", "joints", joint, "type") == "revolute":
                 ends = [number(v, ANGLE) for v in entries(body, "branch", joint)]
                 low, high = ends if len(ends) == 2 else (None, None)

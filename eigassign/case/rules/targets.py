@@ -37,12 +37,12 @@ def targets_are_on_trajectories(tree: Tree) -> Iterator[Finding]:
             continue
         path: KeyPath = ("targets", k, "during")
         if name is None and len(known) > 1:
-            yield path, f"is a part of one trajectory: name it ({listed(known)})"
+            yield path, f"needs the trajectory that is meant, as trajectory ({listed(known)})"
             continue
         motion = motions.get(name or (known[0] if known else ""))
         if motion is not None and not (motion[0] <= span[1] and span[0] <= motion[1]):
             lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
-            yield path, f"is no part of it: {lasts}"
+            yield path, f"lies outside: {lasts}"
 
 
 def statics_are_of_nodes(tree: Tree) -> Iterator[Finding]:
@@ -124,7 +124,7 @@ def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
     elif time is not None and not known:
         yield (*path, "time"), "there is no trajectory: give q"
     elif time is not None and where is None and len(known) > 1:
-        message = f"is a time of one trajectory: name it as trajectory ({listed(known)})"
+        message = f"needs the trajectory that is meant, as trajectory ({listed(known)})"
         yield (*path, "time"), message
     elif time is not None:
         motion = dict(zip(known, _motions(tree), strict=True))[where or known[0]] or (time, time)
@@ -137,27 +137,27 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
     """The paper's program has wanted frequencies, bounds, lists, linear constraints, no more."""
     if text(tree, "assignment", "method") != "one_shot":
         return
-    instead = "method: one_shot takes frequency targets of numbered modes, bounds, lists and "
-    instead += "linear constraints only; take method: sequential"
+    instead = "method: one_shot takes only frequency targets of numbered modes, bounds, lists and "
+    instead += "linear constraints: write method: sequential"
     if at(tree, "assignment", "objective") not in (None, "least_squares"):
-        yield ("assignment", "objective"), f"is not least_squares; {instead}"
+        yield ("assignment", "objective"), f"is not least_squares: {instead}"
     if at(tree, "assignment", "robust") is True:
-        yield ("assignment", "robust"), f"is no limit of a quadratic program; {instead}"
+        yield ("assignment", "robust"), f"is not linear in the design: {instead}"
     for k, target in enumerate(entries(tree, "targets")):
         kinds = kinds_of(target) if isinstance(target, Mapping) else []
         if kinds and not TARGETS[kinds[0]].is_goal:
-            yield ("targets", k, kinds[0]), f"is no wanted frequency; {instead}"
+            yield ("targets", k, kinds[0]), f"is not a wanted frequency: {instead}"
     for path, _ in followed_modes(tree):
-        yield path, f"is followed by its shape; {instead}"
+        yield path, f"is followed by its shape: {instead}"
     for key, what in (("mass", "the mass"), ("torque", "torques of drives")):
         limits = at(tree, "design", key)
         if limits is not None and not is_entry(limits):
             limited = "limits" if key == "torque" or set(names(limits)) != {"price"} else "prices"
-            yield ("design", key), f"{limited} {what}; {instead}"
+            yield ("design", key), f"{limited} {what}: {instead}"
     for name, body in design_entries(tree):
         for choice, values in (choices(body) or ())[:1]:
             if at(values, PRICE) is not None:
-                yield ("design", name, "choices", choice, PRICE), f"is a price; {instead}"
+                yield ("design", name, "choices", choice, PRICE), f"is a price: {instead}"
 
 
 # --- Objectives that are no error of wanted frequencies
@@ -179,13 +179,13 @@ def objectives_have_what_they_take(tree: Tree) -> Iterator[Finding]:
         {key for key in TARGETS if at(own, key) is not None} for own in entries(tree, "targets")
     ]
     for k in (k for k, kind in enumerate(kinds) if "frequency" in kind):
-        message = f"objective {name} comes near to no frequency: write at_least, at_most or both"
+        message = f"objective {name} takes no wanted frequency: write at_least, at_most or both"
         yield ("targets", k, "frequency"), message
     if name == "widest" and not any(kind & {"keep_out", "gap"} for kind in kinds):
-        yield path, "widest is about the room of bands and gaps: there is no keep_out or gap target"
+        yield path, "widest needs a target with keep_out or gap"
     for place, _ in followed_modes(tree) if name == "widest" else ():
         if "keep_out" in kinds[int(place[1])] or "gap" in kinds[int(place[1])]:
-            yield place, "is followed by its shape: widest takes bands and gaps of numbered modes"
+            yield place, "is followed by its shape: widest takes numbered modes only"
     if (where := text(highest, "trajectory")) is not None and where not in known:
         yield (*path, "highest", "trajectory"), unknown("trajectory", where, known)
 
@@ -194,7 +194,7 @@ def robust_designs_have_tolerances(tree: Tree) -> Iterator[Finding]:
     """Something deviates where deviations count."""
     deviates = any(at(body, "tolerance") is not None for _, body in design_entries(tree))
     if at(tree, "assignment", "robust") is True and not deviates:
-        message = "no parameter has a tolerance: give one at least, such as tolerance: 2 %"
+        message = "no parameter has a tolerance: give at least one, such as tolerance: 2 %"
         yield ("assignment", "robust"), message
 
 

@@ -271,9 +271,9 @@ class _Resistance:
         what = " and ".join(named.get(path, path) for path in paths)
         raise MechanismError(
             place,
-            f"with {what} = 0 nothing resists the motion of {self._moved(left)}, which would be "
-            f"one more rigid-body motion: {'take a min' if path in named else 'set a value'} above "
-            "0, such as a thousandth of the largest, or give the coordinate a drive",
+            f"with {what} = 0 nothing holds {self._moved(left)}, which adds a rigid-body motion: "
+            f"{'take a min' if path in named else 'set a value'} above 0, such as a thousandth of "
+            "the largest, or give the coordinate a drive",
         )
 
     def _moved(self, W: Floats) -> str:
@@ -287,11 +287,9 @@ class _Resistance:
         paths = tuple(dict.fromkeys(self.springs))
         return MechanismError(
             "mechanism." + ".".join(paths[0].split(".")[:2]),
-            f"{' and '.join(paths)} resist some motions of {self._moved(left)}, which no drive "
-            "holds, and leave others, in a direction that changes with the pose (a spring's axes "
-            "turn with the link it names first): what is left is a rigid-body motion, but no "
-            "coordinate. Give the springs stiffness in the other directions too, or lock one of "
-            "these coordinates, or give it a drive with a stiffness, a small one if it is to move",
+            f"{' and '.join(paths)} hold {self._moved(left)} in one direction only, which turns "
+            "with the link that the spring names first. Give the springs stiffness in the other "
+            "directions, lock one of these coordinates, or give it a drive stiffness",
         )
 
 

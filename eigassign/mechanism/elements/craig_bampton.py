@@ -114,8 +114,8 @@ def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
     if factor is None:
         raise MechanismError(
             path,
-            "is limp inside: with its interface nodes held its stiffness is not positive "
-            "definite, so something in it is not attached; fix the part or add interface nodes",
+            "is loose inside: its stiffness is not positive definite with its interface nodes "
+            "held. Fix what is not attached in the part, or add interface nodes",
         )
     return factor
 

@@ -54,8 +54,8 @@ def part_lines(case: CaseFile) -> tuple[str, ...]:
             flat = case.mechanism.space == "planar"
             if flat if kind == "solid" else imported_part(case, name).held:
                 found.append(
-                    f"{title}: u_z, θ_x and θ_y of its nodes are held; how it moves out of the "
-                    "plane between them counts among the modes"
+                    f"{title}: u_z, θ_x and θ_y of its nodes are held; modes in which it moves out "
+                    "of the plane between them are counted"
                 )
     return tuple(found)
 
@@ -88,12 +88,12 @@ def free_part_lines(
     lines = [
         f"{title}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m, about it "
         f"{about} kg m2",
-        f"{title}: {_free_modes(K, M, mesh, strain, len(J))}rigid motion strains it by "
-        f"{strain:.1g} (up to {STRAIN_FREE:g} passes)",
+        f"{title}: {_free_modes(K, M, mesh, strain, len(J))}strain under rigid motion "
+        f"{strain:.1g} (accepted up to {STRAIN_FREE:g})",
     ]
     if size > 1.0 and m < _THIN * size**3:
         lines.append(
-            f"{title}: reaches over {size:.3g} m with {m:.3g} kg: if its files are in mm, write "
+            f"{title}: is {size:.3g} m large and has {m:.3g} kg: if its files are in mm, write "
             "units: mm-t-s or mm-kg-ms"
         )
     return lines
@@ -111,13 +111,13 @@ def _free_modes(
     rigid = int((lam < least).sum())
     loose = "" if rigid == expected else f" ({expected} expected: is it in pieces?)"
     hz = np.sqrt(lam[rigid:][:_ELASTIC]) / (2.0 * np.pi)
-    text = f"free-free {rigid} rigid modes{loose}"
+    text = f"free: {rigid} rigid modes{loose}"
     if len(hz):
         text += f", then {', '.join(f'{f:.5g}' for f in hz)} Hz"
         # entries that are wrong by ε √(K_ii K_jj), each by itself, change λ by ε φᵀ diag(K) φ
         shape = phi[:, rigid]
         unsure = 0.5 * strain * (K.diagonal() @ shape**2) / (shape @ (K @ shape))
-        text += f" (uncertain by some {100 * unsure:.1g} %: few digits)" if unsure > _SEEN else ""
+        text += f" (uncertain by {100 * unsure:.1g} %: few digits)" if unsure > _SEEN else ""
     return f"{text}; "
 
 
@@ -136,7 +136,7 @@ def _lowest(
     s = max(1e-6 * s, _held_eigenvalue(K, M, mesh))
     A = sparse.csc_array(K + s * M)
     if (factor := kept_factor(A)) is None:
-        raise AccuracyError("something that has no mass is loose")
+        raise AccuracyError("a part without mass is loose")
     mu, phi = largest_modes(factor, A.T, lambda v: np.asarray(M @ v), count)
     return 1.0 / mu[mu > _MASSLESS * mu[0]] - s, phi
 

@@ -71,9 +71,8 @@ def outside(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryErro
 def other_assembly(ik: TipProblem, course: Course) -> TrajectoryError:
     """The first sample can be reached only with the loops put together otherwise."""
     message = (
-        f"{course.label(0)} can be reached, but only with the loops put together in another way "
-        f"than at {pose(ik, ik.seeds[0])}, or past a dead point; move the path, or choose the "
-        "other way by mechanism.assembly"
+        f"{course.label(0)} can be reached only with the loops put together otherwise than at "
+        f"{pose(ik, ik.seeds[0])}, or past a dead point: move the path, or mechanism.assembly"
     )
     return TrajectoryError(WAYPOINTS, message, 0)
 

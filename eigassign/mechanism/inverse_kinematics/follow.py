@@ -139,8 +139,8 @@ def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
     other = _off(ik, course, own, 100.0 * RESIDUAL)
     if other.any():
         k = int(np.argmax(other))
-        why = "the model, coming straight from its reference, has its loops put together otherwise"
-        raise lost_assembly(ik, course, k, u[k], f"{why}; choose mechanism.assembly.at nearer")
+        why = "on the straight way there the model puts its loops together otherwise"
+        raise lost_assembly(ik, course, k, u[k], f"{why}: choose mechanism.assembly.at nearer")
     return own
 
 
@@ -183,17 +183,17 @@ def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
         slides = ik.chain.of_kind("slide")[: ik.n_q].any()
         measure = f" (a slide of {ik.lever:.3g} m counting as 1 rad)" if slides else ""
         return (
-            f"the tip fixes {ik.rank} of {ik.n_q} coordinates: of the many solutions, the one "
-            f"that moves the joints least from sample to sample is taken{measure}",
+            f"the tip fixes {ik.rank} of {ik.n_q} coordinates: the solution that moves the joints "
+            f"least from sample to sample is taken{measure}",
         )
     if len(candidates) == 1 or ik.guessed:
         return ()
     if ik.chain.assembly is not None:
-        said = "nearest to where the loops are put together"
-        return (f"the first sample is the solution {said}; name a branch or a start for another",)
+        said = "the solution nearest to mechanism.assembly is taken at the first sample"
+        return (f"{said}: name a branch or a start for another",)
     return (
-        f"the first sample can be reached in {len(candidates)} ways; "
-        "name a branch or a start to choose another",
+        f"the first sample can be reached in {len(candidates)} ways, of which one is taken: name a "
+        "branch or a start for another",
     )
 
 

@@ -90,8 +90,8 @@ class PathOfDesign:
     def said(self) -> str:
         """The sentence that says what follows what."""
         return (
-            f"the tip keeps its path whatever {', '.join(self.moving)} will be: the joint "
-            "coordinates follow the design"
+            f"the tip keeps its path for every {', '.join(self.moving)}: the coordinates of the "
+            "joints follow the design"
         )
 
     @cached_property
@@ -180,7 +180,6 @@ def _require_within_reach(path: PathOfDesign) -> None:
         if length > 1e-6 * ik.lever:
             raise MechanismError(
                 f"design.{name}.parameter",
-                f"moves the tip where no coordinate can bring it back: they move {ik.rank} of the "
-                f"{moved.shape[1]} components that the path asks for; give samples of the "
-                "coordinates instead",
+                f"moves the tip where no coordinate can bring it back: they move {ik.rank} of "
+                f"{moved.shape[1]} components of the path. Give samples of the coordinates instead",
             )

@@ -168,8 +168,8 @@ def _check_rigid_loops(
             raise MechanismError(
                 path,
                 f"closes a loop whose two sides do not meet: {_spelt(gap)}{half} apart, where "
-                f"{MEETS:g} m and rad are taken for rounded digits. Correct the positions, lengths "
-                "and angles of the loop, or give one of its joints a freedom",
+                f"{MEETS:g} m and rad pass as rounding. Correct its positions, lengths and angles, "
+                "or give one of its joints a freedom",
             )
 
 
@@ -310,9 +310,8 @@ class _Branches:
             n = len(self.tree.freedoms) - len(self.tree.passive)
             raise MechanismError(
                 "coordinates",
-                f"{missing} more coordinate(s) needed: the mechanism has {n + missing} freedom(s) "
-                f"and {n} coordinate(s), which do not determine the joints {joints}; or "
-                f"{self._at} is a dead point",
+                f"{missing} more coordinate(s) needed: {n} of {n + missing} freedom(s) have one, "
+                f"which leaves the joints {joints} open; or {self._at} is a dead point",
             )
 
     def _require_movable(self, p0: Floats) -> None:
@@ -328,11 +327,9 @@ class _Branches:
             if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
                 raise MechanismError(
                     "coordinates" if v < len(moves) else "design",
-                    f"{self.function.names[k]} cannot change at {self._at}: the loops pose "
-                    f"{self.function.n_equations} conditions, of which the {self.function.size} "
-                    "passive freedom(s) can meet none more. It is a structure, or stretched to a "
-                    "dead point: give a joint another freedom, lock the coordinate, or choose "
-                    "another pose with mechanism.assembly.at",
+                    f"{self.function.names[k]} cannot change at {self._at}: the loops hold it, as "
+                    "a structure or at a dead point. Give a joint another freedom, lock the "
+                    "coordinate, or choose another pose with mechanism.assembly.at",
                 )
 
     def _unclosable(self) -> str:
@@ -349,19 +346,16 @@ class _Branches:
         if met == n:
             return (
                 f"{message}: links do not reach, or lie beyond a dead point; the nearest pose "
-                f"found leaves {_spelt(left)}. Correct the lengths and positions, or name "
-                "coordinates at which the mechanism can be put together: mechanism.assembly: "
-                "{at: {coordinate: value}}"
+                f"found leaves {_spelt(left)}. Correct lengths and positions, or write a pose that "
+                "exists: mechanism.assembly: {at: {coordinate: value}}"
             )
         joints = ", ".join(dict.fromkeys(f.joint for f in self.tree.passive))
         # rounded dimensions of a loop with passive joints leave less than 1e-3 m and rad
         if max(left) < 1e-3:
             return (
-                f"{message}, but nearly: {_spelt(left)} are left, where {ACCEPT:g} are accepted. "
-                f"They pose {n} conditions, of which {joints} can meet {met}, so that the others "
-                "must agree in their dimensions: give positions, lengths and angles with twelve "
-                "digits, or give joints more freedoms, such as spherical for universal, or "
-                "cylindrical for revolute"
+                f"{message}, but nearly: {_spelt(left)} are left, and {ACCEPT:g} are accepted. Of "
+                f"{n} conditions {joints} can meet {met}; dimensions must meet the others: give "
+                "these twelve digits, or joints more freedoms (spherical for universal)"
             )
         return (
             f"{message}: they pose {n} conditions, of which {joints} can meet {met}: {n - met} "

@@ -56,8 +56,7 @@ class Rails:
         where = f"in the pose {pose}" + (f" ({label(k)})" if len(x) > 1 else "")
         message = (
             f"stands at {s:.6g} m of {self.links[rider]!r} {where}: it can travel from "
-            f"{allowed[0]:.4g} m to {allowed[1]:.6g} m, since the mesh that moves with it needs "
-            "room at either end; lengthen the link or keep the coordinate inside"
+            f"{allowed[0]:.4g} m to {allowed[1]:.6g} m. Lengthen the link, or travel less far"
         )
         return TravelError(f"mechanism.joints.{self.joints[rider]}", message, k)
 

@@ -162,9 +162,8 @@ def _made(
             if (gradients(x, count, xi)[1] <= 0.0).any():
                 raise MechanismError(
                     f"{path}.mesh",
-                    "has elements that are folded (their Jacobian is not positive at a point of "
-                    "integration): make the mesh finer where its surface is curved, or its "
-                    "elements straight (in gmsh Mesh.SecondOrderLinear = 1)",
+                    "has elements that are folded (their Jacobian is not positive): mesh finer "
+                    "where it is curved, or with straight edges (gmsh: Mesh.SecondOrderLinear = 1)",
                 )
         dofs = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
         K = K + assembled(stiffness(x, count, nu), dofs, n)

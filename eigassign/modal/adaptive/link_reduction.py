@@ -60,6 +60,6 @@ def reductions(
         reasons.append(f"reduced to {frequency:.4g} Hz: {size} of {whole.n_dof} dofs, {stated}")
         frequencies = dict.fromkeys(names, float(frequency))
         yield ReductionChoice(error, tuple(reasons), frequencies=frequencies)
-    reasons.append(f"not reduced, it does not pay: {', '.join(names)}")
+    reasons.append(f"not reduced, because it saves too little: {', '.join(names)}")
     nothing = np.zeros(len(modes))
     yield ReductionChoice(nothing, tuple(reasons), frequencies=dict.fromkeys(names))

@@ -51,8 +51,8 @@ def meshes(
         modes = modes_at(model, x)
         if (lost := rounding_error(model.pencil, x[0], max(modes))) > accuracy:
             raise AccuracyError(
-                f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "
-                "that is asked for: a finer mesh makes it worse"
+                f"round-off is {lost:.1e} with {_shown(now)} elements, above the accuracy "
+                f"{accuracy:.1e}, and a finer mesh makes it larger: ask for less"
             )
         if model.meshed is None:
             yield MeshChoice(np.zeros(len(modes)), (), elements=now)
@@ -67,8 +67,8 @@ def meshes(
         now, before = _refined(now, alone, before, accuracy), alone
     worst = max(found.links, key=lambda name: float(found.links[name].max()))
     raise AccuracyError(
-        f"the mesh leaves more than {accuracy:.1e} with {reasons[-1]}; most of it is in {worst}: "
-        "give it more elements"
+        f"the mesh misses the accuracy {accuracy:.1e}, with {reasons[-1]}: give more elements to "
+        f"{worst}, which has most of the error"
     )
 
 
@@ -111,6 +111,6 @@ def _said(error: Floats, modes: Sequence[int], model: Model) -> str:
     return ", ".join(
         f"mode {mode} {about} {100.0 * worst:.2g} % too high"
         if np.isfinite(worst)
-        else f"mode {mode} beyond them"
+        else f"mode {mode} not resolved"
         for mode, worst in zip(modes, error, strict=True)
     )

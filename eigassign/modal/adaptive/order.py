@@ -118,7 +118,7 @@ def expansions(
         pencil, x, 0.05 * accuracy, modes, place=place, tolerable=0.5 * accuracy
     )
     q, y = x[:, : pencil.n_q], x[:, pencil.n_q :]
-    told = f"{beside.reduced.size} vectors, itself right to {beside.worst:.1e}"
+    told = f"{beside.reduced.size} vectors, which is right to {beside.worst:.1e}"
     reduced_hz = beside.reduced.frequencies(q, y)
     x0 = x[central(x)] if start is None else start
     waiting = _first_trials(pencil, x0, modes, orders)
@@ -140,7 +140,7 @@ def expansions(
         several = len(parts) > 1
         reach = "" if several else _reach(part, x, estimate)
         lines[trial.gap, trial.order, several] = _line(parts, error, f"{place(worst)}{reach}")
-        reasons = (f"judged beside a reduced model of {told}", *lines.values())
+        reasons = (f"compared with a reduced model of {told}", *lines.values())
         made = parts, estimate, reasons, looks
         yield ExpansionChoice(*made, cluster_gap=trial.gap, beside=beside)
         if error <= least:
@@ -153,12 +153,12 @@ def expansions(
         if is_new and more.cost < 10 * MOST_TERMS and _more_points_help(errors):
             waiting.append(more)
     where = f"at {place(at)}, (q, y) = {shown_numbers(x[at])}"
-    none = f"none has a number that it vouches for {where}"
-    nearest = f"the nearest left {least:.1e} {where}" if np.isfinite(least) else none
+    none = f"none has an error estimate {where}"
+    nearest = f"the best has an error of {least:.1e} {where}" if np.isfinite(least) else none
     tried = f"of order up to {max(_affordable(pencil, orders))} at up to {MAX_POINTS} points"
     raise AccuracyError(
         f"no expansion {tried if looks < most_looks else 'tried'} reaches {accuracy:.1e}: "
-        f"{nearest}; ask for less, narrow the bounds of the design, or take ea.reduce or ea.fit"
+        f"{nearest}. Ask for less, narrow the bounds of the design, or use ea.reduce or ea.fit"
     )
 
 
@@ -211,7 +211,7 @@ def _line(parts: Sequence[Expansion], error: float, where: str) -> str:
     what = f"order {parts[0].order}"
     what += "".join(f", modes {g[0]}-{g[-1]} as one cluster" for g in groups)
     what += f" at {len(parts)} points" if len(parts) > 1 else ""
-    said = f"error at most {error:.1e}" if np.isfinite(error) else "no number"
+    said = f"error at most {error:.1e}" if np.isfinite(error) else "no estimate"
     return f"{what}: {said} ({where})"
 
 

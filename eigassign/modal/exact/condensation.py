@@ -12,9 +12,8 @@ from eigassign.errors import MechanismError
 
 Floats = NDArray[np.float64]
 NO_MASS = (
-    "a free coordinate moves no mass: give the mechanism mass or lock it; or two coordinates move "
-    "alike at this pose, as those of a spherical joint do where the angle about y is ±90 deg "
-    "(gimbal lock): turn the joint by its orientation, or name another pose"
+    "a free coordinate moves no mass: give the mechanism mass or lock it. Or two coordinates move "
+    "alike, as in a spherical joint at ±90 deg about y (gimbal lock): turn it by its orientation"
 )
 
 

@@ -19,8 +19,8 @@ from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_wi
 
 Floats = NDArray[np.float64]
 FINE = (
-    "the exact modes were not found: so fine a mesh, or stiffnesses so far apart, leave nothing "
-    "but round-off; give the links fewer elements"
+    "the exact modes were not found: so fine a mesh, or stiffnesses so far apart, leave only "
+    "round-off. Give the links fewer elements"
 )
 DENSE_MOST = 4000  # elastic unknowns up to which dense algebra settles what may be round-off
 

@@ -70,7 +70,7 @@ def require_hanging(
     if fallen.any():
         k = int(fallen.argmax())
         name = weight.names[s[int(np.abs(modes[k, :, 0]).argmax())]]
-        what = "would fall" if lam[k, 0] < -noise[k] else "is held by nothing, nor by the weight,"
+        what = "would fall" if lam[k, 0] < -noise[k] else "is held by nothing, the weight included,"
         message = f"{what} {_pose(pencil, x, k, label)}: {FALLS}"
         raise MechanismError(f"coordinates.{name}", message)
 
@@ -102,8 +102,8 @@ def _buckled(pencil: Pencil, theta: Floats, where: str) -> str:
     if not share > 1.0:
         return LIMP
     return (
-        f"buckles under its weight {where}: {1.0 / share:.3g} times the weight is enough; make "
-        "what carries it stiffer or the load lighter, or write `gravity: none`"
+        f"buckles under {1.0 / share:.3g} times its weight {where}: make what carries the load "
+        "stiffer or the load lighter, or write `gravity: none`"
     )
 
 

@@ -93,12 +93,12 @@ class Fit:
         degrees = " x ".join(map(str, found.members.max(axis=0)))
         idle = sum(rate == 0.0 for rate in found.rates)
         lines = [
-            f"{self.quantity} is the polynomial: its coefficients fall fastest",
+            f"fitted is {self.quantity}, whose coefficients decrease fastest",
             *(f"{count} terms: error at most {error:.1e}" for count, error in found.rounds),
             f"degrees {degrees}" + (f", {idle} idle" if idle else ""),
         ]
         if self.floor:
-            lines.append(f"the source itself may be off by {self.floor:.1e}")
+            lines.append(f"what is fitted may be off by {self.floor:.1e} itself")
         return tuple(lines)
 
     @property

@@ -227,7 +227,7 @@ def interpolate(
     asked = len(hz) + len(held)
     if between > max(rounds[-1][1], WORTHLESS if accuracy is None else accuracy):
         raise AccuracyError(
-            f"{asked} values may miss {between:.1e} between them"
+            f"{asked} values may be off by {between:.1e} between them"
             f"{_cause(np.vstack([hz, held]), modes)}"
         )
     error = max(rounds[-1][1], between)

@@ -42,14 +42,11 @@ class FitSource:
 
     def own_error(self, x: Floats, accuracy: float | None) -> float:
         """The error; AccuracyError where it is unknown or leaves nothing of an accuracy."""
-        what, error = "round-off" if self.fine else "the source itself", self.error(x)
+        what, error = "round-off" if self.fine else "what is fitted", self.error(x)
         if not error < np.inf:
-            raise AccuracyError(
-                f"{what} may cost any amount: it vouches for no number in the region"
-            )
+            raise AccuracyError(f"the error of {what} is not known in the region")
         if accuracy is not None and error > SHARE * accuracy:
-            left = f"which leaves nothing of {accuracy:.1e}"
-            raise AccuracyError(f"{what} may cost {error:.1e}, {left}")
+            raise AccuracyError(f"{what} leaves an error of {error:.1e}, above {accuracy:.1e}")
         return error
 
 

@@ -79,8 +79,8 @@ def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePla
     return FigurePlan(
         "sensitivity",
         "Sensitivity",
-        "By how many per cent a frequency changes when a parameter changes by one, at the answer: "
-        "bars are means over the samples, whiskers reach to the largest"
+        "By how many % a frequency changes at the answer when a parameter changes by 1 %: bars are "
+        "means over the samples, whiskers reach to the largest"
         f"{of_many}.",
         "Bars of the relative sensitivity of each target to each parameter.",
         Bars("Sensitivity of the frequencies", "% per %", names, tuple(groups)),

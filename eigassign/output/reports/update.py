@@ -45,8 +45,8 @@ def headline(results: UpdateResults) -> str:
     fit = f"χ² = {of.chi_squared:.3g} with {of.degrees} degrees of freedom{chance}"
     verdict = {
         "fitted": f"Explained: the model fits the measurements ({fit})",
-        "poor_fit": f"NOT EXPLAINED: the measurements are further off than their standard "
-        f"deviations allow ({fit}, below {POOR:g}); the intervals do not hold",
+        "poor_fit": f"NOT EXPLAINED: the measurements are farther off than their standard "
+        f"deviations allow ({fit}, below {POOR:g}), and the intervals do not hold",
         "not_identified": f"NOT IDENTIFIED: {'; '.join(_why_not(results))} ({fit})",
         "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
     }[results.verdict]
@@ -72,12 +72,12 @@ def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table,
 def parameters(results: UpdateResults) -> Table:
     """Parameters before and after, with standard deviations and intervals."""
     caption = (
-        "The deviation is the standard deviation by the linear model; the interval is that of the "
-        "profile likelihood, the other parameters fitted anew at each of its values."
+        "Deviation: standard deviation of the linear model. Interval: 95 % by the profile "
+        "likelihood, with the other parameters fitted again at each value."
     )
     held = [row.name for row in results.parameters if row.held]
     if held and any(row.deviation is not None for row in results.parameters):
-        caption += f" The deviations hold only with {' and '.join(held)} at the bound."
+        caption += f" The deviations assume {' and '.join(held)} at the bound."
     names = "name parameter handy initial value deviation low high remark"
     return facts_table("Parameters", results.parameters, names, caption)
 
@@ -85,8 +85,8 @@ def parameters(results: UpdateResults) -> Table:
 def directions(results: UpdateResults) -> Table:
     """Directions that the measurements cannot tell."""
     caption = (
-        "Changes, in SI units, that alter all measured frequencies together by less than 1.96 "
-        "standard deviations, from bound to bound."
+        "Changes from bound to bound, in SI units, that move all measured frequencies together by "
+        "less than 1.96 standard deviations."
     )
     return facts_table("Not identified", results.unidentified, "words change", caption)
 
@@ -102,8 +102,8 @@ def fit(results: UpdateResults) -> Table:
     """χ² before and after, and the chance of it."""
     names = "initial_chi_squared chi_squared degrees p_value steps ended"
     caption = (
-        "χ² is the sum of squared residuals in standard deviations; p is the chance of so large a "
-        "χ² if the model is right and the deviations are those stated."
+        "χ²: sum of the squared residuals in standard deviations. p: the chance of a χ² this large "
+        "if the model and the stated deviations are right."
     )
     return facts_table("Fit", [results.fit], names, caption)
 
@@ -116,7 +116,7 @@ def measurements(results: UpdateResults, most: int | None) -> Table:
         worst = sorted(shown, key=lambda row: -abs(row.residual))[:most]
         shown = [row for row in shown if row in worst]
     names = "label mode measured_hz deviation_hz initial_hz updated_hz residual is_outlier"
-    caption = "Residuals in standard deviations of the measurement, after updating."
+    caption = "Residuals after updating, in standard deviations of the measurement."
     if more:
         caption += f" The {len(shown)} worst of {len(results.measurements)}."
     return facts_table("Measurements", shown, names, caption)

@@ -16,6 +16,7 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import LostModeError
+from eigassign.facts import capital
 from eigassign.study.accuracy import model_errors
 from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
@@ -47,8 +48,8 @@ Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
 LIMIT = 1e-4  # of a limit, by which it may be missed between samples
-UNTRUSTED = "the expansion is further from exact than validation.max_error allows"
-FINER = "give the links more elements, raise reduce_to, or write auto"
+UNTRUSTED = "the error of the expansion is above validation.max_error"
+FINER = "give the links more elements, raise reduce_to, or write auto for them"
 
 
 def assignment_row(
@@ -113,7 +114,7 @@ def assignment_row(
                 *_too_coarse(targets, exact, of_model, largest, answer.robust is not None),
                 *_missed_between(scene, designs, targets, largest),
                 *(f"{each}: {FINER}" for y in designs for each in _too_stiff(scene, y)),
-                *((f"not clear as far as can be checked: {'; '.join(unproved)}",) * bool(unproved)),
+                *((f"not clear, as far as is checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=beyond,
             conflict=_in_words(scene, answer, optimality.kind == "proved"),
@@ -175,7 +176,7 @@ def _deviated(
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
             yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"
     if robust.error > DEVIATED:
-        yield f"the random deviations are solved to {_percent(robust.error)} only"
+        yield f"the frequencies of random deviations have an error of {_percent(robust.error)}"
 
 
 def _missed_between(
@@ -193,12 +194,12 @@ def _missed_between(
         try:
             error = max(error, *(followed_between(scene, one, y) for y in designs))
         except LostModeError as lost:
-            yield f"{one.label} is not known between the samples, which are far apart: {lost}"
+            yield f"{one.label} is not known between the samples: {lost}"
             continue
         if error > (accepted if one.is_goal else LIMIT):
             yield (
-                f"{one.label} is missed by {100 * error:.3g} % between the samples, which are far "
-                "apart: give the trajectory more of them"
+                f"{one.label} is missed by {100 * error:.3g} % between samples: give the "
+                "trajectory more samples"
             )
 
 
@@ -212,7 +213,7 @@ def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
         w, finer = (one.way.at(q[one.rows], y, each) for each in (False, True))
         missed = float((finer + np.maximum(finer - w, 0.0) / 3.0).max()) / float(one.upper[0]) - 1.0
         if one.violation(one.amount(y), 0.0) <= ON and missed > LIMIT:
-            yield f"{one.label}: twice the elements and whole links miss it by {_percent(missed)}"
+            yield f"{one.label}: missed by {_percent(missed)} with twice the elements"
 
 
 def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
@@ -277,11 +278,11 @@ def _too_coarse(
             worst, label, raised = max((worst, label, raised), (stake, target.label, too_high))
     if worst <= accepted:
         return
-    how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by more than can be told"
+    how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by an unknown amount"
     missed = f", so that it may be missed by {100 * worst:.3g} %" if np.isfinite(raised) else ""
     yield (
-        f"{label}: mesh and reduced links raise the frequencies {how}{missed}, and "
-        f"{100 * accepted:.3g} % are accepted: {FINER}"
+        f"{label}: mesh and reduced links raise the frequencies {how}{missed}; accepted are "
+        f"{100 * accepted:.3g} %. {capital(FINER)}"
     )
 
 
@@ -301,11 +302,11 @@ def _undecided(
         if least > (accepted if target.asked.is_goal else MET):
             continue
         missed = target.error.exact.max_relative
-        how = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "more than can be told"
+        how = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "an unknown amount"
         yield (
             target.label,
             f"{target.label}: missed by {100 * missed:.3g} %, and mesh and reduced links raise the "
-            f"frequencies by {how}: {FINER}",
+            f"frequencies by {how}. {capital(FINER)}",
         )
 
 
@@ -319,12 +320,10 @@ def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
         if not of_model.clear:
             yield row.label
             continue
-        how = (
-            "by more than can be told" if row.raised is None else f"by up to {_percent(row.raised)}"
-        )
+        how = "an unknown amount" if row.raised is None else f"up to {_percent(row.raised)}"
         yield (
-            f"{row.label} (clear by {_percent(of_model.room)} as modelled, where mesh and reduced "
-            f"links raise the mode above it {how}: {FINER})"
+            f"{row.label} (the model is clear by {_percent(of_model.room)}, but mesh and reduced "
+            f"links raise the mode above the band by {how}: {FINER})"
         )
 
 
@@ -406,8 +405,8 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
             return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
         gap = search.relative_gap
         words = (
-            f"the best of the catalogues to {100 * gap:.2g} % of the objective of the linearised "
-            f"problem only, by branch and bound in {search.nodes} nodes"
+            f"the best of the catalogues for the linearised problem only, to {100 * gap:.2g} % of "
+            f"its objective, by branch and bound in {search.nodes} nodes"
         )
         return OptimalityRow("bounded", None, gap, words)
     best, chosen = found.best, found.chosen
@@ -425,7 +424,7 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
         return OptimalityRow("local", best.stationarity, None, words)
     words = _of_starts(found)
     if found.untried:
-        words += f"; {found.untried} choices of the numbers of modes below the bands were not tried"
+        words += f"; {found.untried} choices of how many modes are below the bands were not tried"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
     return OptimalityRow("local", best.stationarity, None, words)
@@ -441,11 +440,11 @@ def _of_starts(found: Found) -> str:
     words = f"the {which} that {many} found"
     exact = found.variant.problem.is_error and best.seen.violation <= MET
     if exact and best.objective <= NOTHING:
-        return f"{words}; nothing that is asked is missed, so that no design is better"
+        return f"{words}; all targets are met, so that no design is better"
     if not np.isfinite(tally.unseen):
-        return f"{words}, too few to tell how many more there are"
+        return f"{words}; too few starts to estimate how many more there are"
     unseen = f"{tally.unseen:.1g}" if tally.unseen < 1.0 else f"{tally.unseen:.0f}"
-    return f"{words}; about {unseen} more are expected unseen"
+    return f"{words}; about {unseen} more are expected"
 
 
 def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:
@@ -458,12 +457,12 @@ def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> Opt
             words += ", or misses them by less"
         most = best.objective + EQUAL * abs(best.objective)
         if equal := sum(o.seen.violation <= MET and o.objective <= most for o in found.optima[1:]):
-            words += f"; {equal} more in the list of the best are as good"
+            words += f"; {equal} more of the best are as good"
         return OptimalityRow("proved", best.stationarity, 0.0, words)
     how = f"by branch and bound in {search.nodes} nodes"
     if chosen.each:
-        how = "each as far as it may be better, its other parameters from two starts"
-    words = f"the best found of {among}, {how}: others may be better"
+        how = "the other parameters of each from two starts"
+    words = f"the best found of {among}, {how}; others may be better"
     return OptimalityRow("local", best.stationarity, None, words)
 
 
@@ -507,12 +506,12 @@ def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> 
     for limit in row.active:
         on = f"lies on its {limit.side} {limit.kind} of"
         if limit.kind == "target":
-            on = "misses, by as little as was found," if limit.name in missed else "just meets"
+            on = "misses, by the least that was found," if limit.name in missed else "just meets"
         grouped.setdefault(on, []).append(limit.name)
     notes = [f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items()]
     if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
         notes.append(
-            f"{answer.one_shot.undetermined} direction(s) of the design change no target: there "
-            "the initial design is kept as nearly as the limits allow"
+            f"{answer.one_shot.undetermined} direction(s) of the design change no target: along "
+            "them the initial design is kept as far as the limits allow"
         )
     return notes

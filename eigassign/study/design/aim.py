@@ -48,8 +48,8 @@ def aim_row(
         if asked.trajectory:
             where = f" along {asked.trajectory!r}"
         if (too_high := of_model[asked.mode]) > WITHIN:
-            said = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "an unknown part"
-            kept += f"; mesh and reduced links put it too high by {said}"
+            said = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "an unknown amount"
+            kept += f"; mesh and reduced links raise it by {said}"
         return _in_words(row, f"mode {asked.mode} is at least {row.after}{where}", kept)
     if aim == "widest":
         before, after = (min(_rooms(found, wanted, y)) for y in designs)

@@ -111,7 +111,7 @@ def find_answer(
     notes += idle_notes(scene.model.y_names, found, scene.initial)
     notes += _band_notes(found)
     if found.lost:
-        notes.append(f"{len(found.lost)} designs were passed over, for {found.lost[-1]}")
+        notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction, robust)
 
@@ -119,12 +119,12 @@ def find_answer(
 def _band_notes(found: Found) -> Iterator[str]:
     """Say what came of the numbers of modes below the bands, where there was a choice."""
     if found.choices > 1:
-        stand = f"{found.searches} searches, each with some of the bands, stand for the others"
+        rest = f"{found.searches} searches, each with some of the bands, cover the others"
         if found.untried == found.choices:
-            stand = f"{found.searches} searches with some of the bands were ended before"
+            rest = f"{found.searches} searches with some of the bands were stopped before"
         yield (
-            f"of {found.choices} choices of the numbers of modes below the bands "
-            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: {stand}"
+            f"of {found.choices} choices of how many modes are below each band "
+            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: {rest}"
         )
     for one in found.variants[:SAID] if len(found.variants) > 1 else ():
         below = ((band, k) for band, k in one.variant.below if k is not None)

@@ -231,8 +231,8 @@ def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[
     idle = [k for k in free[still] if _changes_nothing(problem, best, np.eye(len(width))[k])]
     away = np.where(width > 0.0, (best.y - initial) / np.where(width > 0.0, width, 1.0), 0.0)
     if idle:
-        kept = ": left as they are" if np.abs(away[idle]).max() <= LEAST else ""
-        yield f"nothing that is asked depends on {', '.join(names[k] for k in idle)}{kept}"
+        kept = ": left as it was" if np.abs(away[idle]).max() <= LEAST else ""
+        yield f"no target depends on {', '.join(names[k] for k in idle)}{kept}"
     moving = free[~still]
     V = _null_space(J[:, ~still] / size[~still])
     together = np.zeros((len(width), V.shape[1]))  # in shares of the bounds
@@ -242,7 +242,7 @@ def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[
         least = np.abs(np.linalg.qr(together)[0].T @ away).max() <= LEAST
         change = ": their smallest change is taken" if least else ""
         listed = ", ".join(names[k] for k in alike)
-        yield f"{listed} have the same effect on what is asked{change}"
+        yield f"{listed} have the same effect on all targets{change}"
 
 
 def _changes_nothing(problem: DesignProblem, best: Optimum, d: Floats) -> bool:

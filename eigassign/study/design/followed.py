@@ -100,14 +100,14 @@ class Follower:
             except MoreModesError:
                 count *= 2
             except LostModeError as lost:
-                raise self._lost(lost, "on the way from the design that names it", y) from None
+                raise self._lost(lost, "on the way from the design that it is of", y) from None
 
     def _lost(self, lost: LostModeError, where: str, y: Floats) -> LostModeError:
         nearest = " and ".join(map(str, lost.candidates)) or "none of the modes"
         message = (
             f"{self.mode.name} is lost {where} with {shown_point(self.model.y_names, y)}: no mode "
             f"has its shape there; nearest are {nearest}. Leave out that part of the trajectory "
-            "(during), narrow the bounds, or give the target to a numbered mode"
+            "(during), narrow the bounds, or name a mode by its number"
         )
         return LostModeError(lost.candidates, lost.step, message)
 

@@ -86,9 +86,8 @@ def _require_near(scene: Scene, l0: Floats) -> None:
         k, column = (int(i) for i in bad[0])
         problem = scene.file.problem(
             "expansion.q",
-            f"too far from the motion: the expansion predicts a negative λ of mode "
-            f"{scene.expansions.modes[column]} at {scene.path.where(k)}; "
-            "give a pose of the trajectory, or auto",
+            f"gives mode {scene.expansions.modes[column]} a negative λ at {scene.path.where(k)}, "
+            "too far from the motion: give a pose of the trajectory, or auto",
         )
         raise AccuracyError(str(problem))
 

@@ -71,7 +71,7 @@ def robust_optimum(
         try:
             worst = look.worst()
         except EigassignError as why:
-            message = f"a deviation within the tolerances has no answer: {why}"
+            message = f"with a deviation within the tolerances the mechanism has no modes: {why}"
             raise AccuracyError(message) from why
         seen.append((found, worst))
         solves += found.exact_solves + look.response.exact_solves
@@ -80,7 +80,7 @@ def robust_optimum(
         if not more or ended:
             break
         scenarios += more
-        progress(f"robust: what is asked shall hold for {len(scenarios)} deviations too")
+        progress(f"robust: the targets are to hold for {len(scenarios)} deviations too")
     (nominal, before), found = seen[0], replace(found, exact_solves=solves)
     progress(f"robust: {look.draws} random deviations")
     drawn, error = look.drawn(worst)

@@ -90,15 +90,15 @@ def _word(facts: Facts) -> tuple[str, str]:
         if facts.unproved:
             return "do_not_use", "; ".join(facts.unproved)
         if facts.is_optimal:
-            checked = ", also at all deviations within the tolerances that were checked"
+            checked = ", also for all deviations within the tolerances that were checked"
             return "reached", (facts.aim or "every target is met") + checked * facts.robust
-        far = [f"{facts.aim}; not known to be first-order optimal"]
+        far = [f"{facts.aim}; a better design may be near (not first-order optimal)"]
     (before_violation, before), (violation, after) = facts.merits
     gain = IMPROVED * before
     if facts.aim:  # all limits are kept: whatever is gained is one
         gain = GAINED * abs(before)
     if violation > MET:
-        return "do_not_use", f"no design was found that meets what is asked: {_all(far)}"
+        return "do_not_use", f"no design was found that meets all limits: {_all(far)}"
     if before_violation > MET or after < before - gain:
         though = "" if worst is None else _though(worst)
         return "improved", f"better than the initial design; {_all(far)}{though}"
@@ -112,9 +112,8 @@ def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
     error = max((target.error.exact.max_relative for target in wanted), default=0.0)
     if facts.max_error is None or error <= facts.max_error:
         return None
-    return f"worst error {100 * error:.3g} %, over the {100 * facts.max_error:g} % of " + (
-        "assignment.max_error"
-    )
+    limit = f"{100 * facts.max_error:g} % of assignment.max_error"
+    return f"worst error {100 * error:.3g} %, above the {limit}"
 
 
 def _beside(conflict: str, far: Sequence[str]) -> str:

@@ -108,7 +108,7 @@ def _anatomies(
     try:
         found = tuple(anatomies(scene.model, q, y, of_samples, where))
     except EigassignError as error:
-        notes.append(f"what the missed modes are is not known: {error}")
+        notes.append(f"missed modes are not explained: {error}")
         return ()
     notes += (one.words for one in found)
     return found
@@ -121,7 +121,7 @@ def _tolerance(
     try:
         found = study_tolerance(scene, wanted, answer.y, exact)
     except EigassignError as error:
-        notes.append(f"tolerances not studied: {error}")
+        notes.append(f"tolerances are not studied: {error}")
         return None
     if found is not None:
         notes.append(found.words)

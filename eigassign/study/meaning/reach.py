@@ -103,13 +103,12 @@ def unreachable(
             k = int(left.argmax())
             if left[k] > allowed:
                 low, high = (float(values[k]) for values in w.curve_range(*ranges))
-                how = (
-                    f"within the bounds it lies between {low:.4g} and {high:.4g} Hz there (proved)"
-                )
+                how = f"between {low:.4g} and {high:.4g} Hz within the bounds, proved"
                 free = not (others or scene.constraints or scene.file.design.catalogues)
                 best: float | None = low if low > w.lower[k] else high
                 if not free or len(w.terms) > 1:  # the corners need not keep all limits
                     best = None if listed else _nearest(scene, w, others, k, y, allowed)
+                    how = how if best is None else f"found by a search; it is {how}"
                 yield _words(scene, w, k, best, how)
                 continue
         if w.terms and (others or not known) and not listed:
@@ -121,13 +120,11 @@ def _words(scene: Scene, wanted: Requirement, k: int, reached: float | None, how
     asked = float(wanted.hz[k])
     curve = wanted.curve_name if len(wanted.terms) == 1 else f"the {wanted.axis}"
     where = f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}"
+    said = f"{where}: {asked:.4g} Hz was asked, "
     if reached is None:
-        return f"{where}: {asked:.4g} Hz was asked; {how}"
+        return f"{said}{curve} is {how}"
     most = "highest" if reached < asked else "lowest"
-    return (
-        f"{where}: the {most} that {curve} reaches there is {reached:.4g} Hz; {asked:.4g} Hz was "
-        f"asked; {how}"
-    )
+    return f"{said}the {most} that {curve} reaches there is {reached:.4g} Hz ({how})"
 
 
 def _searched(
@@ -143,7 +140,7 @@ def _searched(
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
         nearest = _nearest(scene, wanted, others, k, y, allowed)
         if nearest is not None and abs(nearest / wanted.hz[k] - 1.0) > allowed:
-            how = f"no design found from {STARTS} starts within the limits comes nearer"
+            how = f"found by a search from {STARTS} starts within the limits"
             yield _words(scene, wanted, k, nearest, how)
             return
 

@@ -56,8 +56,7 @@ def study_tolerance(
         if not pencil.is_dense:
             if own:
                 raise AccuracyError(
-                    f"modes of more than {pencil.dense_limit} unknowns are not followed through "
-                    "tolerances"
+                    f"modes followed by their shape need at most {pencil.dense_limit} unknowns"
                 )
             ranges = reduced_ranges(scene, y, exact.hz.shape[1])
     lowest, highest = exact, exact
@@ -96,7 +95,7 @@ def _rows(
         if aim.is_aim:
             least = aim.curve(exact).min(), row.lowest_hz.min()
             changes.insert(0, "mode {} at least {:.4g} → {:.4g} Hz".format(aim.mode, *least))
-    words = f"with every tolerance at its worst: {', '.join(changes)} ({tried})"
+    words = f"with all tolerances at their worst: {', '.join(changes)} ({tried})"
     return ToleranceRows(rows, before, after, words)
 
 
@@ -123,8 +122,8 @@ def reduced_ranges(scene: Scene, y: Floats, count: int) -> Ranges:
         hz, error = reduced.frequencies(q, y), reduced.error_estimate(q, y)
         if not error.max() <= DOUBTFUL:
             raise AccuracyError(
-                "the tolerances are too wide for the reduced model that they are judged by: its "
-                f"error may be {100 * error.max():.3g} %; state smaller ones"
+                "they are too wide for the reduced model that judges them, whose error may be "
+                f"{100 * error.max():.3g} %: state smaller ones"
             )
         low, high = hz * (1.0 - error), hz * (1.0 + error)
         return Solved(low, nothing, numbers), Solved(high, nothing, numbers)

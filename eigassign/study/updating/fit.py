@@ -351,17 +351,17 @@ def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bo
     ``relative`` is the change by the values, None where one of these is 0.
     """
     if len(change) == 1:
-        return f"{next(iter(change))} can change from bound to bound unnoticed"
+        return f"{next(iter(change))} can change from bound to bound without effect"
     *most, last = change
-    together = f"{', '.join(most)} and {last} can change together unnoticed"
+    together = f"{', '.join(most)} and {last} can change together without effect"
     if relative is not None and np.ptp(relative) <= 1e-2 * np.abs(relative).max():
-        return f"{together}, all by the same per cent"
+        return f"{together}, all by the same percentage"
     if len(change) == 2 and (one_unit or relative is None):
         (a, along_a), (b, along_b) = change.items()
         factor = -along_a / along_b  # a + factor · b stays
         sign = "+" if factor > 0.0 else "−"
         size = f"{abs(factor):.3g} " if abs(abs(factor) - 1.0) > 5e-4 else ""
-        return f"{a} and {b} are told only together, as {a} {sign} {size}{b}"
+        return f"{a} and {b} are determined only together, as {a} {sign} {size}{b}"
     if relative is None:
         sizes = [f"{value:.3g} (SI)" for value in change.values()]
     else:
@@ -378,10 +378,7 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     poses = f" at {len(problem.q)} poses" if several else ""
     yield f"{len(problem.measured)} measured frequencies{poses}, {len(found.y)} parameters"
     if found.rounds > 1:
-        yield (
-            "the first fit was a local minimum: a profile came upon a better explanation, from "
-            "which the fit was made anew"
-        )
+        yield "the first fit was a local minimum: the fit began again from a better one"
     if not np.array_equal(
         start := problem.case.initial_design, np.clip(start, problem.lower, problem.upper)
     ):
@@ -389,7 +386,7 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     names = problem.model.y_names
     held = [f"{n} at its {side} bound" for n, side in zip(names, found.held, strict=True) if side]
     if held:
-        yield f"deviations and covariance hold only with {' and '.join(held)}; intervals do not"
+        yield f"deviations and covariance assume {' and '.join(held)}; intervals do not"
     minima = f"{found.met} distinct minima" if found.met > 1 else "one minimum"
     left = unseen(found.starts, found.met)
     more = f"{left:.2g} more are expected" if np.isfinite(left) else "more are likely"
@@ -397,9 +394,9 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     design = problem.case.file.design
     if design.constraints or design.mass is not None or design.torque:
         what = "the mass, of drives" if design.torque else "the mass"
-        yield f"limits of {what} and linear ones say what shall be: they are left aside here"
+        yield f"linear limits and limits of {what} are left aside: a fit has none"
     if design.catalogues:
-        yield "lists of values and choices count as ranges from their smallest to largest value"
+        yield "of lists of values and choices only the smallest and largest value count"
 
 
 def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
@@ -411,9 +408,8 @@ def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     worst = int(np.argmax(share))
     if share[worst] > 0.5:  # half of what the measurement itself leaves open
         yield (
-            f"the mesh makes the frequency of {problem.measured[worst].label} wrong by about "
-            f"{share[worst]:.2g} of its standard deviations, and the parameters take that up: "
-            "give the links more elements, or auto"
+            f"the mesh puts the frequency of {problem.measured[worst].label} off by "
+            f"{share[worst]:.2g} standard deviations: give the links more elements, or auto"
         )
 
 
@@ -431,6 +427,6 @@ def _neighbours(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     if doubtful:
         more = f" and {len(doubtful) - 3} more" if len(doubtful) > 3 else ""
         yield (
-            f"{', '.join(doubtful[:3])}{more}: a neighbouring mode is within 1 %, and modes are "
-            "numbered by size: make sure that the number is that of the mode measured"
+            f"{', '.join(doubtful[:3])}{more}: a neighbouring mode is within 1 %. Modes are "
+            "numbered by size: check that the number is that of the measured mode"
         )

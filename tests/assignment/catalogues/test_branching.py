@@ -193,7 +193,7 @@ def test_without_any_possible_combination_the_lists_are_named():
     with pytest.raises(InfeasibleError, match="'list0', 'list1', 'list2'") as e:
         search_catalogue(impossible)
     assert e.value.constraints == ("list0", "list1", "list2")
-    with pytest.raises(AccuracyError, match="was found in 1 nodes"):
+    with pytest.raises(AccuracyError, match="met all limits in 1 nodes"):
         search_catalogue(impossible, seconds=0.0)
 
 

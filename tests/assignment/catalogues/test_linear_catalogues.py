@@ -269,7 +269,7 @@ def test_a_limit_reached_before_anything_was_found_is_said():
     total = LinearConstraint("total", np.ones(12), *[rows[:, 4].sum() + s * 1e-7 for s in (-1, 1)])
     l0, slope = smooth(1, 12)
     p = program(l0, slope, np.zeros(12), np.ones(12), [total])
-    with pytest.raises(AccuracyError, match="found in 1 nodes"):
+    with pytest.raises(AccuracyError, match="met all limits in 1 nodes"):
         solve_catalogue(p, catalogues, seconds=0.0)
 
 

@@ -46,6 +46,14 @@ SLIPS = {
     "start outside the bounds": ("d: {parameter: sections.rod.diameter, min: 20 mm", "¦d: {parameter: sections.rod.diameter, min: 31 mm", "initial value 0.03 m of sections.rod.diameter is outside [0.031, 0.04] m"),
     "bounds in mm": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm", "¦d: {parameter: sections.rod.diameter, min: 20, max: 40", "[20, 40] m; a bare number is in m: was [20, 40] mm meant?"),
     "bounds in g": ("m: {parameter: bodies.tool.mass, min: 0, max: 250 g", "¦m: {parameter: bodies.tool.mass, min: 50, max: 250", "[50, 250] kg; a bare number is in kg: was [50, 250] g meant?"),
+    "payload in g": ("mass: 0.1}", "¦mass: 1000}", "1000 kg would strain the beam 'hand' that carries it by 0.8"),
+    "largest payload in g": ("m: {parameter: bodies.tool.mass, min: 0, max: 250 g}", "m: {parameter: bodies.tool.mass, min: 0, ¦max: 250}", "250 kg would strain the beam 'hand'"),
+    "payload of a load case in g": ("tip: hand.end", "tip: hand.end\n  set: {bodies.tool.inertia: 0, ¦bodies.tool.mass: {add: 800}}", "800 kg would strain"),
+    "listed values in mm": ("min: 20 mm, max: 40 mm", "¦values: [25, 30]", "25 m is outside 1e-05 … 5: is the unit right? A bare number is in m: write 25 mm"),
+    "one bound in mm": ("min: 20 mm, max: 40 mm", "min: 20 mm, ¦max: 40", "40 m is outside 1e-05 … 5"),
+    "listed values in mm, the start among them": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "¦d: {parameter: sections.rod.diameter, values: [25, 35]}", "was [25, 35] mm meant?"),
+    "listed stiffness in kN m/rad": ("  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "  ¦d: {parameter: coordinates.q2.drive.stiffness, values: [0.08, 0.12]}", "a bare number is in N m/rad: was [0.08, 0.12] kN m/rad meant?"),
+    "choices in mm": ("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "{choices: {a: {¦sections.rod.diameter: 25}, b: {sections.rod.diameter: 30}}}", "25 m is outside"),
     "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
     "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),
 }
@@ -105,6 +113,9 @@ def test_an_ordinary_arm_gives_no_warning() -> None:
         ("max: 200 g", "min: 250 g"),  # just within the bounds
         ("waypoints: [[0.3, 0.1]", "waypoints: [[-90, 0.1]"),
         ("length: 0.6", "length: 70"),
+        ("min: 20 mm, max: 40 mm", "min: 1 mm, max: 4"),
+        ("mass: 0.1}", "mass: 0.1}\n    base: {at: upper.start, mass: 2000}"),  # on its support
+        ("max: 250 g", "max: 15"),  # 26 times the beam, and strained by 0.01 %
     ],
 )
 def test_an_unusual_but_possible_value_gives_no_warning(old: str, new: str) -> None:

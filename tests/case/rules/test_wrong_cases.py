@@ -51,7 +51,7 @@ MECHANISM = [
     Wrong("half an element", "elements: 3", "¦elements: 3.5", "mechanism.links.fore.elements", "expected a whole number, got 3.5"),
     Wrong("boolean elements", "elements: 3", "¦elements: true", "mechanism.links.fore.elements", "expected a whole number, got true"),
     Wrong("too many elements", "elements: 3", "¦elements: 100001", "mechanism.links.fore.elements", "must be <= 100000"),
-    Wrong("too many elements in all", "elements: 3", "¦elements: 20000", "mechanism.links.fore.elements", "in the whole mechanism 20005 elements; more than 20000 take minutes"),
+    Wrong("too many elements in all", "elements: 3", "¦elements: 20000", "mechanism.links.fore.elements", "the mechanism has 20005 elements: more than 20000 take minutes"),
     Wrong("unknown material", "material: alu, section: pipe", "¦material: allu, section: pipe", "mechanism.links.fore.material", "did you mean 'alu'"),
     Wrong("unknown section", "section: pipe", "¦section: pip", "mechanism.links.fore.section", "did you mean 'pipe'"),
     Wrong("material is a number", "material: alu, section: pipe", "¦material: 5, section: pipe", "mechanism.links.fore.material", "expected text"),

@@ -54,7 +54,7 @@ TARGETS = {
     "gap downwards": ("{gap: {¦between: [2, 1], at_least: 2}}", "gap.between", "the lower mode comes first: [1, 2]"),
     "gap of a mode": ("{gap: {between: [1, 2], at_least: 2}, ¦mode: 1}", "mode", "unknown key; allowed: weight"),
     "part backwards": ("{mode: 1, at_least: 3, ¦during: [1, 0]}", "during", "the first time must be before the last"),
-    "part outside": ("{mode: 1, at_least: 3, ¦during: [2, 3]}", "during", "is no part of it: the trajectory lasts from 0 to 1 s"),
+    "part outside": ("{mode: 1, at_least: 3, ¦during: [2, 3]}", "during", "lies outside: the trajectory lasts from 0 to 1 s"),
     "profile of a part that ends early": ("{mode: 1, at_least: {¦time: [0, 0.5], frequency: [1, 2]}, during: [0.1, 0.6]}", "at_least.time", "covers 0 … 0.5 s only; the trajectory is wanted from 0.1 to 0.6 s"),
     "profile of a harmonic that ends early": ("{keep_out: {harmonic: 2, of: {¦time: [0, 0.5], frequency: [1, 2]}, margin: 1 %}}", "keep_out.of.time", "the trajectory lasts from 0 to 1 s"),
     "no such file": ("{mode: 1, at_least: {¦file: no.csv}}", "at_least.file", "no such file"),
@@ -111,18 +111,18 @@ ASSIGNMENT = {
     "no time": ("{¦seconds: 0}", "seconds", "must be > 0 s"),
     "no error": ("{¦max_error: 0 %}", "max_error", "must be > 0"),
     "unknown key": ("{¦step: 3}", "step", "did you mean 'steps'"),
-    "worst case in one shot": ("{method: one_shot, ¦objective: worst_case}", "objective", "is not least_squares; method: one_shot takes frequency targets"),
+    "worst case in one shot": ("{method: one_shot, ¦objective: worst_case}", "objective", "is not least_squares: method: one_shot takes only frequency targets"),
 }
 NOT_OF_OBJECTIVES = {
     "highest of nothing": ("{objective: {¦highest: none}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest", "expected a whole number, got 'none'"),
     "highest of the zeroth": ("{objective: {¦highest: 0}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest", "must be >= 1"),
     "highest without mode": ("{objective: {¦highest: {}}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest.mode", "required key is missing"),
     "highest nowhere": ("{objective: {highest: {mode: 1, ¦trajectory: go}}}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective.highest.trajectory", "go"),
-    "frequency for the lightest": ("{objective: lightest}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective lightest comes near to no frequency: write at_least, at_most or both"),
-    "frequency of the highest": ("{objective: {highest: 1}}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective highest comes near to no frequency"),
-    "nothing to be wide": ("{¦objective: widest}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective", "there is no keep_out or gap target"),
-    "highest in one shot": ("{method: one_shot, ¦objective: {highest: 1}}", "targets:\n" + T, "", "assignment.objective", "take method: sequential"),
-    "price in one shot": ("{method: one_shot}", D, "  ¦mass: {price: 3}\n", "design.mass", "prices the mass; method: one_shot"),
+    "frequency for the lightest": ("{objective: lightest}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective lightest takes no wanted frequency: write at_least, at_most or both"),
+    "frequency of the highest": ("{objective: {highest: 1}}", T, "  - {mode: 1, ¦frequency: 190 Hz}\n", "targets[0].frequency", "objective highest takes no wanted frequency"),
+    "nothing to be wide": ("{¦objective: widest}", T, "  - {mode: 1, at_least: 190 Hz}\n", "assignment.objective", "widest needs a target with keep_out or gap"),
+    "highest in one shot": ("{method: one_shot, ¦objective: {highest: 1}}", "targets:\n" + T, "", "assignment.objective", "write method: sequential"),
+    "price in one shot": ("{method: one_shot}", D, "  ¦mass: {price: 3}\n", "design.mass", "prices the mass: method: one_shot"),
     "price of a length": ("{}", D, "  mass: {¦price: 3 / mm}\n", "design.mass.price", "mm"),
     "price in words": ("{}", D, "  mass: {¦price: dear}\n", "design.mass.price", "expected a number, got text 'dear'"),
     "price of nothing": ("{}", D, "  mass: {¦price: 0}\n", "design.mass.price", "must be > 0"),
@@ -169,7 +169,7 @@ def test_one_shot_refuses_by_name_what_its_program_cannot_take(
     old: str, new: str, path: str, tmp_path: Path
 ) -> None:
     text = edited(old, new) + "assignment: {method: one_shot}\n"
-    check(text, path, "take method: sequential", tmp_path)
+    check(text, path, "write method: sequential", tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -199,4 +199,9 @@ def test_a_part_is_of_a_named_trajectory_where_there_are_several(tmp_path: Path)
     several = "trajectory:\n" + 2 * "  - {q: [[0, 0], [1, 1]], duration: 1}\n"
     target = "  - {mode: 1, at_least: 3, ¦during: [0.1, 0.2]}\n"
     text = edited(motion, several).replace(T, target)
-    check(text, "targets[0].during", "is a part of one trajectory: name it (1, 2)", tmp_path)
+    check(
+        text,
+        "targets[0].during",
+        "needs the trajectory that is meant, as trajectory (1, 2)",
+        tmp_path,
+    )

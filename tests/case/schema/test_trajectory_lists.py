@@ -85,7 +85,7 @@ WRONG = {
     "the same name but for case": (
         ("weight: 2.5", "¦name: Pick"),
         "trajectory[1].name",
-        "'pick' (they name files",
+        "'pick' (some file systems",
     ),
     "no weight": (("weight: 2.5", "¦weight: 0"), "trajectory[1].weight", "must be > 0"),
     "unknown key": (("weight: 2.5", "¦wait: 2.5"), "trajectory[1].wait", "unknown key"),
@@ -188,6 +188,6 @@ def test_a_branch_of_a_passive_joint_is_refused_and_the_driven_ones_named() -> N
     path = "  tip: left_arm.end\n  waypoints: [[0.1, 0.3], [0.12, 0.3]]\n"
     path += "  branch: {left_elbow: [0, 1]}\n\n"
     rest = rest[rest.index("design:") :]
-    with pytest.raises(CaseError, match=r"no coordinate moves this joint .*left_motor") as caught:
+    with pytest.raises(CaseError, match=r"no coordinate moves this joint, .*left_motor") as caught:
         read(f"{head}trajectory:\n{path}{rest}")
     assert [p.path for p in caught.value.problems] == ["trajectory.branch.left_elbow"]

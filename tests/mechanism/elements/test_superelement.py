@@ -235,7 +235,7 @@ def test_a_part_with_something_loose_inside_is_refused(tmp_path: Path) -> None:
     wide[1][-3:, -3:] = 0.1 * np.eye(3)
     files = write(tmp_path, "npy", *wide)
     tree = arm("planar", {"part": part("planar", files)})
-    with pytest.raises(MechanismError, match=r"links\.part: is limp inside"):
+    with pytest.raises(MechanismError, match=r"links\.part: is loose inside"):
         _ = built(tree, tmp_path / "case.yaml").pencil
 
 

@@ -63,7 +63,7 @@ def test_a_five_bars_tool_follows_its_path(tip: str, path: str) -> None:
     motion = shipped("five_bar", wish).trajectory
     np.testing.assert_allclose(motion.q, cranks(motion.tip), atol=1e-9)
     np.testing.assert_allclose(motion.tip[[0, -1]], np.array(CUT)[[0, -1]], atol=1e-10)
-    assert "nearest to where the loops are put together" in motion.notes[0]
+    assert "the solution nearest to mechanism.assembly is taken" in motion.notes[0]
 
 
 def test_a_start_in_the_loops_saves_the_note() -> None:

@@ -86,5 +86,5 @@ def test_reached_is_every_target_met_every_limit_kept_and_nothing_unproved() -> 
     assert "a 2, at most 1" in judged(met, 1.0, 0.5, limits=[broken]).reason
     assert judged(met, 1.0, 0.5, limits=[broken]).word == "improved"
     assert judged(met, 1.0, 0.5, max_error=0.005).shortcoming == (
-        "worst error 1 %, over the 0.5 % of assignment.max_error"
+        "worst error 1 %, above the 0.5 % of assignment.max_error"
     )

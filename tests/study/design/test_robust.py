@@ -166,7 +166,7 @@ def test_combinations_of_catalogues_hold_for_every_deviation() -> None:
     ("design", "assignment", "expected"),
     [
         (ROD.replace(", tolerance: 2 %", ""), ROBUST, "assignment.robust: no parameter has a tol"),
-        (ROD, "assignment: {robust: true, method: one_shot}\n", "robust: is no limit of a quadrat"),
+        (ROD, "assignment: {robust: true, method: one_shot}\n", "robust: is not linear in the des"),
     ],
 )
 def test_robust_where_it_cannot_be_is_refused(design: str, assignment: str, expected: str) -> None:

@@ -193,7 +193,7 @@ def test_designs_that_buckle_are_no_designs(tmp_path: Any, design: str, asked: s
     (tmp_path / "mast.yaml").write_text(MAST + design + asked)
     found = ea.assign(ea.load_case(tmp_path / "mast.yaml")).results
     assert found.assignment.verdict == "reached"
-    assert any("the initial one, for the middle" in note for note in found.notes)
+    assert any("the initial one, because the middle of the bounds" in note for note in found.notes)
 
 
 def test_a_model_is_exported_for_the_designs_that_stand(tmp_path: Any) -> None:

@@ -52,8 +52,8 @@ SECTION = ("bodies.tool_mass.mass, min: 0, max: 250 g", "sections.rod.area, min:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ((), "(proved)"),
-        ((SECTION,), "no design found from 3 starts"),
+        ((), "within the bounds, proved)"),
+        ((SECTION,), "(found by a search from 3 starts within the limits)"),
     ],
 )
 def test_a_target_that_no_design_reaches_is_named_with_what_can_be(
@@ -81,7 +81,7 @@ def test_out_of_reach_is_the_verdict_of_the_run(tmp_path: Path) -> None:
     assert results.assignment is not None
     assert results.assignment.verdict == "unreachable"
     assert "the highest that mode 1 reaches there is" in results.assignment.reason
-    assert "within the bounds it lies between" in results.assignment.reason
+    assert "Hz within the bounds, proved)" in results.assignment.reason
 
 
 M1, M2 = "max: 250 g}\n  m2", "max: 250 g}\n\nexp"
@@ -153,7 +153,7 @@ def test_ranges_of_a_reduced_model_hold_the_exact_frequencies(tmp_path: Path) ->
 
 def test_a_reduced_model_that_doubts_itself_bounds_nothing(tmp_path: Path) -> None:
     ranges = reduced_ranges(scene_of(tmp_path, changed(SHORT, SECTION)), np.array([0.2, 7e-4]), 3)
-    with pytest.raises(AccuracyError, match="the tolerances are too wide for the reduced model"):
+    with pytest.raises(AccuracyError, match="too wide for the reduced model that judges them"):
         ranges(np.array([0.2, 1e-6]))  # m²: a rod that is soft in tension
 
 

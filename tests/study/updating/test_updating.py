@@ -123,7 +123,7 @@ def test_two_masses_on_one_node_are_told_only_together() -> None:
     results = updated(measuring(base, q, hz))
     assert results.verdict == "not_identified"
     (direction,) = results.unidentified
-    assert direction.words == "m2 and m3 are told only together, as m2 + m3"
+    assert direction.words == "m2 and m3 are determined only together, as m2 + m3"
     assert direction.change["m2"] == pytest.approx(-direction.change["m3"], rel=1e-6)
     assert results.design["m1"] == pytest.approx(0.1, rel=1e-6)
     assert results.design["m2"] + results.design["m3"] == pytest.approx(0.13, rel=1e-6)
@@ -155,10 +155,10 @@ def test_what_scales_together_is_told_in_per_cent_though_a_bound_holds() -> None
     assert results.intervals["rho"] == (2000.0, 3500.0)
     assert results.verdict == "not_identified"
     (direction,) = results.unidentified
-    same = "E, rho and m2 can change together unnoticed, all by the same per cent"
+    same = "E, rho and m2 can change together without effect, all by the same percentage"
     assert direction.words == same
     assert [row.deviation for row in results.parameters] == [None] * 3
-    assert any("hold only with rho at its upper bound" in note for note in results.notes)
+    assert any("assume rho at its upper bound" in note for note in results.notes)
 
 
 def test_a_fit_that_explains_nothing_is_sought_from_other_starts_too() -> None:

@@ -134,9 +134,8 @@ class _Wrenches:
             elif not known:
                 raise MechanismError(
                     f"mechanism.joints.{waiting[0].joint}",
-                    "closes a loop at nodes where other loops close as well: the forces between "
-                    "them under the weight are not known. Give the links nodes of their own there, "
-                    "or write gravity: none",
+                    "closes a loop at nodes where other loops close, which leaves forces of the "
+                    "weight unknown: give each loop nodes of its own, or write gravity: none",
                 )
 
     def _is_complete(self, link: str, *waiting: JointEdge) -> bool:
@@ -239,8 +238,8 @@ def _closing(
     if rows < columns:
         raise MechanismError(
             f"mechanism.joints.{loops[0].joint}",
-            "closes a loop that leaves its passive joints a motion of their own, which the weight "
-            "sets free: hold it, or write gravity: none",
+            "closes a loop whose passive joints can move by themselves under the weight: hold "
+            "that motion, or write gravity: none",
         )
     if rows == columns:
         forces = passive_motion(known.recorder, J.T, right)[:, 0]
