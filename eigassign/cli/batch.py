@@ -66,7 +66,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.option(
     "--columns",
     is_flag=True,
-    help="No folder a case, but columns.h5 and columns.csv; so it is above 10 000 cases.",
+    help="No folder a case, but columns.h5; so it is above 10 000 cases.",
 )
 @click.option(
     "--case-time",
@@ -230,7 +230,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> 
             advance.append(stack.enter_context(shown))
 
         def on_outcome(found: CaseOutcome) -> None:
-            advance[0](f"{found.name}: {found.status}")
+            advance[0](f"{found.name}: {found.word}")
 
         return runner.run(batch, workers, on_start, on_outcome, join, reporter.stage)
 
