@@ -48,8 +48,8 @@ def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
     options: CaseOptions, tmp_path: Path
 ) -> None:
     case = tmp_path / "arm.yaml"
-    text = SMALL.read_text().replace("q2: {joint: elbow}", "q2: {joint: elbow, drive: {stiffness: 2e4}}")
-    case.write_text(text)
+    driven = "q2: {joint: elbow, drive: {stiffness: 2e4}}"
+    case.write_text(SMALL.read_text().replace("q2: {joint: elbow}", driven))
     swept = {
         MASS: ("0.1", "kg"),
         "mechanism.sections.rod.diameter": ("21 mm", "m"),

@@ -7,17 +7,20 @@ would be files of others, and may say something else than the rows.
 from __future__ import annotations
 
 import hashlib
+import json
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
+from eigassign._version import __version__
 from eigassign.files import MATRIX, file_digest
 from eigassign.output.batch.columns import Columns
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
 from eigassign.output.batch.outcome import CaseOutcome, from_line
-from eigassign.output.batch.summary import SummaryJson
+from eigassign.output.batch.summary import FORMAT
 from eigassign.output.store.atomic import replace_synced, replacing
 
 _ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
@@ -48,17 +51,19 @@ def write_files(
     there is columns.h5 too, and else none that is left from before.
     """
     with ExitStack() as stack:
-        plain = SummaryJson(_opened(stack, folder / "summary.json"))
+        plain, ends = _opened(stack, folder / "summary.json"), Counter[str]()
+        plain.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
         junit, index = Junit(_opened(stack, folder / "junit.xml")), Index()
         stored = stack.enter_context(replacing(folder / "columns.h5")) if columns else None
         columnar = Columns(stored, total)
         for line in map(str.rstrip, lines):
             row = from_line(line, folder)
-            plain.add(row.status, line)
+            plain.write(f"{', ' if ends else '  '}{line}\n")
+            ends[row.status] += 1
             _test(junit, row)
             index.add(row, line)
             columnar.add(row)
-        plain.end()
+        plain.write(f'], "counts": {json.dumps(dict(sorted(ends.items())))}}}\n')
         junit.end()
         columnar.end(_opened(stack, folder / "summary.csv"))
     for name in _COLUMNS[columns:]:  # of the batch as it was before

@@ -1,15 +1,13 @@
-"""summary.json, written row by row, and the same on the console."""
+"""summary.json, and the same on the console."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, TextIO
+from typing import Annotated
 
-from eigassign._version import __version__
 from eigassign.facts import Fact
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.tables import Table, facts_table
@@ -46,20 +44,3 @@ def said(counts: Counter[str]) -> str:
     """``58 ok, 2 error``."""
     order = ("ok", "tolerance", "failed", "error")
     return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])
-
-
-class SummaryJson:
-    """The rows as the manifest has them, then how many there are of each status."""
-
-    def __init__(self, file: TextIO) -> None:
-        self._file, self._counts = file, Counter[str]()
-        file.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
-
-    def add(self, status: str, line: str) -> None:
-        """Write the line of a row."""
-        self._file.write(f"{', ' if self._counts else '  '}{line}\n")
-        self._counts[status] += 1
-
-    def end(self) -> None:
-        """Write the counts."""
-        self._file.write(f'], "counts": {json.dumps(dict(sorted(self._counts.items())))}}}\n')

@@ -43,7 +43,7 @@
     }
     for (const k of shownColumns) {
       const content = row[k] ?? "", long = columns[k].name === "message";
-      const kind = isNumber[k] ? "number" : k === word ? tones[content] : long ? "long" : k ? "words" : "name";
+      const kind = isNumber[k] ? "number" : k === word ? tones[content] : long ? "long" : k ? "words" : "case";
       const into = element("td", k && !long ? String(content) : undefined, kind);
       if (long) into.append(element("div", content));
       if (k === 0) {
@@ -389,6 +389,18 @@
     for (const p of points) mark(s.root, tones[rows[p.row][word]], p.x, p.y, 4.5, `var(--${tones[rows[p.row][word]]})`);
     live(s, points, (row) => [label(row), ...[kx, ky].filter((k) => !swept.includes(k)).map((k) => `${columns[k].name}: ${text(k, row)}`), rows[row][word]].join("\n"));
   }
+
+  // --- What was swept, and the variant that is nearest to its target
+
+  const few = (value, k) => `${typeof value === "number" ? +value.toPrecision(4) : value} ${columns[k].unit}`.trim();
+  for (const k of swept) {
+    const values = distinct(k, order), many = values.length > 100 ? "" : `, ${values.length} value${values.length > 1 ? "s" : ""}`;
+    const ends = isNumber[k] && values.length > 1 ? ` from ${+values[0].toPrecision(4)} to ${few(values[values.length - 1], k)}` : "";
+    document.getElementById("spans").append(element("li", columns[k].name + many + ends));
+  }
+  const least = swept.length ? order.filter((row) => rows[row][worst] > 0).sort((a, b) => rows[a][worst] - rows[b][worst])[0] : undefined;
+  if (least !== undefined && rows.every((row) => row[worst] !== 0))
+    document.getElementById("nearest").textContent = `Nearest to its target is case ${rows[least][0]}, ${text(worst, least)} off at worst: ${swept.map((k) => `${columns[k].name} ${few(rows[least][k], k)}`).join(", ")}.`;
 
   if (keys.length && numbers.length) draws.push(drawOver);
   if (all.length > 1 && rows.length > 1) {
