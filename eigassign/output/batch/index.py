@@ -139,7 +139,8 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
 def _told(row: CaseOutcome, but: Sequence[str]) -> str:
     """The parameters of a design in words: ``m1 229 g, m2 0 kg``."""
     rest = ((name, amount) for name, amount in row.design if name not in but)
-    return ", ".join(f"{name} {handy(amount, row.units.get(name, ''))}" for name, amount in rest)
+    told = (f"{name} {handy(amount, row.units.get(name, ''))}" for name, amount in rest)
+    return ", ".join(text.replace(" ", "\N{NO-BREAK SPACE}") for text in told)
 
 
 def _numbers(name: str, kind: str, amounts: Sequence[float | None], unit: str) -> Column:

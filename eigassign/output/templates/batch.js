@@ -175,7 +175,11 @@
   function legend(figure, among, more) {
     const rank = Object.keys(glyphs), there = [...new Set(among.map((row) => rows[row][word]))].sort((a, b) => rank.indexOf(tones[a]) - rank.indexOf(tones[b])), caption = figure.querySelector("figcaption");
     caption.replaceChildren();
-    for (const one of there) caption.append(element("span", glyphs[tones[one]], tones[one]), ` ${one}\u2003`);
+    for (const one of there) {
+      const item = element("span");
+      item.append(element("b", glyphs[tones[one]], tones[one]), " " + one);
+      caption.append(item, " ");
+    }
     caption.append(more || "");
   }
 
@@ -322,15 +326,15 @@
   function drawMap(value, kx, ky, among, known, saying) {
     const s = sheet(over, `Map of ${title(value)} over ${title(kx)} and ${title(ky)}.`, 74, leftOf(distinct(ky, among)));
     const x = listed(distinct(kx, among), s.left, s.right, 40), y = listed(distinct(ky, among), s.bottom, s.top, 16), points = [];
-    const share = bar(s, value, known), size = [x.width, y.width];
+    const share = bar(s, value, known), size = [x.width, y.width], said = (row) => String(rows[row][value] === null ? "" : +rows[row][value].toPrecision(3));
+    const wide = size[1] >= 30 && size[0] >= 3 + 6.5 * Math.max(...known.map((row) => said(row).length));  // all numbers or none
     for (const row of among) {
       const cx = x.at(rows[row][kx]), cy = y.at(rows[row][ky]), number = rows[row][value], t = number === null ? 0 : share(row);
       const ink = t > 0.55 ? "#1a1a1a" : "#fff", tone = tones[rows[row][word]];
       points.push({ x: cx, y: cy, row, size });
       if (number === null) svg(s.root, "rect", { x: cx - size[0] / 2 + 1, y: cy - size[1] / 2 + 1, width: size[0] - 2, height: size[1] - 2, fill: "none", class: "axis", "stroke-dasharray": "3 3" });
       else svg(s.root, "rect", { x: cx - size[0] / 2, y: cy - size[1] / 2, width: size[0], height: size[1], fill: shade(t), stroke: "var(--page)", "stroke-width": 0.5 });
-      const wide = size[0] >= 30 && size[1] >= 30, said = String(number === null ? "" : +number.toPrecision(3));
-      if (wide && said.length * 7 <= size[0] - 4) svg(s.root, "text", { x: cx, y: cy + 12, "text-anchor": "middle", style: `fill: ${ink}` }, said);
+      if (wide) svg(s.root, "text", { x: cx, y: cy + 12, "text-anchor": "middle", style: `fill: ${ink}; font-size: 11px` }, said(row));
       if (Math.min(...size) >= 12) mark(s.root, tone, cx, cy - (wide ? 7 : 0), 3.5, number === null ? "var(--ink)" : ink);
     }
     axes(s, x, y, kx, ky);

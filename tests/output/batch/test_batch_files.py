@@ -252,7 +252,7 @@ def test_designs_that_differ_from_case_to_case_are_told_in_words(tmp_path):
         for k, name in enumerate(("arm", "leg", "boom"))
     ]  # fmt: skip
     found = page_of(tmp_path, rows, ())
-    assert found["design"][2] == ["m0 250 g", "m1 250 g", "m2 250 g"]
+    assert found["design"][2] == [f"m{k}\N{NO-BREAK SPACE}250\N{NO-BREAK SPACE}g" for k in range(3)]
     assert found["w"][2] == [1.0, 1.0, 1.0]
     assert found["case"][2] == ["arm", "leg", "boom"]
 
