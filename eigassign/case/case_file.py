@@ -187,15 +187,15 @@ class CaseFile:
 
     @property
     def variant_units(self) -> Mapping[str, str]:
-        """SI unit of each number of its `variant`, by key, of which the schema knows it."""
-        tree, found = self._tree, dict[str, Quantity | None]()
+        """SI unit of each value of its `variant`, by key; empty where the schema knows of none."""
+        tree, found = self._tree, dict[str, Quantity]()
         for key in self.variant:
             *owners, last = key.split(".")
             owner = reduce(below, owners, self)
             own = quantities(type(owner)).get(last) if isinstance(owner, Part) else None
-            found[key] = known_property(tree, key.removeprefix("mechanism.")) or own
-        there = {key: kind for key, kind in found.items() if kind is not None}
-        return dict(zip(there, _units(there.values()), strict=True))
+            known = known_property(tree, key.removeprefix("mechanism.")) or own
+            found[key] = known or Quantity()
+        return dict(zip(found, _units(found.values()), strict=True))
 
     @property
     def design_paths(self) -> frozenset[str]:

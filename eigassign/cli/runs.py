@@ -292,7 +292,7 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
 
     Exact solves, expansions, reduced models, interpolation and surrogates, all against the same
     exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
-    report.html, and says what to choose.
+    report.html, and says what to write in the case.
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request

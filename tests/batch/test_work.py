@@ -61,7 +61,8 @@ def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
     settings = [f"{key}={value}" for key, (value, _) in swept.items()]
     plan = plan_of([case], [*settings, "title=x", "expansion.order=2"])
     (found,) = run_cases([plan[0]], options)
-    assert found.units == {key: unit for key, (_, unit) in swept.items()} | {"m": "kg"}
+    bare = {"title": "", "expansion.order": ""}
+    assert found.units == {key: unit for key, (_, unit) in swept.items()} | bare | {"m": "kg"}
     results = json.loads((tmp_path / "out" / plan[0].name / "results.json").read_text())
     assert found.mass == results["mass"]["optimal"]
     assert found.exact_rms_relative == results["error"]["exact"]["rms_relative"]

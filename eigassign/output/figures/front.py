@@ -1,9 +1,9 @@
 """The figures of a chart: time against error on each front, elements, and ways to a design.
 
-Every figure is a scatter over two logarithmic axes. The first has four families and what to write
-in the case. Methods that differ by a setting are joined by
-a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
-names the kinds. A broad band joins the methods that no other beats.
+Every figure is a scatter over two logarithmic axes. The first has four families, and what to write
+in the case. Methods that differ by a setting are joined by a line: eigassign's filled, the others
+hollow and dashed. A colour is a kind of method; the legend names the kinds. A broad band joins the
+methods that no other beats.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
         f"`expansion.order: auto`.{beyond}"
     )
     if few:
-        shown = [p for p in shown if p.family in CHOICE]
+        shown = [p for p in shown if p.family in CHOICE or (first and p.method == first.key_method)]
         caption = f"A point is a setting, of the series its `order`. Worst error {where}"
 
     def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
