@@ -26,7 +26,7 @@ from eigassign.case.loading import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.schema.sweep import text_of
 from eigassign.case.units import NUMBER
-from eigassign.case.values import key_path
+from eigassign.case.values import key_path, short_keys
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, file_digest, folder_name
 from eigassign.modal.storage import ALGORITHM
@@ -86,13 +86,7 @@ class PlannedFile:
 
     @cached_property
     def _short(self) -> Mapping[str, str]:
-        """The end of each key that tells it from all others."""
-        parts = {key: key.split(".") for key in self.variants.keys}
-        ends = {key: [".".join(p[-n:]) for n in range(1, len(p) + 1)] for key, p in parts.items()}
-        return {
-            key: next(e for e in mine if sum(e in other for other in ends.values()) == 1)
-            for key, mine in ends.items()
-        }
+        return short_keys(self.variants.keys)
 
     @cached_property
     def _twins(self) -> Mapping[str, set[str]]:

@@ -133,10 +133,10 @@ def _solved(
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(None, cache_dir, options.use_cache, report="none", study=STUDY)
     if options.columns:
-        return ended(**_found(_uninterrupted(case, how)))
+        return ended(**_found(case, _uninterrupted(case, how)))
     with new_run_folder(case.file, Path(options.out, variant.name), options.force) as folder:
         results = _uninterrupted(case, how)
-        found = _found(results)
+        found = _found(case, results)
         drawn = options.draws(found["status"])
         folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
         outcome = ended(**found, run_folder=variant.name)
@@ -152,7 +152,7 @@ def _uninterrupted(case: BuiltCase, how: Options) -> RunResults:
     return results
 
 
-def _found(results: RunResults) -> dict[str, Any]:
+def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
     error, found = results.error, results.assignment
     return {
         "status": _status(results),
@@ -161,7 +161,11 @@ def _found(results: RunResults) -> dict[str, Any]:
         "initial_max_relative": error and error.initial.max_relative,
         "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
+        "exact_rms_relative": error and error.exact.rms_relative,
+        "mass": results.mass and results.mass.optimal,
+        "price": results.price,
         "design": tuple((row.name, row.optimal) for row in results.design),
+        "units": {**case.file.variant_units, **{row.name: row.unit for row in results.design}},
         "frequencies": frequency_ranges(results),
     }
 

@@ -5,25 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
 from eigassign.brief import cut, named
 from eigassign.case.canonical import plain, to_yaml
-from eigassign.case.reader import KeyPath, Mark, dotted
+from eigassign.case.reader import KeyPath, Mark, Tree, dotted
 from eigassign.case.rules.properties import (
+    below,
     is_place,
+    known_property,
     least_and_largest,
     properties_of,
     property_at,
+    quantities,
     value_at,
 )
 from eigassign.case.schema.design import Design, Parameter
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
-from eigassign.case.schema.parts import FrozenDict, Quantity
+from eigassign.case.schema.parts import FrozenDict, Part, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
 from eigassign.case.schema.targets import AnyTarget, TargetForm
@@ -140,10 +143,14 @@ class CaseFile:
         """Dimension and limits of each design parameter, in the order of y."""
         return self.quantities([p.parameter for p in self.design.parameters.values()])
 
+    @property
+    def _tree(self) -> Tree:
+        """What properties are looked up in."""
+        return {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
+
     def quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
         """Dimension and limits of the property at each path."""
-        tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
-        found = (property_at(tree, path) for path in paths)
+        found = (property_at(self._tree, path) for path in paths)
         return tuple(each or Quantity() for each in found)
 
     @property
@@ -179,6 +186,18 @@ class CaseFile:
     def q_units(self) -> tuple[str, ...]:
         """SI unit of each entry of q: of the coordinates, then of the loads."""
         return (*self.coordinate_units, *(load.unit for load in self.loads.values()))
+
+    @property
+    def variant_units(self) -> Mapping[str, str]:
+        """SI unit of each value of its `variant`, by key; empty where the schema knows of none."""
+        tree, found = self._tree, dict[str, Quantity]()
+        for key in self.variant:
+            *owners, last = key.split(".")
+            owner = reduce(below, owners, self)
+            own = quantities(type(owner)).get(last) if isinstance(owner, Part) else None
+            known = known_property(tree, key.removeprefix("mechanism.")) or own
+            found[key] = known or Quantity()
+        return dict(zip(found, _units(found.values()), strict=True))
 
     @property
     def design_paths(self) -> frozenset[str]:
@@ -232,10 +251,9 @@ class CaseFile:
         Without those that trajectories set, without limits, and where asked without ``places``:
         lengths, places and angles.
         """
-        tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
         entries = {
             path: Parameter(parameter=path, min=value, max=value)
-            for path in properties_of(tree)
+            for path in properties_of(self._tree)
             if path not in self.loads
             and (places or not is_place(path) or f"{path}.add" in self.loads)
             if (value := self.value_at(path))

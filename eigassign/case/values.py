@@ -6,7 +6,8 @@ A dotted key is a path into the file: `mechanism.bodies.tool.mass`, `targets.0.f
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
@@ -37,6 +38,20 @@ def key_path(tree: Tree, key: str) -> KeyPath:
         del parts[: str(step).count(".") + 1]
         node = _below(node, step)
     return tuple(path)
+
+
+def short_keys(keys: Iterable[str], least: int = 1) -> dict[str, str]:
+    """The end of each key, from a name on and of at least so many parts, that no other key has.
+
+    The whole key where there is none, of ten parts at most.
+    """
+    parts = {key: key.rsplit(".", 10) for key in keys}
+    ends = {
+        key: [".".join(p[-n:]) for n in range(least, len(p)) if not p[-n].isdecimal()]
+        for key, p in parts.items()
+    }
+    counts = Counter(end for own in ends.values() for end in own)
+    return {key: next((e for e in own if counts[e] == 1), key) for key, own in ends.items()}
 
 
 def _below(node: Any, step: str | int) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,6 @@ from eigassign.chart.results import (
     MeshRow,
     Request,
     Timing,
-    kind_of,
     machine,
 )
 from eigassign.errors import EigassignError
@@ -148,7 +148,7 @@ def _chart_method(
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
         # from so many evaluations: offline + N online < N exact
         break_even=offline.median_s / (exact_s - online.median_s) if pays else None,
-        use=method.use, at_once=samples if anew else 1, note=ANEW if anew else "",
+        use=method.use, key=method.key, at_once=samples if anew else 1, note=ANEW if anew else "",
         estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
     )  # fmt: skip
     return point, set_up.median_s
@@ -240,58 +240,72 @@ def advise(
     over a hundred times as large (most are cautious): they may know of places that the points of
     the question miss. Nothing is advised below round-off: no method can be seen to be that
     accurate. For a time, which counts the set-up, the most accurate method, the quicker of equals.
+    The words are of the first of them that a case can ask for.
     """
     floor, rivals = asked.floor_hz / asked.typical_hz, _rivals(points)
     whole = (float(asked.trajectory_samples), 1000.0 * asked.trajectory_samples)
-    for n in (request.evaluations,) if request.evaluations else whole:
-        words = f"for {n:,.0f} evaluations within"
-        for a in request.accuracies:
-            within = Advice("accuracy", a, None, n, words=f"{words} {_share(a)} of exact")
-            if a < floor:
-                said = f"nothing, for round-off moves even exact solves by {floor:.1e}"
-                yield replace(within, words=f"{within.words}: {said}", is_below_round_off=True)
-                continue
-            good = [p for p in rivals if p.everywhere.worst_relative <= a]
-            good = [p for p in good if (p.estimate or 0.0) <= 100.0 * a]
-            best = min(good, key=lambda p: p.cost_s(n), default=None)
-            yield _beside_auto(_chosen(within, "quickest", best), points, skipped)
-        if (seconds := request.budget_s) is not None:
-            within = Advice("budget", None, seconds, n, words=f"{words} {time_in_words(seconds)}")
-            in_time = [p for p in rivals if p.cost_s(n) <= seconds]
-            best = min(in_time, key=lambda p: (p.everywhere.worst_hz, p.cost_s(n)), default=None)
-            yield _chosen(within, "most accurate", best)
+    counts = (request.evaluations,) if request.evaluations else whole
+    wanted = [("accuracy", a, None) for a in request.accuracies]
+    for n, each in product(counts, [*wanted, ("budget", None, request.budget_s)]):
+        advice = Advice(*each, n)
+        if advice.accuracy is not None and advice.accuracy < floor:
+            words = f"nothing is within {_share(advice.accuracy)} of exact: round-off moves even "
+            words += f"exact solves by {floor:.1e}"
+            yield replace(advice, words=words, is_below_round_off=True)
+        elif advice.accuracy is not None or advice.budget_s is not None:
+            yield _chosen(advice, rivals, points, skipped)
 
 
-def _chosen(within: Advice, superlative: str, found: ChartPoint | None) -> Advice:
-    """The advice with a method, if there is one."""
-    if found is None:
-        return replace(within, words=f"{within.words}: no charted method does that")
-    total, worst = found.cost_s(within.evaluations), found.everywhere.worst_relative
-    words = (
-        f"{within.words} the {superlative} is {found.method} ({kind_of(found.family)}). It takes "
-        f"{time_in_words(total)} in all and is off by {_share(worst)} at worst"
-        f"{'; it is set up anew for every design' if found.at_once > 1 else ''}"
-    )
-    chosen = replace(within, method=found.method, parameters=found.parameters, words=words)
-    return replace(chosen, worst_relative=worst, total_s=total)
-
-
-def _beside_auto(
-    advice: Advice, points: Sequence[ChartPoint], skipped: Mapping[str, str]
+def _chosen(
+    advice: Advice,
+    rivals: Sequence[ChartPoint],
+    points: Sequence[ChartPoint],
+    skipped: Mapping[str, str],
 ) -> Advice:
-    """The advice with what ``expansion.order: auto`` takes for the same accuracy."""
-    name, says, auto = f"auto {advice.accuracy:.0e}", "`expansion.order: auto`", None
-    for why in [why for method, why in skipped.items() if method.startswith(name)]:
-        auto, says = AutoTakes(refused=why), f"{says} refuses: {why}"
-    for own in [p for p in points if p.method.startswith(name)]:
-        total, worst = own.cost_s(advice.evaluations), own.everywhere.worst_relative
-        longer = f" ({total / advice.total_s:.2g} times as long)" if advice.total_s else ""
-        auto = AutoTakes(own.method, worst, total, own.parameters["choosing_s"])
-        says = (
-            f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
-            f"{_share(worst)} at worst, after {time_in_words(auto.choosing_s)} of choosing"
-        )
-    return advice if auto is None else replace(advice, auto=auto, words=f"{advice.words}. {says}")
+    """The advice with the best method, the best that a case can ask for, and what `auto` takes."""
+    n, budget, accuracy = advice.evaluations, advice.budget_s, advice.accuracy or 0.0
+    mine = f"auto {accuracy:.0e}"
+    own = [p for p in points if p.method.startswith(mine)]
+    for why in [why for method, why in skipped.items() if method.startswith(mine)]:
+        advice = replace(advice, auto=AutoTakes(refused=why))
+    for p in own:
+        took, worst = p.parameters["choosing_s"], p.everywhere.worst_relative
+        advice = replace(advice, auto=AutoTakes(p.method, worst, p.cost_s(n), took))
+    if budget is None:
+        able = [p for p in rivals if _is_within(p, accuracy)]
+        keyed = [p for p in able if p.key]  # the lowest order, whatever the clock says
+        keyed += [p for p in own if _is_within(p, accuracy)]
+        able.sort(key=lambda p: p.cost_s(n))
+    else:
+        able = [p for p in rivals if p.cost_s(n) <= budget]
+        able.sort(key=lambda p: (p.everywhere.worst_hz, p.cost_s(n)))
+        keyed = [p for p in able if p.key]
+    for p in able[:1]:
+        advice = replace(advice, method=p.method, parameters=p.parameters, total_s=p.cost_s(n))
+        advice = replace(advice, worst_relative=p.everywhere.worst_relative)
+    for p in keyed[:1]:
+        advice = replace(advice, key=p.key, key_method=p.method, key_sample_s=p.online.median_s)
+        advice = replace(advice, key_relative=p.everywhere.worst_relative)
+    return replace(advice, words=_words(advice, rivals))
+
+
+def _is_within(point: ChartPoint, accuracy: float) -> bool:
+    """True of what is accurate enough and does not doubt it."""
+    return max(point.everywhere.worst_relative, (point.estimate or 0.0) / 100.0) <= accuracy
+
+
+def _words(advice: Advice, rivals: Sequence[ChartPoint]) -> str:
+    """What to write in the case, and what that gives."""
+    if advice.key is not None:
+        worst, each = _share(advice.key_relative or 0.0), time_in_words(advice.key_sample_s or 0.0)
+        words = f"write `{advice.key}` under `expansion`: {worst} off at worst, {each} a sample"
+        exact = [time_in_words(p.online.median_s) for p in rivals if p.family == "exact"][:1]
+        return words + "".join(f" (an exact solve takes {time})" for time in exact)
+    within = f"within {_share(advice.accuracy)} of exact" if advice.accuracy else "in time"
+    nearest = min((p.everywhere.worst_relative for p in rivals if p.key), default=None)
+    off = "" if nearest is None else f", the nearest is {_share(nearest)} off at worst"
+    which = "write `method: sequential` under `assignment`, which needs no expansion"
+    return f"{which}: no order that was charted is {within}{off}"
 
 
 def _share(relative: float) -> str:

@@ -62,13 +62,14 @@ class Method:
     family: str
     parameters: Mapping[str, Any]  # from which it can be set up again
     build: Callable[[Floats | None], Built]
-    use: str = ""  # how to ask for it: a line of a case file, or a call; of those by others none
+    use: str = ""  # the call that asks for it; of those by others none
+    key: str = ""  # what a case file asks for it by, under `expansion`
     per_design: bool = False  # so the set-up is a cost of the evaluation
 
     @property
     def ours(self) -> bool:
         """True of what eigassign offers; the others are what people do without it."""
-        return bool(self.use) or self.family == "exact"
+        return bool(self.use or self.key) or self.family == "exact"
 
 
 def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
@@ -132,13 +133,12 @@ def _series(bench: Bench) -> Iterator[Method]:
     orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
     for inverse, linear, order in product((False, True), (False, True), orders):
         kind, how = ("linearised", {"linear_in_y": True}) if linear else ("full", {})
-        symbol, use = "Taylor", f"in the case file, expansion: {{order: {order}}}"
-        if inverse:
-            call = _call(bench, "ea.expand", "model, q0, y0", order=order, **how)
-            symbol, use = "1/λ", f"{call}.inverse"
+        symbol, key = "1/λ" if inverse else "Taylor", f"order: {order}"
+        use = _call(bench, "ea.expand", "model, q0, y0", order=order, **how) + ".inverse" * inverse
+        use, key = (use, "") if inverse or linear else ("", key)
         told = {"order": order, "linear_in_y": linear, "q0": full.q0, "y0": full.y0}
         build = partial(_expanded, bench, told, inverse)
-        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", told, build, use)
+        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", told, build, use, key)
     for count, order in product(effort.expansion_points[1:], orders[1:]):
         q, y, where = _about(bench, count)
         told = {"order": order, "q0": q, "y0": y}
@@ -170,8 +170,8 @@ def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
             told = {"order": choice.order, "cluster_gap": choice.cluster_gap, "accuracy": accuracy}
             told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
             name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
-        yield Method(name, "Taylor, auto", told, partial(_expanded, bench, told, False), use)
+        build, key = partial(_expanded, bench, told, False), f"order: auto, accuracy: {accuracy:g}"
+        yield Method(name, "Taylor, auto", told, build, key=key)
 
 
 def _expanded(bench: Bench, told: Mapping[str, Any], inverse: bool, _: Floats | None) -> Built:

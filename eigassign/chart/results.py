@@ -20,8 +20,9 @@ import scipy
 from eigassign._version import __version__
 from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
 
-SCHEMA = 4  # of chart.json
+SCHEMA = 5  # of chart.json
 _BREAK_EVEN = "evaluations from which it beats exact solves"
+_AUTO, _TIME = "order: auto takes", lambda s: time_in_words(s) if s else ""  # none is not told
 ErrorHz = Annotated[Hertz, Fact(digits=".2e")]
 RelativeError = Annotated[Share, Fact("of the frequency", "relative", digits=".1e")]
 _KINDS = {  # of methods whose family begins so: the first that fits
@@ -120,7 +121,8 @@ class ChartPoint:
     trajectory: Annotated[Errors | None, Fact("at several designs", "worst along the trajectory")]
     break_even: Annotated[float | None, Fact(_BREAK_EVEN, "pays from", "", ",.0f", "never")]
     note: str = ""
-    use: Annotated[str, Fact("how to ask for it: a line of a case file, or a call")] = ""
+    use: Annotated[str, Fact("the call that asks for it", "how")] = ""
+    key: Annotated[str, Fact("what a case file asks for it by, under `expansion`")] = ""
     at_once: Annotated[int, Fact("evaluations that come together: those of a trajectory")] = 1
     estimate: Annotated[float | None, Fact("of fits: their own worst estimate, relative")] = None
 
@@ -157,28 +159,42 @@ class AutoTakes:
     ``choosing_s`` went before and is no part of ``total_s``.
     """
 
-    method: str | None = None
-    worst_relative: RelativeError | None = None
+    method: Annotated[str | None, Fact("", _AUTO, digits=lambda m: m.partition(": ")[2])] = None
+    worst_relative: Annotated[Share | None, Fact(heading="its worst error")] = None
     total_s: Seconds | None = None
-    choosing_s: Seconds = 0.0
+    choosing_s: Annotated[Seconds, Fact("", "choosing took", digits=_TIME)] = 0.0
     refused: Annotated[str, Fact("why it refuses")] = ""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """The cheapest method for an accuracy, or the most accurate for a budget."""
+    """The cheapest method for an accuracy, or the most accurate for a budget.
+
+    ``key`` is the same of what a case can ask for, ``words`` tell it in a sentence.
+    """
 
     asked: Annotated[str, Fact("accuracy or budget")]
     accuracy: Annotated[Share | None, Fact("the worst relative error in Hz")]
     budget_s: Seconds | None
-    evaluations: float
-    method: Annotated[str | None, Fact("null: no charted method does it")] = None
+    evaluations: Annotated[float, Fact(digits=",.0f")]
+    method: Annotated[str | None, Fact("null: no charted method does it", absent="none")] = None
     parameters: Mapping[str, Any] | None = None
-    worst_relative: RelativeError | None = None
-    total_s: Annotated[Seconds | None, Fact("set-up and all evaluations")] = None
-    words: Annotated[str, Fact("the same in words")] = ""
+    worst_relative: Annotated[Share | None, Fact(heading="worst error")] = None
+    total_s: Annotated[Seconds | None, Fact("set-up and all evaluations", "time in all")] = None
+    words: Annotated[str, Fact("what to write in the case, in a sentence")] = ""
+    key: Annotated[str | None, Fact("null: none does it", "under expansion", absent="none")] = None
+    key_method: Annotated[str | None, Fact("the charted method that the key asks for")] = None
+    key_relative: Annotated[Share | None, Fact("its worst error", "worst error")] = None
+    key_sample_s: Annotated[Seconds | None, Fact("its time", "a sample", "", time_in_words)] = None
     is_below_round_off: bool = False
     auto: Annotated[AutoTakes | None, Fact("null: not looked at")] = None
+
+    @property
+    def asked_for(self) -> Annotated[str, Fact(heading="asked for")]:
+        """The accuracy, or the time, in words."""
+        if self.accuracy is None:
+            return f"in {time_in_words(self.budget_s or 0.0)}"
+        return f"{100.0 * self.accuracy:.2g} %"
 
 
 @dataclass(frozen=True)

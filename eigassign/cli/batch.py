@@ -68,8 +68,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.option(
     "--columns",
     is_flag=True,
-    help="Write columns.h5 and columns.csv instead of a folder for each case; always above 10 000 "
-    "cases.",
+    help="Write columns.h5 instead of a folder for each case; always above 10 000 cases.",
 )
 @click.option(
     "--case-time",
@@ -233,7 +232,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> 
             advance.append(stack.enter_context(shown))
 
         def on_outcome(found: CaseOutcome) -> None:
-            advance[0](f"{found.name}: {found.status}")
+            advance[0](f"{found.name}: {found.word}")
 
         return runner.run(batch, workers, on_start, on_outcome, join, reporter.stage)
 

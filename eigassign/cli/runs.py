@@ -292,7 +292,7 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
 
     Times exact solves, expansions, reduced models, interpolation and surrogates on this machine,
     and compares them with the same exact frequencies. Compares meshes, and methods that search for
-    a design. Writes figures, chart.json and report.html, and says which method to choose.
+    a design. Writes figures, chart.json and report.html, and says what to write in the case.
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request
@@ -307,9 +307,10 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     if as_json:
         print_json({"run_folder": str(folder), **vars(made)})
     else:
-        from eigassign.output.console import print_tables
-        from eigassign.output.reports.chart import main_tables
+        from eigassign.output.console import print_tables, print_verdict
+        from eigassign.output.reports.chart import headline, to_write
 
-        print_tables(main_tables(made))
+        print_verdict(headline(made) or "")
+        print_tables([to_write(made)])
         show(_written(folder, made.seconds))
     return 0

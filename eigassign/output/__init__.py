@@ -9,10 +9,10 @@ In reading order; each imports from those above it only:
     tables        the tables of a run as text
     console       results on stdout, progress on stderr
     pages         HTML pages from their templates
-    batch         what a batch leaves: summaries, junit.xml, columns, index.html
-    previous      what an earlier result said, and what has moved since
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
+    batch         what a batch leaves: summaries, junit.xml, columns, index.html
+    previous      what an earlier result said, and what has moved since
     schema        JSON Schemas of the files of results
 """
 

@@ -38,7 +38,7 @@ def ran(batch: Batch) -> list[str]:
 
 def summaries(folder: Path) -> dict[str, str]:
     """What they say, wherever they are."""
-    names = ("summary.csv", "summary.json", "junit.xml", "columns.csv")
+    names = ("summary.csv", "summary.json", "junit.xml")
     there = [folder / name for name in names if (folder / name).exists()]
     return {path.name: path.read_text().replace(str(folder.parent), "") for path in there}
 

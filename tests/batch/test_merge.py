@@ -66,7 +66,7 @@ def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: b
     assert merge_shards(whole, []).ends == {"ok": TOTAL - 1, "failed": 1}
     assert names(out) == [f"mass={k}g" for k in range(TOTAL)]
     if columns:
-        for name in ("summary.csv", "summary.json", "junit.xml", "columns.csv"):
+        for name in ("summary.csv", "summary.json", "junit.xml"):
             assert (out / name).read_text() == (whole / name).read_text(), name
     header = read_header(out)
     assert header is not None
@@ -99,7 +99,6 @@ def pipe(path: Path) -> None:
         ("columns.h5", external),
         pytest.param("columns.h5", bomb, marks=pytest.mark.slow),
         ("columns.h5", pipe),
-        ("columns.csv", pipe),
         ("junit.xml", lambda path: path.write_text("<testsuites ")),
         ("summary.csv", lambda path: path.write_text("name,\nanother,\n")),
     ],
@@ -113,7 +112,7 @@ def test_what_others_made_of_a_shards_summaries_is_not_read(
         merge_shards(folder, [])
     change(shards[0] / name)
     merge_shards(tmp_path / "out", shards)
-    for name in ("summary.csv", "junit.xml", "columns.h5", "columns.csv"):
+    for name in ("summary.csv", "junit.xml", "columns.h5"):
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "before" / name).read_bytes()
     assert b"a password" not in (tmp_path / "out" / "columns.h5").read_bytes()
 

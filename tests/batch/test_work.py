@@ -44,6 +44,31 @@ def numbers(folder: Path) -> dict[str, object]:
     return found
 
 
+def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
+    options: CaseOptions, tmp_path: Path
+) -> None:
+    case = tmp_path / "arm.yaml"
+    driven = "q2: {joint: elbow, drive: {stiffness: 2e4}}"
+    case.write_text(SMALL.read_text().replace("q2: {joint: elbow}", driven))
+    swept = {
+        MASS: ("0.1", "kg"),
+        "mechanism.sections.rod.diameter": ("21 mm", "m"),
+        "coordinates.q2.drive.stiffness": ("3e4", "N m/rad"),
+        "trajectory.duration": ("2", "s"),
+        "targets.0.frequency": ("90", "Hz"),
+        "validation.max_error": ("0.6", ""),
+    }
+    settings = [f"{key}={value}" for key, (value, _) in swept.items()]
+    plan = plan_of([case], [*settings, "title=x", "expansion.order=2"])
+    (found,) = run_cases([plan[0]], options)
+    bare = {"title": "", "expansion.order": ""}
+    assert found.units == {key: unit for key, (_, unit) in swept.items()} | bare | {"m": "kg"}
+    results = json.loads((tmp_path / "out" / plan[0].name / "results.json").read_text())
+    assert found.mass == results["mass"]["optimal"]
+    assert found.exact_rms_relative == results["error"]["exact"]["rms_relative"]
+    assert found.price is None
+
+
 def test_a_case_gives_the_same_numbers_in_any_order(options: CaseOptions, tmp_path: Path) -> None:
     plan = plan_of([SMALL], [f"{MASS}=0.1,0.3"])
     first = run_cases([plan[0], plan[1]], options)

@@ -117,20 +117,41 @@ def test_advice_for_a_budget_is_the_most_accurate_in_time() -> None:
     assert advised(POINTS, 1e4, budget_s=1e-9).method is None
 
 
-def test_advice_is_a_sentence_that_says_what_the_method_does_and_that_auto_refuses() -> None:
-    stations = point("stations linear 3", 0.0, 1e-3, 1e-3, family="stations, linear")
-    found = advised([stations], 152, accuracies=(1e-2,))
-    assert found.words.startswith(
-        "for 152 evaluations within 1 % of exact the quickest is stations linear 3 (interpolation"
+def test_advice_is_a_sentence_that_names_the_lowest_order_and_not_the_quickest_method() -> None:
+    exact = replace(POINTS[0], family="exact")
+    orders = [point(f"Taylor {k}", 0.0, t, 10.0 ** (2 - k), key=f"order: {k}")
+              for k, t in ((1, 1e-9), (2, 3e-7), (3, 2e-7))]  # fmt: skip
+    found = advised([exact, *POINTS[1:], *orders], 1e4, accuracies=(1e-2,))
+    assert found.words == (
+        "write `order: 2` under `expansion`: 1 % off at worst, 300 ns a sample (an exact solve "
+        "takes 1 ms)"
     )
-    assert "and is off by 0.001 % at worst" in found.words
+    assert (found.key, found.key_method, found.method) == ("order: 2", "Taylor 2", "Taylor 3")
+    found = advised([exact, *orders], 1e4, budget_s=1e-4)
+    assert found.words.startswith("write `order: 1` under `expansion`: 10 % off at worst, 1 ns a")
+    none = advised([exact, *orders], 1e4, accuracies=(1e-6,))
+    assert (none.key, none.method) == (None, "exact")
+    assert none.words == (
+        "write `method: sequential` under `assignment`, which needs no expansion: no order that "
+        "was charted is within 0.0001 % of exact, the nearest is 0.1 % off at worst"
+    )
+    assert advised([exact, *orders], 1e4, budget_s=1e-9).words.startswith("write `method:")
+
+
+def test_where_no_order_does_auto_may_and_its_refusal_is_told() -> None:
+    auto = point("auto 1e-02: Taylor 2 at 3 points", 0.0, 1e-6, 1e-2)
+    auto = replace(auto, key="order: auto, accuracy: 0.01", parameters={"choosing_s": 0.1})
+    found = advised([POINTS[0], auto], 1e4, accuracies=(1e-2,))
+    assert (found.key, found.method) == ("order: auto, accuracy: 0.01", "exact")
+    assert found.auto is not None
+    assert (found.auto.method, found.auto.choosing_s) == (auto.method, 0.1)
+    stations = point("stations linear 3", 0.0, 1e-3, 1e-3, family="stations, linear")
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, 1.0, 1, 1.0, 0.0)
     refused = {"auto 1e-02": "no expansion of order up to 4"}
     (found,) = advise([stations], asked, Request((1e-2,), evaluations=152), refused)
     assert found.auto is not None
     assert found.auto.method is None
     assert found.auto.refused == "no expansion of order up to 4"
-    assert found.words.endswith("`expansion.order: auto` refuses: no expansion of order up to 4")
 
 
 def test_a_reason_that_many_methods_share_is_said_once_with_their_names() -> None:

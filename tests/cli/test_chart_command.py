@@ -29,7 +29,7 @@ def test_a_quick_chart_leaves_a_whole_folder_and_advises(
     assert all("auto" in a for a in kept["advice"])
     names = {p.name for p in out.iterdir()}
     assert names >= {"chart.json", "report.html", "figures", "case.yaml", "run.json"}
-    assert len(list((out / "figures").glob("*.png"))) == 6
+    assert len(list((out / "figures").glob("*.png"))) == 7
     assert kept["machine"]["cores"] >= 1
 
 
@@ -68,3 +68,22 @@ def test_a_folder_of_something_else_is_not_replaced(
     assert main(["chart", str(ARM), "--quick", "--out", str(tmp_path)]) == 3
     assert str(tmp_path) in capsys.readouterr().err
     assert (tmp_path / "mine.txt").read_text() == "keep"
+
+
+@pytest.mark.slow
+def test_the_terminal_begins_with_the_advice_of_the_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "chart"
+    case = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
+    asked = ["--quick", "--quiet", "--figures", "none", "--accuracy", "0.02"]
+    assert main(["chart", str(case), *asked, "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    kept = json.loads((out / "chart.json").read_text())["advice"][0]
+    assert shown.startswith(f"Write `{kept['key']}` under `expansion`: ")
+    assert kept["key"].startswith("order: ")
+    first = shown.splitlines()[0].replace("`", "")
+    page = (out / "report.html").read_text().replace("<code>", "").replace("</code>", "")
+    assert first in page.partition("<details>")[0]
+    assert "What to write in the case" in shown
+    assert "Designs" not in shown

@@ -95,7 +95,7 @@ def made(root: Path, to_the_byte: bool = False) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if to_the_byte:
         return {
-            name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "columns.csv")
+            name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "summary.csv")
         }
     for name in ("out", "columns", "part-2", "whole"):
         if (root / name / "summary.json").exists():

@@ -296,10 +296,12 @@ def test_without_motion_wanted_nothing_moves(browser, reports):
 def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder, rows = tmp_path_factory.mktemp("batch"), []
     for k in range(450):
-        status = "failed" if k % 100 == 7 else "ok"
+        status, verdict = ("failed", "unreachable") if k % 100 == 7 else ("ok", "reached")
         values = {"mechanism.bodies.tool.mass": f"{(k * 7) % 450} g"}
         run = "run" if k == 0 else None
-        row = CaseOutcome(f"tool={k}", "arm.yaml", status, 0.1, run_folder=run, values=values)
+        row = CaseOutcome(
+            f"tool={k}", "arm.yaml", status, 0.1, "", run, verdict=verdict, values=values
+        )
         rows.append(to_line(replace(row, index=k)))
     (folder / "run" / "figures").mkdir(parents=True)
     shutil.copy(Path(__file__).parents[2] / "cases" / "two_link.png", folder / "run" / "figures")
@@ -316,22 +318,22 @@ def names(browser: Any) -> list[str]:
     )
 
 
-def test_rows_of_a_batch_sort_by_size_and_filter_by_words_and_status(browser, batch):
+def test_rows_of_a_batch_sort_by_size_and_filter_by_words_and_verdict(browser, batch):
     browser.get_log("browser")
     at(browser, batch, 1200)
-    assert names(browser)[:2] == ["tool=0", "tool=1"]
+    assert names(browser)[:2] == ["1", "2"]
     mass = browser.find_element("css selector", "[data-column='tool.mass']")
     mass.find_element("css selector", "button").click()
-    assert names(browser)[1] == "tool=193"  # 193 · 7 = 1351 = 3 · 450 + 1
+    assert names(browser)[1] == "194"  # 193 · 7 = 1351 = 3 · 450 + 1
     mass.find_element("css selector", "button").click()
     assert mass.get_attribute("aria-sort") == "descending"
     assert len(names(browser)) == 200
     browser.find_element("css selector", ".more button").click()
     assert len(names(browser)) == 400
-    browser.find_element("css selector", "[data-status=failed]").click()
-    assert sorted(names(browser)) == [f"tool={k}07" if k else "tool=7" for k in (1, 2, 3, 4, 0)]
-    browser.find_element("css selector", "input").send_keys("tool=3")
-    assert names(browser) == ["tool=307"]
+    browser.find_element("css selector", "[data-word='Not reachable']").click()
+    assert sorted(names(browser)) == ["108", "208", "308", "408", "8"]
+    browser.find_element("css selector", "input").send_keys("308 not")
+    assert names(browser) == ["308"]
     assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
 
 
@@ -342,3 +344,148 @@ def test_a_batch_shows_small_pictures_and_is_no_wider_than_the_window(browser, b
     time.sleep(0.5)
     wide = browser.execute_script("return document.querySelector('td img').naturalWidth")
     assert wide > 0
+
+
+# --- The page of a sweep: its plots
+
+MASS, WANTED = "mechanism.bodies.tool.mass", "targets.0.frequency"
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, rows = tmp_path_factory.mktemp("sweep"), []
+    for k in range(50):
+        mass, hz = k // 5, 12 + k % 5
+        far = abs(mass - (hz - 12)) / 40
+        ended = ("ok", "reached") if far < 0.04 else ("failed", "unreachable")
+        row = CaseOutcome(
+            f"mass={mass}", "arm.yaml", ended[0], 0.1, "unreachable: it is far off" * (far >= 0.04),
+            f"run {k}", 2 * far, far, far + 0.001, design=(("width", 0.03 + k / 1e4),),
+            units={MASS: "kg", "width": "m"}, verdict=ended[1], index=k,
+            values={MASS: mass / 7, WANTED: f"{hz} Hz"},
+        )  # fmt: skip
+        rows.append(to_line(row))
+        (folder / f"run {k}").mkdir()
+        (folder / f"run {k}" / "report.html").write_text("<title>one</title>")
+    write_files(folder, rows, len(rows), (MASS, WANTED))
+    return folder / "index.html"
+
+
+def select(browser: Any, plot: str, label: str, choice: str) -> None:
+    """Choose in the field of this label, as a person does."""
+    for field in browser.find_elements("css selector", f"{plot} label"):
+        if field.text.startswith(label):
+            field.find_element("css selector", "select").send_keys(choice)
+            return
+    raise AssertionError(label)
+
+
+def marks(browser: Any, plot: str, kind: str) -> int:
+    return len(browser.find_elements("css selector", f"{plot} svg {kind}"))
+
+
+def said_at(browser: Any, plot: str, *keys: str) -> str:
+    """What the plot says once these keys are pressed in it."""
+    drawn = browser.find_element("css selector", f"{plot} svg")
+    browser.execute_script("arguments[0].focus()", drawn)
+    drawn.send_keys(*keys)
+    return browser.find_element("css selector", f"{plot} .plot output").text
+
+
+UP, RIGHT, ENTER = "\ue013", "\ue014", "\ue007"
+
+
+def test_a_sweep_is_a_map_over_its_two_keys_and_lines_where_asked(browser, sweep):
+    browser.get_log("browser")
+    requests(browser)
+    at(browser, sweep, 1200)
+    assert "Sweep of arm" in browser.find_element("css selector", "h1").text
+    spans = [li.text for li in browser.find_elements("css selector", "#spans li")]
+    assert spans[0] == "tool.mass, 10 values from 0 to 1.286 kg"
+    assert spans[1] == "targets.0.frequency, 5 values from 12 to 16 Hz"
+    nearest = browser.find_element("css selector", "#nearest").text
+    assert nearest.startswith("Nearest to its target is case 1, 0.1 % off at worst: tool.mass 0 kg")
+    cells = "rect[fill^=rgb][stroke]"
+    assert marks(browser, "#over", cells) == 50
+    select(browser, "#over", "as", "lines")
+    assert marks(browser, "#over", cells) == 0
+    assert marks(browser, "#over", "path[fill=none][stroke-width='2']") == 5
+    select(browser, "#over", "over", "targets")
+    assert marks(browser, "#over", "path[fill=none][stroke-width='2']") == 10
+    select(browser, "#over", "show", "width")
+    assert "width [mm]" in browser.find_element("css selector", "#over svg").text
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
+    assert requests(browser) == [sweep.as_uri()]
+
+
+def test_points_are_named_under_the_pointer_and_by_keys_and_open_their_report(browser, sweep):
+    at(browser, sweep, 1200)
+    select(browser, "#cloud", "against", "tool.mass")
+    assert marks(browser, "#cloud", "path") == 50
+    assert said_at(browser, "#cloud", RIGHT).startswith("case 1\ntool.mass 0 kg\n")
+    assert said_at(browser, "#cloud", RIGHT).startswith("case 7\n")
+    assert said_at(browser, "#cloud", UP).endswith("worst error: 2.6 %\nReached")
+    point = browser.find_elements("css selector", "#cloud svg path")[23]
+    webdriver.ActionChains(browser).move_to_element(point).perform()
+    hovered = browser.find_element("css selector", "#cloud .plot output").text
+    assert hovered.startswith("case 24\ntool.mass 0.5714 kg\ntargets.0.frequency 15 Hz\n")
+    assert said_at(browser, "#over", RIGHT, RIGHT).splitlines()[1:3] == [
+        "tool.mass 0.1429 kg",
+        "targets.0.frequency 12 Hz",
+    ]
+    browser.find_element("css selector", "#over svg").send_keys(ENTER)
+    assert browser.title == "one"
+
+
+def test_plots_show_what_the_filter_leaves(browser, sweep):
+    at(browser, sweep, 1200)
+    browser.find_element("css selector", "[data-word=Reached]").click()
+    reached = len(names(browser))
+    assert marks(browser, "#cloud", "path") == reached < 50
+    browser.find_element("css selector", "input").send_keys("nothing of this kind")
+    assert "no case that is shown" in browser.find_element("css selector", "#over .plot").text
+    assert "no case that is shown" in browser.find_element("css selector", "#cloud .plot").text
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_plots_of_a_sweep_are_as_wide_as_their_place(browser, sweep, width):
+    at(browser, sweep, width)
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+    over = browser.execute_script(
+        "return [...document.querySelectorAll('svg text')].filter((t) => { const a = "
+        "t.getBoundingClientRect(), b = t.closest('svg').getBoundingClientRect(); "
+        "return a.left < b.left - 1 || a.right > b.right + 1; }).map((t) => t.textContent)"
+    )
+    assert over == []
+
+
+def test_fields_have_labels_and_headings_are_in_order(browser, sweep):
+    at(browser, sweep, 1200)
+    fields = browser.find_elements("css selector", "select, input")
+    assert len(fields) == 7
+    assert all(field.accessible_name for field in fields)
+    levels = "return [...document.querySelectorAll('h1, h2, h3')].map((h) => +h.tagName[1])"
+    assert browser.execute_script(levels) == [1, 2, 2]
+    assert all(svg.accessible_name for svg in browser.find_elements("css selector", "svg"))
+
+
+# --- The page of a chart
+
+
+def test_a_chart_has_one_plot_and_draws_the_rest_where_it_is_unfolded(browser, tmp_path):
+    case = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
+    out = tmp_path / "chart"
+    main(["chart", str(case), "--quick", "--quiet", "--out", str(out), "--figures", "none"])
+    browser.get_log("browser")
+    at(browser, out / "report.html", 1200)
+    first = browser.find_element("css selector", ".plot")
+    assert first.get_attribute("data-figure") == "choice"
+    said = browser.find_element("css selector", ".verdict").text
+    assert said.startswith("Write order:")
+    assert sum(plot.is_displayed() for plot in browser.find_elements("css selector", ".plot")) == 1
+    assert browser.execute_script("return document.documentElement.scrollHeight") < 1200
+    browser.execute_script(
+        "document.querySelectorAll('details').forEach((d) => { d.open = true; })"
+    )
+    drawn(browser)
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []

@@ -52,7 +52,10 @@ def design(name: str, excess: float, trace: tuple[tuple[float, float], ...] = ()
     )  # fmt: skip
 
 
-BEST = Advice("accuracy", 1e-4, None, 152.0, "exact dense", {}, 0.0, 0.0152, "words")
+BEST = Advice(
+    "accuracy", 1e-2, None, 152.0, "exact dense", {}, 0.0, 0.0152,
+    "write `order: 4` under `expansion`: 0.05 % off", "order: 4", "Taylor 4 full", 5e-4, 1e-7,
+)  # fmt: skip
 CHART = Chart(
     title="An <arm> & more",
     case_name="arm",
@@ -65,7 +68,7 @@ CHART = Chart(
     points=(
         point("exact dense", "exact", True, 1e-4, 0.0),
         point("Taylor 4 full", "Taylor, full", True, 1e-7, 1e-1),
-        point("auto 1e-04: Taylor 4", "Taylor, auto", True, 1e-7, 1e-1),
+        point("auto 1e-02: Taylor 4", "Taylor, auto", True, 1e-7, 1e-1),
         point("grid linear 4", "grid, linear", False, 2e-7, 1e-2),
         point("hopeless", "grid, linear", False, 2e-7, np.inf),
     ),
@@ -75,8 +78,17 @@ CHART = Chart(
         Front("online alone", None, ("exact dense", "grid linear 4", "Taylor 4 full")),
     ),
     advice=(
-        replace(BEST, auto=AutoTakes("auto 1e-04: Taylor 4", 5e-5, 0.00304, 0.4, "")),
-        replace(BEST, accuracy=1e-8, auto=AutoTakes(None, None, None, 0.0, "it is too large")),
+        replace(BEST, auto=AutoTakes("auto 1e-02: Taylor 4", 5e-5, 0.00304, 0.4, "")),
+        replace(
+            BEST,
+            accuracy=1e-8,
+            key=None,
+            key_method=None,
+            key_relative=None,
+            key_sample_s=None,
+            auto=AutoTakes(None, None, None, 0.0, "it is too large"),
+        ),
+        replace(BEST, evaluations=152000.0),
         Advice("budget", None, 1e-9, 152.0, words="nothing"),
     ),
     mesh=(
@@ -99,6 +111,7 @@ def test_captions_tell_what_is_not_drawn() -> None:
 def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
     bare = replace(CHART, mesh=(), designs=())
     assert {p.name for p in chart_figures(bare)} == {
+        "choice",
         "cost_one_trajectory",
         "online_alone",
     }
@@ -111,14 +124,20 @@ def test_a_folder_holds_every_point_the_tables_and_the_figures(tmp_path: Path) -
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
     assert data["points"][4]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
-    assert data["schema"] == 4
+    assert data["schema"] == 5
     page = (tmp_path / "report.html").read_text()
     assert "An &lt;arm&gt; &amp; more" in page
-    assert page.count("data:image/png;base64") == 4
-    for word in ("What to choose", "Front: one trajectory", "All methods", "Mesh", "Machine"):
+    assert page.count("data:image/png;base64") == 5
+    for word in (
+        "What to write in the case",
+        "The quickest of all methods",
+        "All methods",
+        "Mesh",
+        "Machine",
+    ):
         assert word in page
     figures = {path.name: path.read_bytes() for path in (tmp_path / "figures").iterdir()}
-    names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
+    names = ("choice", "cost_one_trajectory", "online_alone", "mesh", "designs")
     assert set(figures) == {f"{name}.png" for name in names}
     assert all(data.startswith(b"\x89PNG") for data in figures.values())
 
@@ -128,21 +147,51 @@ def table(title: str, chart: Chart = CHART) -> Table:
     return found
 
 
-def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
-    rows = table("Front: online alone").rows
-    assert [row[0] for row in rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
-    assert [row[1] for row in rows] == ["yes", "no", "yes"]
-
-
 def test_what_auto_takes_stands_beside_the_choice() -> None:
-    shown = table("What to choose")
-    taken, refused, budget = shown.rows
-    assert taken[:3] == ("1e-04", "152", "exact dense")
-    assert taken[5:9] == ("Taylor 4", "5.0e-05", "3.04 ms", "400 ms")
-    assert refused[5:9] == ("refused", "", "", "")
-    assert shown.caption.endswith("1e-08 is refused: it is too large.")
-    assert [row[2] for row in shown.rows] == ["exact dense"] * 2 + ["none"]
-    assert budget[5:9] == ("", "", "", "")
+    shown = table("What to write in the case")
+    assert shown.columns[1:6] == (
+        *("under expansion", "worst error", "a sample", "order: auto takes", "its worst error"),
+    )
+    assert shown.rows == (
+        ("1 %", "order: 4", "0.0500 %", "100 ns", "Taylor 4", "0.00500 %", "400 ms", ""),
+        ("1e-06 %", "none", "", "", "", "", "", "it is too large"),
+        ("in 1 ns", "none", "", "", "", "", "", ""),
+    )
+
+
+def test_the_quickest_of_all_methods_is_told_for_each_number_of_evaluations() -> None:
+    rows = [row[:5] for row in table("The quickest of all methods").rows]
+    assert rows[0] == ("1 %", "152", "exact dense", "0.00 %", "15.2 ms")
+    assert rows[2][:3] == ("1 %", "152,000", "exact dense")
+    assert rows[3] == ("in 1 ns", "152", "none", "", "")
+
+
+def test_the_page_is_a_sentence_that_names_a_key_one_plot_and_the_rest_is_folded(
+    tmp_path: Path,
+) -> None:
+    write_chart(CHART, tmp_path, kind="light")
+    above, folded = (tmp_path / "report.html").read_text().split("<details>", 1)
+    assert "Write <code>order: 4</code> under <code>expansion</code>: 0.05 % off." in above
+    assert above.count("<figure") == above.count("<h2") == 1
+    assert "<table" not in above
+    assert "All methods" in folded
+    assert "Where this comes from" in folded
+
+
+def test_the_first_plot_has_four_families_and_rings_what_to_write() -> None:
+    families = ("reduced, 1 point", "fit to an accuracy", "1/λ, full", "reduced, 3 points")
+    more = tuple(replace(CHART.points[1], method=f, family=f, key="") for f in families)
+    plan = chart_figures(replace(CHART, points=(*CHART.points, *more)))[0]
+    figure = draw(plan)
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "time [µs]"
+    assert sorted(words(figure)) == [
+        "exact solves", "fits", "reduced models", "series of λ", "to write in the case",
+    ]  # fmt: skip
+    (ring,) = [line for line in axes.get_lines() if line.get_markersize() == 12.0]
+    np.testing.assert_allclose(ring.get_xydata(), [(0.1, 0.05)])
+    heights = [line.get_ydata()[0] for line in axes.get_lines() if len(set(line.get_ydata())) == 1]
+    assert 1.0 in heights  # % that were asked for
 
 
 def test_a_time_measured_once_says_so() -> None:
@@ -152,11 +201,11 @@ def test_a_time_measured_once_says_so() -> None:
 
 
 def test_what_auto_takes_is_ringed() -> None:
-    plan = chart_figures(CHART)[0]
-    bare = chart_figures(replace(CHART, advice=()))[0]
+    plan = chart_figures(CHART)[1]
+    bare = chart_figures(replace(CHART, advice=()))[1]
     ringed, plain = draw(plan), draw(bare)
     (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
-    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[2].cost_s(152.0), 0.1)])
+    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[2].cost_s(152.0), 0.05)])
     assert "taken by order: auto" in words(ringed)
     assert "taken by order: auto" not in words(plain)
 
@@ -166,22 +215,20 @@ def words(figure: Figure) -> list[str]:
 
 
 def test_points_are_drawn_by_kind_over_a_band_through_the_best() -> None:
-    figure = draw(chart_figures(CHART)[1])
+    figure = draw(chart_figures(CHART)[2])
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [Hz]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [%]")
     assert words(figure)[:6] == [
         "eigassign", "exact solves", "series of λ", "others", "interpolation and surrogates",
         "taken by order: auto",
     ]  # fmt: skip
     shown = {line.get_label(): line for line in axes.get_lines()}
-    np.testing.assert_array_equal(shown["series of λ"].get_xydata(), [(1e-7, 0.1)])
-    np.testing.assert_array_equal(
-        shown["interpolation and surrogates"].get_xydata(), [(2e-7, 0.01)]
-    )
+    np.testing.assert_allclose(shown["series of λ"].get_xydata(), [(1e-7, 0.05)])
+    np.testing.assert_allclose(shown["interpolation and surrogates"].get_xydata(), [(2e-7, 0.005)])
     assert shown["interpolation and surrogates"].get_markerfacecolor() == "white"
     (band,) = [line for line in axes.get_lines() if line.get_linewidth() == 7.0]
-    np.testing.assert_array_equal(band.get_xydata(), [(1e-7, 0.1), (2e-7, 0.01), (1e-4, 1e-10)])
+    np.testing.assert_allclose(band.get_xydata(), [(1e-7, 0.05), (2e-7, 0.005), (1e-4, 5e-11)])
 
 
 def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> None:
@@ -193,7 +240,7 @@ def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> No
     points = [
         replace(CHART.points[0], method=f"m {f}", family=f, ours="," not in f) for f in families
     ]
-    shown = chart_figures(replace(CHART, points=tuple(points)))[0].shows
+    shown = chart_figures(replace(CHART, points=tuple(points)))[1].shows
     labels = [curve.label for curve in shown.panels[0].curves if curve.label]
     assert len(labels) == len(set(labels)) <= 8
     looks = {curve.look for curve in shown.panels[0].curves if curve.names}

@@ -185,8 +185,8 @@ def test_a_batch_lists_every_case():
     good = CaseOutcome("arm", "arm.yaml", "ok", 1.25, exact_max_relative=0.0155)
     bad = CaseOutcome("leg", "leg.yaml", "error", 0.5, "leg.yaml:3:1: [what] is wrong")
     assert batch_table([good, bad]).rows == (
-        ("arm", "ok", "1.25 s", "1.55 %", ""),
-        ("leg", "error", "500 ms", "", "leg.yaml:3:1: [what] is wrong"),
+        ("arm", "Done", "1.55 %", "1.25 s", ""),
+        ("leg", "Not run", "", "500 ms", "leg.yaml:3:1: [what] is wrong"),
     )
 
 

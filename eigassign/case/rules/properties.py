@@ -9,6 +9,7 @@ angles, such as `joints.<name>.position.0`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
 from typing import Annotated, Any, get_args, get_origin
 
 from pydantic_core import PydanticUndefined
@@ -303,18 +304,18 @@ def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
 
 def value_at(case: Any, path: str) -> float:
     """The number at ``path`` in the parts of a valid case, in SI."""
-    head, name, *keys = path.split(".")
-    value: Any = (case.coordinates if head == "coordinates" else getattr(case.mechanism, head))[
-        name
-    ]
-    for key in keys:
-        if value is None:  # what is nowhere else is at its node, and not turned
-            return 0.0
-        if isinstance(value, Mapping):
-            value = value[key]
-        else:
-            value = value[int(key)] if isinstance(value, tuple) else getattr(value, key)
-    return float(value)
+    owner = case if path.startswith("coordinates.") else case.mechanism
+    value = reduce(below, path.split("."), owner)
+    return 0.0 if value is None else float(value)  # it is at its node, and not turned
+
+
+def below(part: Any, key: str) -> Any:
+    """What stands below a part, a mapping of parts or a list; None where nothing does."""
+    if isinstance(part, Mapping):
+        return part.get(key)
+    if isinstance(part, tuple):
+        return part[int(key)] if key.isdecimal() and int(key) < len(part) else None
+    return getattr(part, key, None)
 
 
 def parameters_agree_with_the_file(tree: Tree, case: Any) -> Iterator[Finding]:

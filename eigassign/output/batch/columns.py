@@ -1,9 +1,10 @@
-"""A column for every number of a batch: columns.h5, and the same as columns.csv.
+"""A column for every number of a batch: columns.h5, and summary.csv, which is made of it.
 
 ``/name``, ``/status`` and what else every case has as text or number, (n,) each; ``/values/KEY``
 what a sweep set, in SI units, as ``KEY (text)`` what is no number; ``/design/NAME`` the optimum;
 ``/frequencies/NAME/lowest_hz``, ``mean_hz`` and ``highest_hz`` of each target. NaN where there is
-no number. Rows are in the order of the batch, and a few thousand at a time are held.
+no number. A column's attribute ``unit`` is its SI unit. Rows are in the order of the batch, and a
+few thousand at a time are held.
 """
 
 from __future__ import annotations
@@ -20,26 +21,25 @@ import numpy as np
 from eigassign._version import __version__
 from eigassign.case.units import QuantityError, read_quantity
 from eigassign.files import printable
-from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.batch.summary import cell
+from eigassign.output.batch.outcome import NUMBERS, CaseOutcome
 
 FORMAT = 1  # of columns.h5
 ROWS = 8192  # held at a time, and in a chunk of the file: 64 kB of numbers
 _LONGEST = 1000  # characters of a name: HDF5 has some 64 kB for each
-_TEXTS = ("name", "status", "verdict", "message", "path")
-_NUMBERS = (
-    "seconds", "initial_max_relative", "predicted_max_relative", "exact_max_relative",
-)  # fmt: skip
+_TEXTS = ("name", "status", "verdict", "message", "path", "run_folder")
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
 
 
 class Columns:
-    """columns.h5, row by row, of which ``rows`` are held at a time."""
+    """columns.h5, row by row, of which ``rows`` are held at a time; without a path in memory."""
 
-    def __init__(self, path: Path, total: int, rows: int = ROWS) -> None:
+    def __init__(self, path: Path | None, total: int, rows: int = ROWS) -> None:
         import h5py
 
-        self._most = rows
-        self._file, self._total, self._start = h5py.File(path, "w", locking=False), total, 0
+        how: dict[str, Any] = {"locking": False}
+        how = how if path is not None else {"driver": "core", "backing_store": False}
+        self._most, self._names = rows, list[str]()
+        self._file, self._total, self._start = h5py.File(path or "columns.h5", "w", **how), total, 0
         self._rows: list[CaseOutcome] = []
         self._file.attrs.update({"format": FORMAT, "version": __version__, "cases": total})
 
@@ -49,27 +49,55 @@ class Columns:
         if len(self._rows) == self._most:
             self._flush()
 
-    def end(self) -> None:
-        """Write the rest and close the file."""
+    def end(self, file: TextIO | None = None) -> None:
+        """Write the rest, all of it as CSV into ``file``, and close the file of columns."""
         self._flush()
+        if file is not None:
+            self._write_csv(file)
         self._file.close()
 
+    def _write_csv(self, file: TextIO) -> None:
+        """Each column under its path and unit, without ``values/``; numbers as ``repr`` has them.
+
+        What is text in every row needs no mark of it.
+        """
+        place = {name: k for k, name in enumerate(_ORDER)}
+        names = sorted(self._names, key=lambda name: place[name.partition("/")[0]])
+        heads = []
+        for name in names:
+            bare, unit = name.removesuffix(" (text)"), self._file[name].attrs.get("unit")
+            head = (name if bare in self._names else bare).removeprefix("values/")
+            heads.append(cell(f"{head} [{unit}]" if unit else head))
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        for start in range(0, self._total, ROWS):
+            parts = [
+                [cell(text) for text in column.asstr()[start : start + ROWS]]
+                if _is_text(column)
+                else ["" if v != v else v for v in column[start : start + ROWS].tolist()]
+                for column in map(self._file.get, names)
+            ]
+            writer.writerows(zip(*parts, strict=True))
+
     def _flush(self) -> None:
-        if not self._rows:
-            return
-        for name in (*_TEXTS, *_NUMBERS):
-            self._write(name, [getattr(row, name) for row in self._rows])
+        for name in (*_TEXTS, "seconds", *NUMBERS) if self._rows or not self._total else ():
+            self._write(name, [getattr(row, name) for row in self._rows], name in _TEXTS)
+        units = {name: unit for row in self._rows for name, unit in row.units.items()}
+        units = {_level(name): unit for name, unit in units.items()}
         for group, cells in _GROUPS.items():
             every = [dict(cells(row)) for row in self._rows]
             for name in dict.fromkeys(name for row in every for name in row):
                 self._write(f"{group}/{name}", [row.get(name) for row in every])
+                if unit := units.get(name):
+                    self._file[f"{group}/{name}"].attrs["unit"] = unit
         self._start += len(self._rows)
         self._rows = []
 
-    def _write(self, name: str, cells: list[Any]) -> None:
+    def _write(self, name: str, cells: list[Any], text: bool = False) -> None:
         """The cells of the rows held, of a column that is made where it is new."""
         if name not in self._file:
-            self._create(name, text=any(isinstance(cell, str) for cell in cells))
+            self._create(name, text or any(isinstance(cell, str) for cell in cells))
+            self._names.append(name)
         column = self._file[name]
         made = [*map(_text, cells)] if _is_text(column) else np.array(cells, np.float64)
         column[self._start : self._start + len(cells)] = made
@@ -78,24 +106,12 @@ class Columns:
         import h5py
 
         kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
-        chunks = (min(ROWS, self._total),)
+        chunks = (min(ROWS, self._total),) if self._total else None
         self._file.create_dataset(name, (self._total,), kind, fillvalue=empty, chunks=chunks)
 
 
 def _is_text(column: Any) -> bool:
     return bool(column.dtype.kind == "O")
-
-
-def _names(file: Any) -> list[str]:
-    """The paths of all columns, in the order of the groups."""
-    import h5py
-
-    found = list[str]()
-    file.visititems(lambda n, what: found.append(n) if isinstance(what, h5py.Dataset) else None)
-    first = (*_TEXTS, *_NUMBERS)
-    groups = ["", *_GROUPS]
-    found.sort(key=lambda name: groups.index(name.rpartition("/")[0].partition("/")[0]))
-    return [*(name for name in first if name in found), *(name for name in found if "/" in name)]
 
 
 def _values(row: CaseOutcome) -> Iterator[tuple[str, float | str]]:
@@ -137,21 +153,14 @@ _GROUPS: dict[str, Callable[[CaseOutcome], Iterable[tuple[str, Any]]]] = {
         for what, value in zip(("lowest_hz", "mean_hz", "highest_hz"), hz, strict=True)
     ),
 }
+_ORDER = (  # in the CSV
+    *("name", "values", "status", "verdict", "seconds", *NUMBERS, "design", "frequencies"),
+    *("message", "path", "run_folder"),
+)
 
 
-def write_csv(columns: Path, file: TextIO) -> None:
-    """The columns as CSV, each under its path in the file; numbers as ``repr`` writes them."""
-    import h5py
-
-    writer = csv.writer(file, lineterminator="\n")
-    with h5py.File(columns, locking=False) as stored:
-        names = _names(stored)
-        writer.writerow([cell(name) for name in names])
-        for start in range(0, stored.attrs["cases"], ROWS):
-            parts = [
-                [cell(text) for text in column.asstr()[start : start + ROWS]]
-                if _is_text(column)
-                else ["" if v != v else v for v in column[start : start + ROWS].tolist()]
-                for column in map(stored.get, names)
-            ]
-            writer.writerows(zip(*parts, strict=True))
+def cell(text: str) -> str:
+    """The text as a cell that stays on its line, and that no spreadsheet takes for a formula."""
+    if not text.isprintable():
+        text = printable(" ".join(text.split("\n")))
+    return "'" + text if text.startswith(_FORMULA) else text

@@ -7,21 +7,24 @@ would be files of others, and may say something else than the rows.
 from __future__ import annotations
 
 import hashlib
+import json
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
+from eigassign._version import __version__
 from eigassign.files import MATRIX, file_digest
-from eigassign.output.batch.columns import Columns, write_csv
+from eigassign.output.batch.columns import Columns
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
 from eigassign.output.batch.outcome import CaseOutcome, from_line
-from eigassign.output.batch.summary import SummaryCsv, SummaryJson
+from eigassign.output.batch.summary import FORMAT
 from eigassign.output.store.atomic import replace_synced, replacing
 
 _ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
-_COLUMNS = ("columns.h5", "columns.csv")
+_COLUMNS = ("columns.h5", "columns.csv")  # the latter of versions up to 0.3.0
 NAMES = (*_ALWAYS, *_COLUMNS)
 
 
@@ -45,30 +48,27 @@ def write_files(
     """Write what is made of the ``total`` rows of a batch, each file whole or not at all.
 
     ``lines`` are the rows as `to_line` writes them, ``keys`` those of the sweep; with ``columns``
-    there are columns.h5 and columns.csv too, and else none that are left from before.
+    there is columns.h5 too, and else none that is left from before.
     """
     with ExitStack() as stack:
-        summary = SummaryCsv(_opened(stack, folder / "summary.csv"), keys)
-        plain = SummaryJson(_opened(stack, folder / "summary.json"))
+        plain, ends = _opened(stack, folder / "summary.json"), Counter[str]()
+        plain.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
         junit, index = Junit(_opened(stack, folder / "junit.xml")), Index()
         stored = stack.enter_context(replacing(folder / "columns.h5")) if columns else None
-        columnar = None if stored is None else Columns(stored, total)
+        columnar = Columns(stored, total)
         for line in map(str.rstrip, lines):
             row = from_line(line, folder)
-            summary.add(row)
-            plain.add(row.status, line)
+            plain.write(f"{', ' if ends else '  '}{line}\n")
+            ends[row.status] += 1
             _test(junit, row)
-            index.add(row.status, line)
-            if columnar is not None:
-                columnar.add(row)
-        plain.end()
+            index.add(row, line)
+            columnar.add(row)
+        plain.write(f'], "counts": {json.dumps(dict(sorted(ends.items())))}}}\n')
         junit.end()
-        if stored is not None and columnar is not None:
-            columnar.end()
-            write_csv(stored, _opened(stack, folder / "columns.csv"))
-    replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
-    for name in () if columns else _COLUMNS:  # of the batch as it was before
+        columnar.end(_opened(stack, folder / "summary.csv"))
+    for name in _COLUMNS[columns:]:  # of the batch as it was before
         (folder / name).unlink(missing_ok=True)
+    replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
 
 
 def write_moves(folder: Path, rows: Iterable[tuple[CaseOutcome, Sequence[str]]]) -> None:

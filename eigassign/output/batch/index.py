@@ -1,23 +1,34 @@
-"""index.html of a batch: its rows to sort and to filter, with a picture where a case has one."""
+"""index.html of a batch: what it found in a sentence, plots over what was swept, its rows.
+
+The page carries its rows as numbers, rounded and in units that people read; its own script draws
+them, as a map or lines over the swept keys and as points of any two columns, and sorts and filters.
+"""
 
 from __future__ import annotations
 
+import json
 import os
-import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from eigassign._version import __version__
-from eigassign.facts import fact, number
+from eigassign.brief import cut
+from eigassign.case.units import QuantityError, handy, handy_unit, number_and_unit
+from eigassign.case.values import short_keys
+from eigassign.facts import capital, fact
 from eigassign.output.batch.columns import quantity
-from eigassign.output.batch.outcome import CaseOutcome, from_line
+from eigassign.output.batch.outcome import NUMBERS, CaseOutcome, from_line
+from eigassign.output.batch.summary import bare_names
 from eigassign.output.pages import TEMPLATES, inside, page_of
+from eigassign.output.reports.verdict import TONES
 
-_STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
-_TAIL = re.compile(r"(?<![^.])(?:[0-9]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")  # in linear time
+_MANY = 100  # values of a key: more are a sample's, which need not be told apart
+_MESSAGE = 400  # characters of it: a page of a thousand rows stays below 2 MB
+_LIKE = {"ok": "reached", "tolerance": "improved"}  # how cases without a verdict look
+# Name, unit and kind (name, swept, word, number, text, hidden: for plots only); and the cells
+Column = tuple[tuple[str, str, str], Sequence[float | str | None]]
 
 
 class Index:
@@ -30,12 +41,12 @@ class Index:
         self._most = most
         self._good: list[str] = []
         self._bad: list[str] = []
-        self._counts = Counter[str]()
+        self._counts = Counter[tuple[str, str]]()
 
-    def add(self, status: str, line: str) -> None:
+    def add(self, row: CaseOutcome, line: str) -> None:
         """Keep the line of a row while there is a place for it."""
-        self._counts[status] += 1
-        lines = self._good if status == "ok" else self._bad
+        self._counts[row.word, TONES.get(row.verdict or _LIKE.get(row.status, ""), "bad")] += 1
+        lines = self._good if row.status == "ok" else self._bad
         if len(lines) < self._most:
             lines.append(line)
 
@@ -43,67 +54,107 @@ class Index:
         """The page of the batch in ``folder``; ``keys`` are those of its sweep."""
         lines = [*self._bad, *self._good][: self._most]
         rows = sorted(map(from_line, lines), key=lambda row: row.index)
-        columns = _columns(rows, keys)
+        swept, stems = [*_swept(rows, keys)], {Path(row.path).stem for row in rows}
+        apart = len({*zip(*(cells for _, cells in swept), strict=True)}) == len(rows)
+        names = [str(row.index + 1) for row in rows] if apart else bare_names(rows)
+        columns = [(("case", "", "name"), names), *swept, *_columns(rows)]
+        shown = [
+            (head, cells) for head, cells in columns if any(c not in ("", None) for c in cells)
+        ]
         data = {
-            "columns": [name for name, _ in columns],
-            "rows": [[_links(row, folder), *(cell(row) for _, cell in columns)] for row in rows],
+            "columns": [head for head, _ in shown],
+            "rows": [*zip(*(cells for _, cells in shown), strict=True)],
+            "links": [_links(row, folder) for row in rows],
         }
         return page_of(
             "batch.html.j2",
-            title=title,
+            title=f"Sweep of {', '.join(stems)}" if keys and len(stems) == 1 else title,
+            noun="variant" if keys else "case",
             total=self._counts.total(),
+            met=sum(n for (_, tone), n in self._counts.items() if tone == "good"),
             shown=len(rows),
-            counts=[(s, tone, self._counts[s]) for s, tone in _STATUS.items() if self._counts[s]],
+            counts=sorted((tone != "good", w, tone, n) for (w, tone), n in self._counts.items()),
+            files=[n for n in ("summary.json", "columns.h5") if (folder / n).exists()],
             version=__version__,
             data=inside(data),
             script=(TEMPLATES / "batch.js").read_text("utf-8"),
         )
 
 
-Cell = tuple[str, float | None] | str  # as it is shown, and the number to sort it by
+def _swept(rows: Sequence[CaseOutcome], keys: Sequence[str]) -> Iterator[Column]:
+    """What a sweep set, in the unit that it is written in, with digits that tell values apart.
+
+    And the case file, where there are several.
+    """
+    if keys and len({row.path for row in rows}) > 1:
+        yield ("case file", "", "swept"), [Path(row.path).stem for row in rows]
+    for key, name in short_keys(keys, 2).items():
+        written = [row.values.get(key) for row in rows]
+        try:
+            pairs = [None if value is None else number_and_unit(value) for value in written]
+        except QuantityError:
+            words = [v if isinstance(v, str | None) else json.dumps(v) for v in written]
+            yield (name, "", "swept"), words
+            continue
+        units = {pair[1] for pair in pairs if pair and pair[0]}
+        if len(units) == 1 and (unit := units.pop()):
+            numbers, size = [pair and float(pair[0]) for pair in pairs], 1.0
+        else:
+            numbers = [None if value is None else quantity(value) for value in written]
+            unit = next((row.units[key] for row in rows if key in row.units), "")
+            unit, size = handy_unit(unit, *(n for n in numbers if n is not None))
+        for digits in range(4, 18):
+            cells = _rounded(numbers, size, digits)
+            if len({*cells}) >= min(len({*numbers}), _MANY):
+                break
+        yield (name, unit, "swept"), cells
 
 
-def _columns(
-    rows: Sequence[CaseOutcome], keys: Sequence[str]
-) -> list[tuple[str, Callable[[CaseOutcome], Cell]]]:
-    """Name and cell of each column in a row; columns without a cell are left out."""
-    designs = dict.fromkeys(name for row in rows for name, _ in row.design)
-    # keys by their last two names, and numbers between them, where that tells them apart
-    tails = {key: _TAIL.findall(key)[0] for key in keys}
-    several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
-    short = {key if tail in several else tail: key for key, tail in tails.items()}
-    found: list[tuple[str, Callable[[CaseOutcome], Cell]]] = [
-        _fact("name"),
-        *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in short.items()),
-        *map(_fact, ("status", "verdict", "initial_max_relative", "exact_max_relative", "message")),
-        *((n, lambda row, n=n: _cell(dict(row.design).get(n), number)) for n in designs),
-        _fact("seconds"),
-    ]
-    kept = ("case", "status")
-    return [
-        (name, cell)
-        for name, cell in found
-        if name in kept
-        or any(shown if isinstance(shown, str) else shown[0] for shown in map(cell, rows))
-    ]
+def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
+    """Verdict, errors, mass, price, design, message; for plots frequencies and time too.
+
+    Parameters that less than half of the designs have are told in words.
+    """
+    yield ("verdict", "", "word"), [row.word for row in rows]
+    for name in NUMBERS:
+        one, kind = fact(CaseOutcome, name), "hidden" if name.startswith("pred") else "number"
+        yield _numbers(one.heading, kind, [getattr(row, name) for row in rows], one.unit)
+    designs = [dict(row.design) for row in rows]
+    counts = Counter(name for design in designs for name in design)
+    own = [name for name, count in counts.items() if 2 * count >= sum(map(bool, designs))]
+    for name in own:
+        unit = next((row.units[name] for row in rows if name in row.units), "")
+        yield _numbers(name, "number", [design.get(name) for design in designs], unit)
+    yield ("design", "", "text"), [_told(row, own) for row in rows]
+    ranges = [{name: hz for name, *hz in row.frequencies} for row in rows]
+    for name in dict.fromkeys(name for each in ranges for name in each):
+        for k, which in ((0, "lowest"), (2, "highest")):
+            hz = [each[name][k] if name in each else None for each in ranges]
+            yield _numbers(f"{name}, {which}", "hidden", hz, "Hz")
+    yield _numbers("time", "hidden", [row.seconds for row in rows], "s")
+    told = (row.message.removeprefix(f"{row.verdict.replace('_', ' ')}: ") for row in rows)
+    yield ("message", "", "text"), [cut(capital(text), _MESSAGE) for text in told]
 
 
-def _value(value: Any) -> Cell:
-    if value is None:
-        return ""
-    amount = quantity(value) if isinstance(value, (int, float, str)) else None
-    return str(value) if amount is None else (str(value), amount)
+def _told(row: CaseOutcome, but: Sequence[str]) -> str:
+    """The parameters of a design in words: ``m1 229 g, m2 0 kg``."""
+    rest = ((name, amount) for name, amount in row.design if name not in but)
+    told = (f"{name} {handy(amount, row.units.get(name, ''))}" for name, amount in rest)
+    return ", ".join(text.replace(" ", "\N{NO-BREAK SPACE}") for text in told)
 
 
-def _fact(name: str) -> tuple[str, Callable[[CaseOutcome], Cell]]:
-    one = fact(CaseOutcome, name)
-    return one.heading, lambda row: _cell(getattr(row, name), one.text)
+def _numbers(name: str, kind: str, amounts: Sequence[float | None], unit: str) -> Column:
+    """A column in its handy unit, to four digits; of shares and times three."""
+    few = unit in ("fraction", "s")
+    if unit == "fraction":
+        unit, size = "%", 0.01
+    else:
+        unit, size = handy_unit(unit, *(amount for amount in amounts if amount is not None))
+    return (name, unit, kind), _rounded(amounts, size, 3 if few else 4)
 
 
-def _cell(value: float | str | None, words: Callable[[Any], str]) -> Cell:
-    if value is None or isinstance(value, str):
-        return ("", None) if value is None else words(value)
-    return words(value), value
+def _rounded(amounts: Sequence[float | None], size: float, digits: int) -> list[float | None]:
+    return [None if a is None else float(f"{a / size:.{digits}g}") + 0.0 for a in amounts]
 
 
 def _links(row: CaseOutcome, folder: Path) -> list[str]:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args
 from eigassign.errors import StorageError
 from eigassign.facts import Fact, Seconds, Share
 from eigassign.files import json_value, name_of
+from eigassign.output.reports.verdict import WORDS
 from eigassign.study.results import RunResults
 
 OUTCOME = "outcome.json"  # in the folder of a case
@@ -28,7 +29,8 @@ class CaseOutcome:
     there is no answer: infeasible, unreachable); error (wrong input, no disk, a bug).
     Errors are fractions of the target; None where there is no number. ``values`` are what a sweep
     sets, by key; ``frequencies`` the lowest, mean and highest exact frequency in Hz that each
-    target has along the trajectory at the answer.
+    target has along the trajectory at the answer; ``units`` those in SI of swept values and of the
+    design, by name.
     """
 
     name: Annotated[str, Fact("of the case, and of its variant", "case")]
@@ -38,21 +40,37 @@ class CaseOutcome:
     message: str = ""
     run_folder: Annotated[str | None, Fact("as seen from the folder of the batch")] = None
     initial_max_relative: Annotated[Share | None, Fact("largest error", "worst before")] = None
-    predicted_max_relative: Share | None = None
-    exact_max_relative: Annotated[Share | None, Fact("largest error", "worst after")] = None
+    predicted_max_relative: Annotated[Share | None, Fact(heading="worst predicted")] = None
+    exact_max_relative: Annotated[Share | None, Fact("largest error", "worst error")] = None
+    exact_rms_relative: Annotated[Share | None, Fact("over time", "rms error")] = None
+    mass: Annotated[float | None, Fact("of all links and bodies", "total mass", "kg")] = None
+    price: Annotated[float | None, Fact("of the choices and of the change")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
     frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
-    verdict: Annotated[str, Fact(digits=lambda word: word.replace("_", " "))] = ""
+    verdict: str = ""
     values: Mapping[str, Any] = field(default_factory=dict)
+    units: Annotated[Mapping[str, str], Fact("SI, of values and design")] = field(
+        default_factory=dict
+    )
     index: Annotated[int, Fact("place in the batch")] = 0
     key: Annotated[str, Fact("of what was computed")] = ""
 
+    @property
+    def word(self) -> Annotated[str, Fact(heading="verdict")]:
+        """How it ended as people say it: the verdict, or of a case without one its status."""
+        return WORDS.get(self.verdict, _WITHOUT.get(self.status, self.status))
 
+
+_WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", "error": "Not run"}
 _STATUSES = get_args(Status)
+NUMBERS = (  # that every case has, or lacks
+    "initial_max_relative", "predicted_max_relative", "exact_max_relative", "exact_rms_relative",
+    "mass", "price",
+)  # fmt: skip
 _ORDER = (
     "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
-    "predicted_max_relative", "exact_max_relative", "design", "frequencies", "seconds", "path",
-    "run_folder",
+    "predicted_max_relative", "exact_max_relative", "exact_rms_relative", "mass", "price", "design",
+    "units", "frequencies", "seconds", "path", "run_folder",
 )  # fmt: skip
 
 
@@ -81,17 +99,20 @@ def from_line(line: str | bytes, folder: str | Path = "") -> CaseOutcome:
 def from_plain(row: Any) -> CaseOutcome:
     """The outcome that is written as these plain values; raises ValueError or TypeError else."""
     found = CaseOutcome(**row)
+    if {type(found.values), type(found.units)} != {dict}:
+        raise ValueError("no outcome of a case")
     places = [found.path, "" if found.run_folder is None else found.run_folder]
     texts = [found.name, found.message, found.verdict, found.key, *map(name_of, places)]
-    errors = (found.initial_max_relative, found.predicted_max_relative, found.exact_max_relative)
-    numbers = [found.seconds, *(error for error in errors if error is not None)]
+    texts += [*found.units, *found.units.values()]
+    given = (getattr(found, name) for name in NUMBERS)
+    numbers = [found.seconds, *(number for number in given if number is not None)]
     for name, number in found.design:
         texts.append(name)
         numbers.append(number)
     for name, lowest, mean, highest in found.frequencies:
         texts.append(name)
         numbers += (lowest, mean, highest)
-    right = found.status in _STATUSES and type(found.values) is dict and type(found.index) is int
+    right = found.status in _STATUSES and type(found.index) is int
     if not right or {*map(type, texts)} != {str} or not {*map(type, numbers)} <= {int, float}:
         raise ValueError("no outcome of a case")
     return found

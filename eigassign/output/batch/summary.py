@@ -1,26 +1,19 @@
-"""summary.csv and summary.json, written row by row, and the same on the console."""
+"""summary.json, and the same on the console."""
 
 from __future__ import annotations
 
-import csv
-import json
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, TextIO
+from dataclasses import dataclass, replace
+from typing import Annotated
 
-from eigassign._version import __version__
 from eigassign.facts import Fact
-from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.tables import Table, facts_table
 
 FORMAT = 1  # of summary.json
-COLUMNS = (
-    "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
-    "exact_max_relative", "design", "message", "path", "run_folder",
-)  # fmt: skip
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
+_HASH = re.compile("~[0-9a-f]{10}$")  # of the name of a variant
 
 
 @dataclass(frozen=True)
@@ -34,54 +27,20 @@ class SummaryDocument:
 
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
-    """One line a case: name, status, seconds, worst exact error if there is one, message."""
-    return facts_table("Batch", outcomes, "name status seconds exact_max_relative message")
+    """One line a case: its name, verdict, worst exact error if there is one, time, message."""
+    rows = [replace(o, name=n) for o, n in zip(outcomes, bare_names(outcomes), strict=True)]
+    return facts_table("Batch", rows, "name word exact_max_relative seconds message")
+
+
+def bare_names(outcomes: Sequence[CaseOutcome]) -> list[str]:
+    """The names of cases, of variants without a hash where they are told apart without."""
+    bare = [_HASH.sub("", row.name) if row.values else row.name for row in outcomes]
+    many = Counter(bare)
+    pairs = zip(outcomes, bare, strict=True)
+    return [name if many[name] == 1 else row.name for row, name in pairs]
 
 
 def said(counts: Counter[str]) -> str:
     """``58 ok, 2 error``."""
     order = ("ok", "tolerance", "failed", "error")
     return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])
-
-
-class SummaryCsv:
-    """One line a case, numbers as ``repr`` writes them; a column for every swept key too."""
-
-    def __init__(self, file: TextIO, keys: Sequence[str] = ()) -> None:
-        self._writer, self._keys = csv.writer(file, lineterminator="\n"), tuple(keys)
-        self._writer.writerow((COLUMNS[0], *map(cell, self._keys), *COLUMNS[1:]))
-
-    def add(self, row: CaseOutcome) -> None:
-        """Write one line."""
-        design = "; ".join([f"{name}={amount!r}" for name, amount in row.design])
-        values = {**vars(row), "design": design}
-        first, *others = (cell(values[name]) for name in COLUMNS)
-        swept = (cell(row.values.get(key)) for key in self._keys)
-        self._writer.writerow((first, *swept, *others))  # floats as repr writes them, None as ""
-
-
-def cell(value: object) -> object:
-    """The value as a cell that stays on its line, and that no spreadsheet takes for a formula."""
-    if value is None or isinstance(value, (bool, int, float)):
-        return value
-    text = value if isinstance(value, str) else json.dumps(value)
-    if not text.isprintable():
-        text = printable(" ".join(text.split("\n")))
-    return "'" + text if text.startswith(_FORMULA) else text
-
-
-class SummaryJson:
-    """The rows as the manifest has them, then how many there are of each status."""
-
-    def __init__(self, file: TextIO) -> None:
-        self._file, self._counts = file, Counter[str]()
-        file.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
-
-    def add(self, status: str, line: str) -> None:
-        """Write the line of a row."""
-        self._file.write(f"{', ' if self._counts else '  '}{line}\n")
-        self._counts[status] += 1
-
-    def end(self) -> None:
-        """Write the counts."""
-        self._file.write(f'], "counts": {json.dumps(dict(sorted(self._counts.items())))}}}\n')

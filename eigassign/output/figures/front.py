@@ -1,8 +1,9 @@
 """The figures of a chart: time against error on each front, elements, and ways to a design.
 
-Every figure is a scatter over two logarithmic axes. Methods that differ by a setting are joined by
-a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
-names the kinds. A broad band joins the methods that no other beats.
+Every figure is a scatter over two logarithmic axes. The first has four families, and what to write
+in the case. Methods that differ by a setting are joined by a line: eigassign's filled, the others
+hollow and dashed. A colour is a kind of method; the legend names the kinds. A broad band joins the
+methods that no other beats.
 """
 
 from __future__ import annotations
@@ -16,61 +17,82 @@ import numpy as np
 from eigassign.chart.results import Chart, ChartPoint, Front, excess_over, kind_of
 from eigassign.facts import capital
 from eigassign.output.figures import graph
-from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Rule
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
 WHOSE = {True: "eigassign", False: "others"}  # groups of the legend
 BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
+CHOICE = ("exact", "Taylor, full", "reduced, 1 point", "fit to an accuracy")  # families of it
 RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """The figures that this chart has something to show for, in reading order."""
-    plans = [_front(chart, each) for each in chart.fronts]
+    """The figures that this chart has something to show for; what to write in the case first."""
+    plans = [_front(chart, each, True) for each in chart.fronts if each.evaluations is None]
+    plans += [_front(chart, each) for each in chart.fronts]
     plans += [_mesh(chart)] if chart.mesh else []
     plans += [_designs(chart)] if chart.designs else []
     return tuple(plans)
 
 
-def _front(chart: Chart, front: Front) -> FigurePlan:
-    """The methods by family, over the band through the best; what auto takes is ringed."""
-    asked, n = chart.asked, front.evaluations
-    what = "time of one evaluation" if n is None else f"set-up and {n:,.0f} evaluations"
+def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
+    """The methods by family, over the band through the best; what auto takes is ringed.
+
+    Of ``few`` families the method that the advice names, and the accuracy that it is for.
+    """
+    asked, n, first = chart.asked, front.evaluations, next(iter(chart.advice), None)
+    what = "time of a sample" if n is None else f"set-up and {n:,.0f} evaluations"
     name = "".join(c if c.isalnum() else "_" for c in front.name)
-    name = name if n is None else f"cost_{name}"
+    name = "choice" if few else name if n is None else f"cost_{name}"
     shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
     lost = len(chart.points) - len(shown)
     verb = "method is" if lost == 1 else "methods are"
     beyond = f" {lost} {verb} wrong by over 100 % somewhere and not drawn." if lost else ""
+    where = (
+        f"over {asked.random_points} random samples of trajectory × design box and "
+        f"{asked.designs} × {asked.samples_per_design} samples along the trajectory at several "
+        "designs."
+    )
     caption = (
-        f"Worst |f − f exact| over {asked.random_points} random samples of trajectory × design "
-        f"box and {asked.designs} × {asked.samples_per_design} samples along the trajectory at "
-        "several designs. Filled: eigassign's; hollow: what people do without it; the band: no "
-        "charted method is both quicker and more accurate; ringed: taken by "
+        f"Worst |f / f exact − 1| {where} Filled: eigassign's; hollow: what people do without it; "
+        "the band: no charted method is both quicker and more accurate; ringed: taken by "
         f"`expansion.order: auto`.{beyond}"
     )
+    if few:
+        shown = [p for p in shown if p.family in CHOICE or (first and p.method == first.key_method)]
+        caption = f"A point is a setting, of the series its `order`. Worst error {where}"
 
     def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
-        x = np.array([p.cost_s(n) for p in points])
-        y = np.array([max(p.everywhere.worst_hz, asked.floor_hz) for p in points])
+        x = np.array([p.cost_s(n) / size for p in points])
+        y = np.array([100.0 * max(p.everywhere.worst_relative, floor) for p in points])
         return Curve(y, look, label, x, group=whose, names=tuple(p.method for p in points))
 
+    floor, unit, size = asked.floor_hz / asked.typical_hz, "µs" if few else "s", 1e-6**few
+    below: list[Mark] = [Rule(100.0 * floor, PLAIN, note="round-off of exact solves")]
+    if few:
+        taken, ring = {first.key_method if first else None}, "to write in the case"
+        if first and first.accuracy:
+            below.append(Rule(100.0 * first.accuracy, PLAIN, note="asked for"))
+    else:
+        taken = {a.auto.method for a in chart.advice if a.auto is not None}
+        ring = "taken by order: auto"
+        best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
+        below.append(curve(best, BAND))
+    ringed = [p for p in shown if p.method in taken]
     # what is set up anew for every design has no part in single evaluations
     drawn = [p for p in shown if p.at_once == 1 or n is not None]
     curves = [
         curve([p for p in drawn if p.family == family], PLAIN, kind_of(family), WHOSE[ours])
         for family, ours in dict.fromkeys((p.family, p.ours) for p in drawn)
     ]
-    taken = {a.auto.method for a in chart.advice if a.auto is not None}
-    best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
-    level = Rule(asked.floor_hz, PLAIN, note="round-off of exact solves")
-    ringed = [curve([p for p in shown if p.method in taken], RING, "taken by order: auto")]
-    below = (level, curve(best, BAND), *(ringed if taken else ()))
-    room = (np.array([asked.floor_hz / 2.0]),)  # for the name of the level
+    marks = (*below, *([curve(ringed, RING, ring)] if ringed else ()), *_coloured(curves))
+    room = (np.array([50.0 * floor]),)  # for the name of the level
     heading = f"{capital(what)} against worst error"
-    alt = f"Scatter of worst error in Hz over {what} for every method."
-    panel = Panel("worst error [Hz]", (*below, *_coloured(curves)), 3.8, True, None, room)
-    return FigurePlan(name, heading, caption, alt, _scatter(heading, "time [s]", panel))
+    alt = f"Scatter of worst error in % over {what} for {'a few' if few else 'all'} methods."
+    panel = Panel("worst error [%]", marks, 3.8, True, None, room)
+    section = "answer" if few else "appendix"
+    graph = _scatter(heading, f"time [{unit}]", panel)
+    return FigurePlan(name, heading, caption, alt, graph, section)
 
 
 def _mesh(chart: Chart) -> FigurePlan:

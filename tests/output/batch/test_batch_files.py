@@ -8,6 +8,7 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,12 +18,13 @@ from eigassign.output import (
     CaseOutcome,
     Columns,
     Index,
+    batch_table,
     to_line,
     write_files,
 )
 
 KEYS = ("body.mass", "kind")
-NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.h5", "columns.csv")
+NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.h5")
 
 
 def row(k: int) -> CaseOutcome:
@@ -38,8 +40,14 @@ def row(k: int) -> CaseOutcome:
         design=(("m1", k / 3),),
         frequencies=ranges,
         values={"body.mass": f"{k} g", "kind": "steel"},
+        units={"body.mass": "kg", "m1": "kg"},
         index=k,
     )
+
+
+def summary(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "summary.csv", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def lines(n: int) -> list[str]:
@@ -72,6 +80,7 @@ def test_columns_hold_every_number_in_si_and_nan_where_there_is_none(tmp_path):
         assert found["message"].asstr()[2] == "no such link"
         assert list(found["values/kind (text)"].asstr()[1:4]) == ["steel", "", "steel"]
         assert found["design/m1"][7] == 7 / 3
+        assert found["design/m1"].attrs["unit"] == found["values/body.mass"].attrs["unit"] == "kg"
     there = np.arange(8) != 2
     np.testing.assert_array_equal(mass[there], [0.0, 0.001, 0.003, 0.004, 0.005, 0.006, 0.007])
     np.testing.assert_array_equal(lowest[there], 180.0 + np.arange(8)[there])
@@ -79,13 +88,16 @@ def test_columns_hold_every_number_in_si_and_nan_where_there_is_none(tmp_path):
     assert np.isnan(lowest[2])
 
 
-def test_the_columns_as_csv_are_those_of_the_file(tmp_path):
+def test_the_summary_is_the_columns_of_the_file_with_their_units(tmp_path):
     write_files(tmp_path, lines(5), 5, KEYS, columns=True)
-    with open(tmp_path / "columns.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = summary(tmp_path)
     with h5py.File(tmp_path / "columns.h5") as found:
-        for name in ("seconds", "design/m1", "values/body.mass"):
-            read = [float(each[name] or "nan") for each in rows]
+        for name, heading in (
+            ("seconds", "seconds"),
+            ("design/m1", "design/m1 [kg]"),
+            ("values/body.mass", "body.mass [kg]"),
+        ):
+            read = [float(each[heading] or "nan") for each in rows]
             np.testing.assert_array_equal(read, found[name][:])
     assert [each["status"] for each in rows] == ["ok", "ok", "error", "ok", "ok"]
 
@@ -98,7 +110,7 @@ def test_columns_write_out_what_hdf5_cannot_hold(tmp_path):
         assert found["message"].asstr()[4:6].tolist() == [r"a\x00\ud800", r"a\x00\udce9"]
         assert all(np.nansum(column[:]) == 1.0 for column in found["design"].values())
         assert len(found["design"]) == len(found["values"]) == len(names)
-    assert len((tmp_path / "columns.csv").read_text().splitlines()) == 1 + len(names)
+    assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + len(names)
 
 
 def test_links_of_the_page_are_those_of_folders_whose_names_are_no_text(tmp_path):
@@ -107,13 +119,12 @@ def test_links_of_the_page_are_those_of_folders_whose_names_are_no_text(tmp_path
     (tmp_path / name / "results.json").touch()
     made = to_line(CaseOutcome("c", "arm.yaml", "ok", 0.5, run_folder=name))
     write_files(tmp_path, [made], 1)
-    assert page_data(tmp_path)["rows"][0][0] == ["caf%E9/results.json", ""]
+    assert page_data(tmp_path)["links"] == [["caf%E9/results.json", ""]]
 
 
 @pytest.mark.parametrize("n", [0, 1])
 def test_a_shard_may_be_empty(tmp_path, n):
     write_files(tmp_path, lines(n), n, KEYS, columns=True)
-    assert len((tmp_path / "columns.csv").read_text().splitlines()) == 1 + n
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + n
 
 
@@ -125,24 +136,147 @@ def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_
     made[1] = to_line(CaseOutcome("c=1", "arm.yaml", "ok", 0.5, run_folder="run 1", index=1))
     index = Index(most=3)
     for k, line in enumerate(made):
-        index.add("error" if k == 2 else "ok", line)
+        index.add(replace(row(0), status="error" if k == 2 else "ok"), line)
     (tmp_path / "index.html").write_bytes(index.page(tmp_path, "batch", KEYS))
     found = page_data(tmp_path)
-    assert [each[1] for each in found["rows"]] == ["c=0", "c=1", "c=2"]
-    assert found["rows"][1][0] == ["run%201/report.html", "run%201/figures/frequencies.png"]
-    assert found["columns"][:2] == ["case", "body.mass"]
+    assert [each[0] for each in found["rows"]] == ["c=0", "c=1", "c=2"]
+    assert found["links"][1] == ["run%201/report.html", "run%201/figures/frequencies.png"]
+    assert found["columns"][:2] == [["case", "", "name"], ["body.mass", "kg", "swept"]]
     html = (tmp_path / "index.html").read_text("utf-8")
-    assert "3 of them are shown" in html
+    assert "3 of 6 cases are shown" in html
 
 
 def test_a_name_is_no_markup_in_the_page(tmp_path):
     hostile = CaseOutcome("</script><b>", "a.yaml", "error", 0.1, "<img onerror=x>")
     write_files(tmp_path, [to_line(hostile)], 1)
-    assert page_data(tmp_path)["rows"][0][1] == "</script><b>"
+    assert page_data(tmp_path)["rows"][0][0] == "</script><b>"
     assert "<img onerror" not in (tmp_path / "index.html").read_text("utf-8")
 
 
 def test_columns_of_a_batch_that_has_folders_now_do_not_stay(tmp_path):
     write_files(tmp_path, lines(4), 4, KEYS, columns=True)
+    (tmp_path / "columns.csv").touch()  # of versions up to 0.3.0
     write_files(tmp_path, lines(4), 4, KEYS)
     assert not [*tmp_path.glob("columns.*")]
+
+
+# --- The page
+
+
+def variant(k: int, mass: float, hz: str, **more: Any) -> CaseOutcome:
+    digits = f"{k:x}".zfill(10)
+    found = CaseOutcome(
+        f"mass={mass:.6g},frequency={hz.replace(' ', '')}~{digits}", "cases/arm.yaml", "ok", 1.25,
+        initial_max_relative=0.3, exact_max_relative=0.0123456, exact_rms_relative=0.00517,
+        mass=2.7123456, price=12.0, design=(("width", 0.0354321), ("gear", 5421.7)),
+        frequencies=(("mode 1", 13.45678, 13.5, 13.63),), verdict="reached",
+        values={"mechanism.bodies.tool.mass": mass, "targets.0.frequency": hz},
+        units={"mechanism.bodies.tool.mass": "kg", "width": "m", "gear": "N m/rad"}, index=k,
+    )  # fmt: skip
+    return replace(found, **more)
+
+
+GRID = [variant(4 * k + n, k / 7, f"{12 + n} Hz") for k in range(4) for n in range(4)]
+SWEPT = tuple(GRID[0].values)
+
+
+def page_of(folder: Path, rows: list[CaseOutcome], keys: tuple[str, ...] = SWEPT) -> dict[str, Any]:
+    """The data in the page of these rows, by column: its unit, its kind and its cells."""
+    write_files(folder, map(to_line, rows), len(rows), keys)
+    data = page_data(folder)
+    cells = zip(*data["rows"], strict=True)
+    pairs = zip(data["columns"], cells, strict=True)
+    return {name: (unit, kind, list(own)) for (name, unit, kind), own in pairs}
+
+
+def test_numbers_on_the_page_have_few_digits_and_the_units_that_people_use(tmp_path):
+    found = page_of(tmp_path, GRID)
+    assert {name: (unit, cells[5]) for name, (unit, _, cells) in found.items()} == {
+        "case": ("", "6"),
+        "tool.mass": ("g", 142.9),
+        "targets.0.frequency": ("Hz", 13.0),
+        "verdict": ("", "Reached"),
+        "worst before": ("%", 30.0),
+        "worst error": ("%", 1.23),
+        "rms error": ("%", 0.517),
+        "total mass": ("kg", 2.712),
+        "price": ("", 12.0),
+        "width": ("mm", 35.43),
+        "gear": ("kN m/rad", 5.422),
+        "mode 1, lowest": ("Hz", 13.46),
+        "mode 1, highest": ("Hz", 13.63),
+        "time": ("s", 1.25),
+    }
+    hidden = [name for name, (_, kind, _) in found.items() if kind == "hidden"]
+    assert hidden == ["mode 1, lowest", "mode 1, highest", "time"]
+
+
+def test_what_is_swept_has_the_unit_it_is_written_in_and_digits_that_tell_it_apart(tmp_path):
+    near = [variant(k, 100 + k / 1000, f"{190 + k} deg") for k in range(3)]
+    found = page_of(tmp_path, near)
+    assert found["tool.mass"] == ("kg", "swept", [100.0, 100.001, 100.002])
+    assert found["targets.0.frequency"][0] == "deg"
+    words = [variant(k, 1.0, hz) for k, hz in enumerate(("auto", "12 Hz", "14 Hz"))]
+    assert page_of(tmp_path, words)["targets.0.frequency"][2] == ["auto", "12 Hz", "14 Hz"]
+
+
+def test_variants_are_named_by_their_number_and_no_name_has_a_hash_that_it_needs_not(tmp_path):
+    assert page_of(tmp_path, GRID)["case"][2] == [str(k + 1) for k in range(16)]
+    twice = [variant(0, 0.1, "12 Hz"), variant(1, 0.1, "12 Hz"), variant(2, 0.2, "12 Hz")]
+    names = ["mass=0.1,frequency=12Hz~0000000000", "mass=0.1,frequency=12Hz~0000000001"]
+    assert page_of(tmp_path, twice)["case"][2] == [*names, "mass=0.2,frequency=12Hz"]
+    assert [row[0] for row in batch_table(twice).rows] == [*names, "mass=0.2,frequency=12Hz"]
+    plain = replace(GRID[0], name="arm~0123456789", values={})
+    assert page_of(tmp_path, [plain], ())["case"][2] == ["arm~0123456789"]
+
+
+def test_the_page_says_in_a_sentence_how_many_meet_what_is_asked(tmp_path):
+    missed = {"status": "failed", "verdict": "unreachable", "message": "unreachable: mode 1 is off"}
+    rows = [*GRID[:2], *(replace(row, **missed, exact_max_relative=0.3) for row in GRID[2:])]
+    found = page_of(tmp_path, rows)
+    html = (tmp_path / "index.html").read_text("utf-8")
+    assert "<h1>Sweep of arm</h1>" in html
+    assert "2 of 16 variants meet what is asked." in html
+    assert found["verdict"][2][-1] == "Not reachable"
+    assert found["message"][2][-1] == "Mode 1 is off"
+    assert "failed" not in html.partition('id="data"')[0]
+    for rows, said in ((GRID, "All 16 variants meet"), ([GRID[0]], "The variant meets")):
+        page_of(tmp_path, rows)
+        assert said in (tmp_path / "index.html").read_text("utf-8")
+
+
+def test_designs_that_differ_from_case_to_case_are_told_in_words(tmp_path):
+    rows = [
+        replace(GRID[k], name=name, path=f"{name}.yaml", values={}, units={f"m{k}": "kg"},
+                design=((f"m{k}", 0.25), ("w", 1.0)))
+        for k, name in enumerate(("arm", "leg", "boom"))
+    ]  # fmt: skip
+    found = page_of(tmp_path, rows, ())
+    assert found["design"][2] == [f"m{k}\N{NO-BREAK SPACE}250\N{NO-BREAK SPACE}g" for k in range(3)]
+    assert found["w"][2] == [1.0, 1.0, 1.0]
+    assert found["case"][2] == ["arm", "leg", "boom"]
+
+
+def test_of_several_swept_files_the_file_is_one_of_the_swept_values(tmp_path):
+    other = [replace(row, path="cases/leg.yaml", index=16 + row.index) for row in GRID]
+    found = page_of(tmp_path, [*GRID, *other])
+    assert found["case file"][1:] == ("swept", ["arm"] * 16 + ["leg"] * 16)
+    assert found["case"][2][-1] == "32"
+
+
+def test_the_page_of_a_thousand_variants_is_at_most_two_megabytes(tmp_path):
+    long = {"status": "failed", "verdict": "unreachable", "message": "unreachable: " + "x y " * 800}
+    rows = [variant(k, k / 7, "12 Hz", **long) for k in range(1000)]
+    page_of(tmp_path, rows)
+    assert (tmp_path / "index.html").stat().st_size < 2e6
+
+
+def test_rows_of_earlier_versions_are_shown_without_the_units_that_they_lack(tmp_path):
+    lacks = ("units", "mass", "price", "exact_rms_relative")
+    plain = {k: v for k, v in json.loads(to_line(GRID[5])).items() if k not in lacks}
+    write_files(tmp_path, [json.dumps(plain)], 1, SWEPT)
+    columns = {name: unit for name, unit, _ in page_data(tmp_path)["columns"]}
+    assert columns["width"] == ""
+    assert columns["targets.0.frequency"] == "Hz"
+    (row,) = summary(tmp_path)
+    assert row["design/width"] == "0.0354321"

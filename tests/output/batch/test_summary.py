@@ -6,16 +6,18 @@ import csv
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from eigassign.output import CaseOutcome, to_line, write_files
 
-COLUMNS = [
+AHEAD = [
     "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
-    "exact_max_relative", "design", "message", "path", "run_folder",
+    "exact_max_relative", "exact_rms_relative", "mass", "price",
 ]  # fmt: skip
+LAST = ["message", "path", "run_folder"]
 GOOD = CaseOutcome(
     name="two_link",
     path="cases/two_link.yaml",
@@ -27,6 +29,7 @@ GOOD = CaseOutcome(
     exact_max_relative=0.1 + 0.2,
     design=(("m1", 0.2287), ("m2", 0.0)),
     values={"title": "=A1", "targets.0.frequency": "190 Hz", "load": [1, 2]},
+    units={"m1": "kg", "targets.0.frequency": "Hz"},
 )
 LOOSE = CaseOutcome("loose", "cases/loose.yaml", "tolerance", 0.5, "5 % exceeds 2 %")
 STUCK = CaseOutcome("stuck", "cases/stuck.yaml", "failed", 0.1, "no design meets 'total_mass'")
@@ -52,16 +55,26 @@ def suite(tmp_path: Path) -> ET.Element:
 def test_the_summary_has_one_line_a_case_that_reads_back(tmp_path):
     rows = summary(tmp_path, ALL[:3])
     assert [row["status"] for row in rows] == ["ok", "tolerance", "failed"]
-    assert list(rows[0]) == COLUMNS
+    assert list(rows[0]) == [
+        *AHEAD[:1], *("title", "targets.0.frequency [Hz]", "load"), *AHEAD[1:],
+        *("design/m1 [kg]", "design/m2"), *LAST,
+    ]  # fmt: skip
     assert float(rows[0]["exact_max_relative"]) == 0.1 + 0.2
-    assert rows[0]["design"] == "m1=0.2287; m2=0.0"
+    assert (rows[0]["design/m1 [kg]"], rows[0]["design/m2"]) == ("0.2287", "0.0")
     assert rows[1]["exact_max_relative"] == ""
 
 
 def test_swept_keys_have_a_column_each(tmp_path):
     (row,) = summary(tmp_path, (GOOD,), tuple(GOOD.values))
-    assert (row["title"], row["targets.0.frequency"], row["load"]) == ("'=A1", "190 Hz", "[1, 2]")
+    swept = (row["title"], row["targets.0.frequency [Hz]"], row["load"])
+    assert swept == ("'=A1", "190.0", "[1, 2]")
     assert list(row)[:2] == ["name", "title"]
+
+
+def test_a_key_that_has_words_beside_numbers_has_a_column_of_each(tmp_path):
+    rows = [replace(GOOD, values={"order": value}) for value in (3, "auto")]
+    found = summary(tmp_path, rows, ("order",))
+    assert [(row["order"], row["order (text)"]) for row in found] == [("3.0", ""), ("", "auto")]
 
 
 def test_a_summary_s_message_stays_on_its_line_and_is_no_formula(tmp_path):
@@ -101,4 +114,4 @@ def test_junit_has_a_line_a_case_and_shows_characters_that_xml_cannot_hold(tmp_p
 def test_an_empty_batch_is_still_valid(tmp_path):
     assert summary(tmp_path, ()) == []
     assert ET.parse(tmp_path / "junit.xml").getroot()[0].get("tests") == "0"
-    assert (tmp_path / "summary.csv").read_text() == ",".join(COLUMNS) + "\n"
+    assert (tmp_path / "summary.csv").read_text() == ",".join([*AHEAD, *LAST]) + "\n"
