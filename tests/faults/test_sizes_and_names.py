@@ -6,6 +6,7 @@ import csv
 import json
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -75,7 +76,7 @@ def lattice(bays: int) -> str:
     ]
     for r in "lu":
         along = ["start", *(f"{r}{k}" for k in range(1, bays)), "end"]
-        pairs += zip(along, along[1:], strict=False)
+        pairs += pairwise(along)
     beams = {
         f"{a}_{b}": {"from": a, "to": b, "material": "steel", "section": "rod"} for a, b in pairs
     }
