@@ -30,7 +30,7 @@ def examples(*commands: str, after: str = "") -> str:
     return "\n\n".join([*parts, *([f"\b\n{after}"] if after else [])])
 
 
-class Shard(click.ParamType[tuple[int, int]]):
+class Shard(click.ParamType):  # type: ignore[type-arg] # no generic one before click 8.4
     """``2/8``: the second of eight parts."""
 
     name = "shard"
@@ -48,7 +48,7 @@ class Shard(click.ParamType[tuple[int, int]]):
         return i, n
 
 
-class Age(click.ParamType[float]):
+class Age(click.ParamType):  # type: ignore[type-arg]
     """``30d``: so many seconds."""
 
     name = "age"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from inspect import signature
 from math import prod
 from typing import Any
 
@@ -105,6 +104,4 @@ def _matrix_market(data: bytes) -> Any:
     require_few(rows, rows * columns if layout == b"array" else given)
     if (wrong := _LINES[layout].search(data + b"\n", banner.end(), len(data))) is not None:
         raise ValueError(f"Line {data.count(10, 0, wrong.start()) + 1}")
-    explicit = "spmatrix" in signature(mmread).parameters  # from SciPy 1.15 on, where False is new
-    stream = io.BytesIO(data + b"\n")
-    return mmread(stream, spmatrix=False) if explicit else mmread(stream)
+    return mmread(io.BytesIO(data + b"\n"), spmatrix=False)
