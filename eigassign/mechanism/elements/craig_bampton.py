@@ -16,7 +16,7 @@ as of rotations without inertia) do no harm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,11 +245,34 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
 
 
+class _Heavy(NamedTuple):
+    """The few dofs h that have mass: a Krylov space would be too small for Lanczos."""
+
+    dofs: Ints
+    mass: Floats  # M_hh
+    flexible: Floats  # the columns h of K⁻¹, (n, n_h)
+
+
+def _few_with_mass(M: sparse.csc_array, factor: linalg.SuperLU) -> _Heavy | None:
+    """The dofs with mass where these are few among many, else None; ``factor`` is that of K."""
+    dofs = np.flatnonzero(abs(M).sum(axis=0))
+    if not len(dofs) <= DENSE < M.shape[0]:
+        return None
+    unit = np.zeros((M.shape[0], len(dofs)))
+    unit[dofs, np.arange(len(dofs))] = 1.0
+    flexible = factor.solve(unit) if len(dofs) else unit
+    return _Heavy(dofs, M[dofs][:, dofs].toarray(), flexible)
+
+
 def fixed_modes(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
 ) -> Floats:
     """The modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
     n, least = K.shape[0], 1.0 / lam
+    if (heavy := _few_with_mass(M, factor)) is not None:
+        root = np.linalg.cholesky(heavy.flexible[heavy.dofs])
+        mu, b = np.linalg.eigh(root.T @ heavy.mass @ root)
+        return np.asarray(heavy.flexible @ np.linalg.solve(root.T, b[:, mu >= least][:, ::-1]))
     # Lanczos is asked for 16 modes first, then for twice as many
     rows, count = M.T, 16  # M is symmetric: products run faster row by row
     while n > DENSE and count < n // 2:
@@ -268,6 +291,10 @@ def largest_left_out(
     n = K.shape[0]
     if W.shape[1] >= n:
         return 0.0
+    if (heavy := _few_with_mass(M, factor)) is not None:
+        across = W[heavy.dofs]
+        beside = heavy.flexible[heavy.dofs] - across @ np.linalg.solve(W.T @ (K @ W), across.T)
+        return float(np.linalg.eigvals(heavy.mass @ beside).real.max(initial=0.0))
     if n > DENSE:
         mu = largest_beside(factor, K.T, lambda v: np.asarray(M @ v), W, LOOSE)[0]
         return mu * (1.0 + LOOSE)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
+from eigassign.mechanism.imports.entries import LARGEST
 from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
@@ -115,7 +116,7 @@ def _numbered(raw: _Raw, program: str) -> SolidMesh:
     if missing := place.keys() - raw.nodes.keys():
         raise _UnfitError(f"has elements with nodes that it does not define, as {min(missing)}")
     x = np.array([raw.nodes[node] for node in used], dtype=np.float64)
-    if not np.isfinite(x).all():
+    if not (np.abs(x) < LARGEST).all():
         raise _UnfitError("has nodes at infinite places")
     found = {}
     for count, kind in KINDS.items():

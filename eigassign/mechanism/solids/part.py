@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.imports.parts import UNITS
 from eigassign.mechanism.solids.elements import (
@@ -26,6 +27,7 @@ from eigassign.mechanism.solids.elements import (
     assembled,
     elasticity,
     gradients,
+    jacobians,
     mass,
     stiffness,
 )
@@ -44,6 +46,13 @@ Ints = NDArray[np.intp]
 _log = logging.getLogger(__name__)
 SEVERAL = 50_000  # unknowns above which a factor may take half a minute and a GB
 AT_ONCE = 2_000_000  # strains that are held at a time
+# Volume of an element at a point, of the box of its edges, that is none: files have few digits
+FLAT = 1e-9
+FOLDED = (
+    "has elements that are folded, or have no volume (their Jacobian is not positive at a point of "
+    "integration): make the mesh finer where its surface is curved, or its elements straight (in "
+    "gmsh Mesh.SecondOrderLinear = 1)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +122,7 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
 
     Raises MechanismError for what cannot be read, and for surfaces that the mesh does not have.
     """
-    mesh = _scaled(read_mesh(Path(link.mesh), f"{path}.mesh"), UNITS[link.units].length)
+    mesh = _sound(read_mesh(Path(link.mesh), f"{path}.mesh"), UNITS[link.units].length, path)
     known, found = {name.upper(): own for name, own in mesh.sets.items()}, {}
     for name, node in link.nodes.items():
         own = mesh.sets.get(node.surface, known.get(node.surface.upper()))
@@ -129,8 +138,19 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
 
 
 @lru_cache(maxsize=4)
-def _scaled(mesh: SolidMesh, factor: float) -> SolidMesh:
-    return mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x)
+def _sound(mesh: SolidMesh, factor: float, path: str) -> SolidMesh:
+    """The mesh in metres; raises MechanismError for one that no part has."""
+    far, length = factor * float(np.abs(mesh.x).max()), DIMENSIONS["length"]
+    if not length.smallest < far < length.largest:
+        message = f"has nodes {far:.3g} m from its origin: is it damaged, or in other units?"
+        raise MechanismError(f"{path}.mesh", message)
+    found = mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x)
+    for count, rows in found.elements.items():
+        for xi in (KINDS[count].points, KINDS[count].heavy[0]):
+            J = jacobians(found.x[rows], count, xi)
+            if (np.linalg.det(J) <= FLAT * np.linalg.norm(J, axis=3).prod(axis=2)).any():
+                raise MechanismError(f"{path}.mesh", FOLDED)
+    return found
 
 
 def solid_part(link: Any, nu: float, path: str) -> tuple[SolidPart, Mapping[str, Floats]]:
@@ -158,14 +178,6 @@ def _made(
     K, M = sparse.csr_array((n, n)), sparse.csr_array((n, n))
     for count, rows in mesh.elements.items():
         x = mesh.x[rows]
-        for xi in (KINDS[count].points, KINDS[count].heavy[0]):
-            if (gradients(x, count, xi)[1] <= 0.0).any():
-                raise MechanismError(
-                    f"{path}.mesh",
-                    "has elements that are folded (their Jacobian is not positive at a point of "
-                    "integration): make the mesh finer where its surface is curved, or its "
-                    "elements straight (in gmsh Mesh.SecondOrderLinear = 1)",
-                )
         dofs = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
         K = K + assembled(stiffness(x, count, nu), dofs, n)
         M = M + assembled(np.asarray(np.kron(mass(x, count), np.eye(3))), dofs, n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from solid_parts import METAL, Bar, bar, bdf, case, inp, msh
 
 import eigassign
 import eigassign as ea
-from eigassign.errors import CaseError, MechanismError
+from eigassign.errors import CaseError, MechanismError, MissingMassError
 from eigassign.mechanism import Coupling, joined, read_mesh, solid_part
 
 # Hz, of the bar with rigid ends, one of them fixed: bending in its flat and its upright plane
@@ -223,6 +224,34 @@ def test_random_damage_is_an_error_and_no_crash(tmp_path: Path) -> None:
             except MechanismError:
                 continue
             assert np.isfinite(mesh.x).all()
+
+
+def test_meshes_without_volume_or_of_any_size_are_refused_and_no_crash(tmp_path: Path) -> None:
+    """Corners of an element that coincide, places that no part has: read into a whole model."""
+    rng, part = np.random.default_rng(4), bar((2, 1, 1), 4)
+    x, corners = part.x.copy(), part.elements[3, :2]
+    x[corners[1]] = x[corners[0]]
+    spoiled = [(x, "have no volume"), (1e-12 * part.x, "from its origin: is it damaged")]
+    spoiled += [(np.where(part.x > 0.39, far, part.x), "has nodes") for far in (1e300, 1e7)]
+    for _ in range(16):
+        x = part.x.copy()
+        x[rng.integers(len(x), size=4), rng.integers(3, size=4)] *= 10.0 ** rng.uniform(-300, 300)
+        spoiled.append((x, "has (nodes|elements) "))
+    for places, why in spoiled:
+        try:
+            ea.load_case(case(tmp_path, part._replace(x=places)), allow_outside=True).model()
+        except CaseError as error:
+            assert re.search(why, str(error))  # noqa: PT017
+        else:
+            assert why == "has (nodes|elements) "
+
+
+@pytest.mark.parametrize("reduce_to", [4e3, "auto", 1e9])
+def test_a_solid_without_mass_is_told(tmp_path: Path, reduce_to: Any) -> None:
+    given = case(tmp_path, bar((8, 1, 1), 10), reduce_to=reduce_to)
+    given["mechanism"]["materials"]["metal"] = METAL | {"density": 0.0}
+    with pytest.raises(MissingMassError, match="only 0 modes with mass"):
+        ea.load_case(given, allow_outside=True).model().frequencies([0.0], [], 1)
 
 
 # --- nodes that stand for surfaces
