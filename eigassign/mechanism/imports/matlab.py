@@ -1,4 +1,4 @@
-"""MATLAB's .mat files of versions 4 to 7; those of 7.3 are HDF5, which asks for trust."""
+"""MATLAB's .mat files: of versions 4 to 7 by SciPy, of 7.3, which are HDF5, by `eigassign.hdf5`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from eigassign.files import MATRIX, how_to_raise, raised
+from eigassign.hdf5 import foreign_array, foreign_arrays
 from eigassign.mechanism.imports.entries import Contents, Matrix, UnfitError, require_few
 
 _HEADER, _COMPRESSED = 128, 15  # bytes before the first element; type of one that is compressed
@@ -35,7 +37,7 @@ def read_matlab(data: bytes) -> Contents | None:
     from scipy.io import whosmat
 
     if data.startswith(b"MATLAB 7.3"):
-        raise UnfitError("is of MATLAB 7.3: write it with save('parts.mat', 'K', 'M', '-v7')")
+        return _of_hdf5(data)
     if data.startswith(b"MATLAB "):
         data = _unpacked(data)
     elif not _is_oldest(data):
@@ -78,3 +80,28 @@ def _matrix(data: bytes, name: str, rows: int, entries: int) -> Matrix:
     if hasattr(read, "check_format"):
         read.check_format(full_check=True)
     return Matrix(read)
+
+
+def _of_hdf5(data: bytes) -> Contents:
+    """Full ones are arrays, sparse ones groups of the values, their rows and where columns start.
+
+    Both by columns.
+    """
+    found = foreign_arrays(data, ("MATLAB_class", "MATLAB_sparse"))
+    named = [n for n, each in found.items() if each.words.get("MATLAB_class") in _NUMBERS]
+
+    def matrix(name: str) -> Matrix:
+        rows = found[name].words.get("MATLAB_sparse")
+        if rows is None:
+            require_few(0, prod(found[name].shape))
+            full = foreign_array(data, name)
+            return Matrix(full.T if full.dtype.names is None else full[full.dtype.names[0]] * 1j)
+        parts = (foreign_array(data, f"{name}/{key}") for key in ("data", "ir", "jc"))
+        values, at, starts = parts
+        shape = (int(rows), len(starts) - 1)
+        require_few(max(shape), len(values))
+        read = sparse.csc_array((values, at.astype(np.int64), starts.astype(np.int64)), shape)
+        read.check_format(full_check=True)
+        return Matrix(read)
+
+    return Contents({name: partial(matrix, name) for name in named})

@@ -1,14 +1,16 @@
 """Arrays in one file: HDF5 for everybody, with a record in front by which it is read again.
 
+What others wrote, which has no such record, `foreign_arrays` reads within limits.
+
     eigassign-stored 2 <SHA-256 of all bytes after this line>
     {"key": …, "words": {…}, "arrays": {name: [dtype, shape, place in the file], …}}
     zeros up to 512, 1024, 2048, … bytes: the user block, which HDF5 skips
     HDF5: each array a contiguous dataset, the words once more as attributes of the group ``meta``
 
-What is read is the record: an array is so many bytes at its place, checked against the length of
-the file and not copied. HDF5 itself is never asked, so that links, external and virtual datasets,
-filters, references and nested groups, which anybody may put into a file, mean nothing here, and no
-file takes more memory than it is long.
+What is read of our own is the record: an array is so many bytes at its place, checked against the
+length of the file and not copied. HDF5 itself is never asked, so that links, external and virtual
+datasets, filters, references and nested groups, which anybody may put into a file, mean nothing
+here, and no file takes more memory than it is long.
 
 The hash tells damage; it is no signature. A file with another content and a hash to match is what
 its author made of it, and the classes and shapes that its reader expects are all that is checked.
@@ -16,22 +18,24 @@ its author made of it, and the classes and shapes that its reader expects are al
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
 import re
-from collections.abc import Mapping
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, UsageError
-from eigassign.files import STORED, read_bytes
-from eigassign.output.store.atomic import replace_synced
+from eigassign.files import MATRIX, STORED, how_to_raise, raised, read_bytes
 
 Array = NDArray[Any]
 SCHEMA = 2  # raise it when the layout of the file changes
@@ -55,13 +59,8 @@ class Stored:
     words: dict[str, str]
 
 
-def put(path: Path, key: str, arrays: Mapping[str, Array], words: Mapping[str, str]) -> None:
-    """Write the file in one step (`replace_synced`); raises OSError, and as `pack` does."""
-    replace_synced(path, pack(key, arrays, words))
-
-
 def get(path: Path, key: str) -> Stored:
-    """The arrays that were `put` there; raises as `read_bytes` and `unpack` do."""
+    """The arrays that were packed there; raises as `read_bytes` and `unpack` do."""
     return unpack(key, read_bytes(path, STORED))
 
 
@@ -155,3 +154,109 @@ def _array(data: bytes, dtype: str, shape: list[int], place: int) -> Array:
     if min([*shape, place]) < 0 or place + count * kind.itemsize > len(data):
         raise ValueError("an array beyond its end")
     return np.frombuffer(data, kind, count, place).reshape(shape)
+
+
+# --- What others wrote
+
+_DEFLATE, _SHUFFLE, _CHECKSUM = 1, 2, 3  # filters, by HDF5's numbers
+_MOST_CHUNKS = 100_000  # some 50 µs each
+
+
+class Foreign(NamedTuple):
+    """An array in a file of anybody's, or a group of such, () of no numbers; words by attribute."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    words: dict[str, str]
+
+
+def foreign_arrays(data: bytes, attributes: Sequence[str]) -> dict[str, Foreign]:
+    """What lies at the root of an HDF5 file, and in its groups as ``group/name``, no deeper.
+
+    Links to elsewhere are passed over. Raises ValueError for a damaged file.
+    """
+    import h5py
+
+    found = {}
+    with _opened(data) as file:
+        groups = [("", file)]
+        for prefix, group in groups:  # which grows
+            own = [n for n in group if isinstance(group.get(n, getlink=True), h5py.HardLink)]
+            for name in own:
+                each = group[name]
+                words = {key: _word(each, key) for key in attributes if key in each.attrs}
+                shape, dtype = getattr(each, "shape", None), getattr(each, "dtype", np.dtype("V"))
+                found[prefix + name] = Foreign(shape or (), dtype, words)
+                if not prefix and isinstance(each, h5py.Group):
+                    groups.append((f"{name}/", each))
+    return found
+
+
+def foreign_array(data: bytes, name: str) -> Array:
+    """An array of `foreign_arrays`; chunks are unpacked here, to no more than they should hold.
+
+    Raises UsageError for one that is larger than matrices may be, or stored in a way that is not
+    read, and ValueError for a damaged one.
+    """
+    with _opened(data) as file:
+        dataset = file[name]
+        plan, chunk = dataset.id.get_create_plist(), dataset.chunks or ()
+        filters = [plan.get_filter(k)[0] for k in range(plan.get_nfilters())]
+        if dataset.is_virtual or dataset.external or {*filters} - {_DEFLATE, _SHUFFLE, _CHECKSUM}:
+            raise UsageError("stores an array in a way that is not read: write it uncompressed")
+        size = dataset.dtype.itemsize * prod(dataset.shape)
+        if size > raised(MATRIX):
+            raise UsageError(f"unpacks to {size / 1e6:.3g} MB: {how_to_raise(size, MATRIX)}")
+        out = np.zeros(dataset.shape, dataset.dtype)
+        if not chunk or not out.size:
+            dataset.read_direct(out) if out.size else None
+            return out
+        grid = [range(0, n, step) for n, step in zip(out.shape, chunk, strict=True)]
+        if prod(map(len, grid)) > _MOST_CHUNKS:
+            raise UsageError("stores an array in too many pieces")
+        for corner in product(*grid):
+            place = dataset.id.get_chunk_info_by_coord(corner)
+            if place.byte_offset is None:
+                continue
+            if place.size > len(data):
+                raise ValueError("a piece beyond its end")
+            mask, packed = dataset.id.read_direct_chunk(corner)
+            used = [f for k, f in enumerate(filters) if not mask >> k & 1]
+            piece = _unpacked(packed, used, chunk, out.dtype)
+            room = tuple(slice(at, at + step) for at, step in zip(corner, chunk, strict=True))
+            out[room] = piece[tuple(slice(n) for n in out[room].shape)]
+    return out
+
+
+def _unpacked(
+    packed: bytes, filters: Sequence[int], shape: tuple[int, ...], dtype: np.dtype[Any]
+) -> Array:
+    size = dtype.itemsize * prod(shape)
+    for each in reversed(filters):
+        if each == _DEFLATE:
+            packed = zlib.decompressobj().decompress(packed, size + 4)
+        elif each == _CHECKSUM:
+            packed = packed[:-4]
+        else:
+            packed = np.frombuffer(packed, "u1").reshape(dtype.itemsize, -1).T.tobytes()
+    return np.frombuffer(packed, dtype).reshape(shape)
+
+
+def _word(each: Any, key: str) -> str:
+    own = each.attrs.get_id(key)
+    if own.shape != () or own.dtype.kind not in "Sui":
+        return ""
+    value = each.attrs[key]
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
+
+
+@contextlib.contextmanager
+def _opened(data: bytes) -> Iterator[Any]:
+    """An HDF5 file in memory; whatever is wrong with it is a ValueError."""
+    import h5py
+
+    try:
+        with h5py.File(io.BytesIO(data), "r") as file:
+            yield file
+    except (OSError, RuntimeError, KeyError, TypeError, zlib.error) as error:
+        raise ValueError("a damaged HDF5 file") from error
