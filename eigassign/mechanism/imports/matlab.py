@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from eigassign.files import MATRIX, how_to_raise, raised
-from eigassign.hdf5 import foreign_array, foreign_arrays
+from eigassign.hdf5 import ForeignFile
 from eigassign.mechanism.imports.entries import Contents, Matrix, UnfitError, require_few
 
 _HEADER, _COMPRESSED = 128, 15  # bytes before the first element; type of one that is compressed
@@ -83,25 +83,25 @@ def _matrix(data: bytes, name: str, rows: int, entries: int) -> Matrix:
 
 
 def _of_hdf5(data: bytes) -> Contents:
-    """Full ones are arrays, sparse ones groups of the values, their rows and where columns start.
+    """Full ones are arrays by columns, sparse ones values, their rows and where columns start.
 
-    Both by columns.
+    Text is stored as whole numbers, and these are passed over.
     """
-    found = foreign_arrays(data, ("MATLAB_class", "MATLAB_sparse"))
-    named = [n for n, each in found.items() if each.words.get("MATLAB_class") in _NUMBERS]
+    file = ForeignFile(data)
+    kinds = {name: each.dtype.kind for name, each in file.arrays.items() if each.dtype is not None}
+    by_columns = [name for name in file.arrays if f"{name}/jc" in kinds]
 
     def matrix(name: str) -> Matrix:
-        rows = found[name].words.get("MATLAB_sparse")
-        if rows is None:
-            require_few(0, prod(found[name].shape))
-            full = foreign_array(data, name)
-            return Matrix(full.T if full.dtype.names is None else full[full.dtype.names[0]] * 1j)
-        parts = (foreign_array(data, f"{name}/{key}") for key in ("data", "ir", "jc"))
-        values, at, starts = parts
-        shape = (int(rows), len(starts) - 1)
-        require_few(max(shape), len(values))
-        read = sparse.csc_array((values, at.astype(np.int64), starts.astype(np.int64)), shape)
+        if name in kinds:
+            require_few(0, prod(file.arrays[name].shape))
+            return Matrix(file.read(name).T)
+        values, at, starts = (file.read(f"{name}/{key}") for key in ("data", "ir", "jc"))
+        n = len(starts) - 1
+        require_few(n, len(values))
+        found = (values, at.astype(np.int64), starts.astype(np.int64))
+        read = sparse.csc_array(found, (n, n))
         read.check_format(full_check=True)
         return Matrix(read)
 
-    return Contents({name: partial(matrix, name) for name in named})
+    full = [name for name, kind in kinds.items() if kind == "f" and "/" not in name]
+    return Contents({name: partial(matrix, name) for name in (*full, *by_columns)})

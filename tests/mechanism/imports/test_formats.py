@@ -237,7 +237,7 @@ def test_hdf5_of_others_takes_no_more_than_the_limit(
         made = written.create_dataset("K", (9, 9), "f8", chunks=(9, 9), compression="gzip")
         made.attrs["MATLAB_class"] = np.bytes_("double")
         made.id.write_direct_chunk((0, 0), zlib.compress(bytes(200_000_000)))
-        written["elsewhere"] = h5py.ExternalLink("/etc/hostname", "M")
+        written["elsewhere"] = h5py.SoftLink("/K")
     with open(file, "r+b") as stream:
         stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
     tracemalloc.start()
