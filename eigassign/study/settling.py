@@ -15,8 +15,13 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
-from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
-from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.assembly.build import (
+    LOWEST,
+    WholeLinks,
+    with_elements,
+    with_reduction,
+)
+from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.cheapest import cheapest
@@ -85,8 +90,12 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
         return build_model(with_reduction(file, dict.fromkeys(names, frequency_hz)), links)
 
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
-    path, q0 = _path(file, whole)
-    x = standing(at_corners(file, path, q0, initial_design(file)), whole).x
+    upright = whole
+    if whole.pencil.weight is not None:  # inside imported parts it changes nothing
+        at_nodes = {n: LOWEST if is_imported(file, n) else None for n in names}
+        upright = build_model(with_reduction(file, at_nodes), links)
+    path, q0 = _path(file, upright)
+    x = standing(at_corners(file, path, q0, initial_design(file)), upright).x
     modes_at = modes_that_matter(file, _bands_hz(file, path))
     return cheapest(reductions(names, whole, reduced, x, modes_at), truncation_share(file))
 

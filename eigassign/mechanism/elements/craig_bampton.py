@@ -7,7 +7,10 @@ Craig and Bampton (AIAA J. 6 (1968) 1313): with the interface b and the interior
 Links stay affine in y: the basis is constant, taken in the middle of the design's bounds, and every
 constant matrix of the link is projected on it. Where the link itself changes with y, W also holds
 what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
-rigid-body motion is in the span at every y. What is left out is estimated in modal/truncation.py.
+rigid-body motion is in the span at every y. Under gravity that of an imported part holds its sag as
+well, K_ii⁻¹ (M r)_i of translations r: the weight's stiffness, which joins M r to the nodes
+(`assembly.gravity.imported`), is nothing then on what is left out. That is estimated in
+modal/truncation.py.
 
 The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,
 as of rotations without inertia) do no harm.
@@ -34,7 +37,7 @@ from eigassign.mechanism.elements.sparse_factor import (
     largest_beside,
     largest_modes,
 )
-from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
+from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported, link_type
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -66,7 +69,11 @@ def reduced_where_asked(
     central = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
     N, Psi = total(mesh.rigid, central).toarray(), parts[0].Psi
     Psi = Psi + (N[i] - Psi @ N[b]) @ np.linalg.pinv(N[b])  # Ψ N_b = N_i to the last digit
-    W = _span(parts, Psi, mesh.rigid, b, i, lam)
+    heavy = np.zeros((len(i), 0))
+    if is_imported(case, name) and isinstance(case.mechanism.gravity, tuple):
+        axes = len(case.mechanism.gravity)
+        heavy = np.asarray(mesh.mass[0].matrix[i] @ total(mesh.rigid, central)[:, :axes].toarray())
+    W = _span(parts, Psi, mesh.rigid, heavy, b, i, lam)
     if W.shape[1] >= len(i):
         return mesh
     T = np.zeros((mesh.n_local, len(b) + W.shape[1]))
@@ -166,15 +173,25 @@ def coefficients(parameters: ModelParameters, terms: Sequence[Term], p: Floats) 
 
 
 def _span(
-    parts: Sequence[_DesignBlocks], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
+    parts: Sequence[_DesignBlocks],
+    Psi: Floats,
+    rigid: Sequence[Term],
+    heavy: Floats,
+    b: Ints,
+    i: Ints,
+    lam: float,
 ) -> Floats:
-    """W (n_i, k), K_ii-orthonormal: rigid remainders, fixed-interface modes, other designs."""
+    """W (n_i, k), K_ii-orthonormal: rigid remainders, sags under forces ``heavy`` (n_i, n), modes
+    with the interface held, other designs.
+    """
     first = parts[0]
     K = first.K_ii
     W = np.zeros((len(i), 0))
     for term in rigid:
         N = term.matrix.toarray()
         W = _extended(W, K, N[i] - Psi @ N[b], _norms(K, N[i]), EXACT)
+    sags = np.asarray(first.factor.solve(heavy)) if heavy.size else heavy
+    W = _extended(W, K, sags, _norms(K, sags), EXACT)
     Phi = fixed_modes(K, first.M_ii, first.factor, lam)
     W = _extended(W, K, Phi, np.ones(Phi.shape[1]), EXACT)
     for part in parts[1:]:
