@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated
 
 import numpy as np
@@ -216,6 +217,7 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
 
 
 def _checked(case: BuiltCase) -> CheckAnswer:
+    started = perf_counter()
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = part_lines(file)
@@ -243,7 +245,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += weight.lines
         warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
-    takes = None if plan is None else outlook(case, plan, trajectory)
+    takes = None if plan is None else outlook(case, plan, trajectory, started)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
         title=file.title,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,11 @@ from eigassign.study.planning import (
 Floats = NDArray[np.float64]
 
 
+# Times the highest frequency that matters: where elements are chosen imported parts with
+# `reduce_to: auto` are reduced to that, far beyond what is chosen for them then
+BEYOND = 8.0
+
+
 @dataclass(frozen=True)
 class SettledModel:
     """A model with the file it is of: ``file`` has numbers in place of ``auto`` for its links."""
@@ -73,12 +79,20 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
     if None not in wanted.values():
         return None
 
-    def meshed(elements: Mapping[str, int]) -> Model:
-        return build_model(with_elements(file, elements))
+    def meshed(to_hz: float, elements: Mapping[str, int]) -> Model:
+        meshed = with_elements(file, elements)
+        return build_model(with_reduction(meshed, dict.fromkeys(parts, to_hz)))
 
-    trial = meshed({name: TRIAL for name, given in wanted.items() if given is None})
+    parts = [name for name in automatic_reduction(file) if is_imported(file, name)]
+    trial = meshed(LOWEST, {name: TRIAL for name, given in wanted.items() if given is None})
     path, q0 = _path(file, trial)
-    return settle_mesh(file, meshed, path, q0, modes_that_matter(file, _bands_hz(file, path)))
+    modes_at = modes_that_matter(file, _bands_hz(file, path))
+    beyond = LOWEST
+    if parts:
+        q, y = q0 if path is None else path.q[0], initial_design(file)
+        highest = max(modes_at(trial, trial.x(q, y)))
+        beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
+    return settle_mesh(file, partial(meshed, beyond), path, q0, modes_at)
 
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:

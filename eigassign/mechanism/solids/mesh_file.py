@@ -50,6 +50,12 @@ class SolidMesh:
     elements: dict[int, Ints]  # (m, number of nodes)
     sets: dict[str, Ints]
 
+    def pieces(self, most: int) -> Iterator[tuple[int, Ints]]:
+        """The elements with their number of nodes, so many at a time at most."""
+        for count, rows in self.elements.items():
+            for k in range(0, len(rows), max(most, 1)):
+                yield count, rows[k : k + max(most, 1)]
+
 
 class _UnfitError(Exception):
     """The file is readable but its content is not what is wanted; begins with a verb."""

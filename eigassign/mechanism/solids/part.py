@@ -9,7 +9,7 @@ mode, is about what the mesh adds to λ.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 _log = logging.getLogger(__name__)
 SEVERAL = 50_000  # unknowns above which a factor may take half a minute and a GB
-AT_ONCE = 2_000_000  # strains that are held at a time
+AT_ONCE = 2_000_000  # numbers that are held at a time: strains, entries of elements' matrices
 # Volume of an element at a point, of the box of its edges, that is none: files have few digits
 FLAT = 1e-9
 FOLDED = (
@@ -74,7 +74,7 @@ class SolidPart:
         """
         x, u = self.mesh.x, (self.motion @ v).reshape(len(self.mesh.x), -1)
         mean, volume = np.zeros((len(x), 2 * u.shape[1])), np.zeros(len(x))
-        for count, rows in self._pieces(u.shape[1]):
+        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
             weight = np.repeat(mass(x[rows], count).sum(axis=(1, 2)), count)
             spread = sparse.csr_array(
                 (weight, (rows.ravel(), np.arange(rows.size))), shape=(len(x), rows.size)
@@ -86,7 +86,7 @@ class SolidPart:
         at, possible = self.boundary
         mean[at] = possible @ mean[at]
         out = np.zeros((v.shape[1],) * 2)
-        for count, rows in self._pieces(u.shape[1]):
+        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
             own = np.einsum("ab,mkbr->mkar", C, _strains(x[rows], count, u[rows]))
             d = mean[rows] - own
             heavy = (mass(x[rows], count) @ d.reshape(*rows.shape, -1)).reshape(d.shape)
@@ -98,13 +98,6 @@ class SolidPart:
     def boundary(self) -> tuple[Ints, Floats]:
         """Nodes where nothing pulls, and the stresses that can be there, `free_directions`."""
         return free_directions(self.mesh, self.held)
-
-    def _pieces(self, width: int) -> Iterator[tuple[int, Ints]]:
-        """The elements, few enough at a time."""
-        for count, elements in self.mesh.elements.items():
-            step = max(1, AT_ONCE // (2 * count * width))
-            for k in range(0, len(elements), step):
-                yield count, elements[k : k + step]
 
 
 def _strains(x: Floats, count: int, u: Floats) -> Floats:
@@ -176,7 +169,7 @@ def _made(
     _tell_size(T.shape[1], path)
     n = T.shape[0]
     K, M = sparse.csr_array((n, n)), sparse.csr_array((n, n))
-    for count, rows in mesh.elements.items():
+    for count, rows in mesh.pieces(AT_ONCE // 2000):
         x = mesh.x[rows]
         dofs = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
         K = K + assembled(stiffness(x, count, nu), dofs, n)

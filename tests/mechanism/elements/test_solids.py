@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import eigassign
 import eigassign as ea
 from eigassign.errors import CaseError, MechanismError, MissingMassError
 from eigassign.mechanism import Coupling, joined, read_mesh, solid_part
+from eigassign.study import load_case
 
 # Hz, of the bar with rigid ends, one of them fixed: bending in its flat and its upright plane
 BENDING = (103.05, 154.06)
@@ -353,6 +355,37 @@ def test_what_a_solid_leaves_out_is_bounded(tmp_path: Path, g: float) -> None:
         bound = model.truncation_error([0.0], [], (1, 2, 3))[0]
         assert (raised > -1e-9).all()
         assert (bound >= raised - 1e-9).all()
+
+
+def test_weight_of_a_solid_takes_no_dense_matrix(tmp_path: Path) -> None:
+    mesh = bar((16, 3, 3), 10)
+    given = case(tmp_path, mesh, reduce_to=2e4)
+    given["mechanism"]["gravity"] = [0.0, 0.0, -9.81]
+    tracemalloc.start()
+    model = ea.load_case(given, allow_outside=True).model()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert model.pencil.weight is not None
+    assert peak < 8 * (3 * len(mesh[0])) ** 2 / 2
+
+
+def test_elements_are_chosen_alike_beside_parts_whose_reduction_is_not_chosen_yet(
+    tmp_path: Path,
+) -> None:
+    found = []
+    for reduce_to in ("auto", 5e4):
+        given = case(tmp_path, bar((8, 1, 1), 20), reduce_to=reduce_to)
+        beam = {"length": 0.6, "material": "metal", "section": "rod", "elements": "auto"}
+        given["mechanism"]["sections"] = {"rod": {"shape": "circle", "diameter": 0.02}}
+        given["mechanism"]["links"]["arm"] = beam
+        joint = {"type": "revolute", "base": "bar.end", "follower": "arm.start", "axis": [0, 0, 1]}
+        given["mechanism"]["joints"]["turn"] = joint
+        given["coordinates"]["turn"] = {"joint": "turn", "drive": {"stiffness": 1e4}}
+        given["expansion"] = {"q": [0.0, 0.3], "accuracy": 1e-4}
+        built = load_case(given, allow_outside=True)
+        found.append(built.mesh.elements["arm"])
+        assert built.model().discretisation_error([0.0, 0.3], [], (1,)) < 2e-2
+    assert found[0] == found[1]
 
 
 def test_in_a_plane_a_solid_bends_in_it_only(tmp_path: Path) -> None:
