@@ -17,7 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
-    "h5py": {"output"},
+    "h5py": {"hdf5", "output"},
     "matplotlib": {"output"},
     "PIL": {"output"},  # comes with matplotlib
     "markupsafe": {"output"},  # comes with Jinja

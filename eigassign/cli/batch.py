@@ -273,7 +273,7 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     if case_s is not None:
         total = duration(case_s * len(todo) / min(workers.slots, len(todo)))
         show(f"time     about {total} in {processes}: {duration(case_s)} a case, {source}")
-    show(f"memory   about {150 + memory_mb:.0f} MB in each of {processes}")
+    show(f"memory   about {memory_mb:.0f} MB in each of {processes}")
     # of the paper's arm: a folder has 8 files and 30 kB, a report 14 more and 700 kB, a line 1 kB
     disk_mb = (len(todo) + 30 * folders + 700 * drawn) / 1e3
     count = 8 * folders + 14 * drawn
@@ -282,19 +282,22 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
 
 
 def _of_first(batch: Batch, index: int, drawn: bool) -> tuple[float | None, float]:
-    """Seconds of a case, and megabytes of its expansion, from its sizes; None: it has no answer."""
+    """Seconds of a case, and megabytes of it, from its sizes; None: it has no answer."""
+    from time import perf_counter
+
     from eigassign.batch.work import load
-    from eigassign.pipeline.outlook import ELSE_S, outlook
+    from eigassign.pipeline.outlook import ALONE_MB, ELSE_S, outlook
     from eigassign.study.planning import expansion_needed, plan_expansion
 
+    started = perf_counter()
     try:
         case = load(batch.plan[index], batch.options)
         needed = expansion_needed(case.file)
         plan = plan_expansion(case.file, case.model(), case.trajectory, needed=needed)
-        found = outlook(case, plan, case.trajectory)
+        found = outlook(case, plan, case.trajectory, started)
     except EigassignError:
-        return None, 0.0
+        return None, ALONE_MB
     if found.optimize_s is None:
-        return None, found.expansion.memory_mb
+        return None, found.memory_mb
     # a light report takes 5 s with its figures
-    return found.optimize_s - ELSE_S + (5.0 if drawn else 0.0), found.expansion.memory_mb
+    return found.optimize_s - ELSE_S + (5.0 if drawn else 0.0), found.memory_mb

@@ -134,7 +134,8 @@ def _expected(outlook: Outlook) -> list[str]:
             f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
         )
     if outlook.optimize_s is not None:
-        lines.append(f"optimize: {_about(outlook.optimize_s)}")
+        large = f", {outlook.memory_mb / 1e3:.1g} GB" if outlook.memory_mb > 300.0 else ""
+        lines.append(f"optimize: {_about(outlook.optimize_s)}{large}")
     return lines
 
 

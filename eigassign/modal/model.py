@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.build import build_pencil, has_tapers, refined, with_reduction
 from eigassign.mechanism.assembly.dynamics.under_load import (
@@ -99,7 +100,7 @@ class Model:
 
     @cached_property
     def whole(self) -> Pencil:
-        """K and M with no link reduced."""
+        """K and M with no link of beams reduced."""
         return self.pencil if self.reduced is None else self._rebuilt(self._unreduced)
 
     @cached_property
@@ -116,7 +117,7 @@ class Model:
 
     @cached_property
     def finer(self) -> tuple[CaseFile, Pencil] | None:
-        """The case, K and M with twice the elements and no link reduced.
+        """The case, K and M with twice the elements and no link of beams reduced.
 
         None where that gives way alike: beams of one section are exact under forces at their ends.
         """
@@ -128,9 +129,11 @@ class Model:
 
     @property
     def _unreduced(self) -> CaseFile:
-        links = self.poses.case.mechanism.links
-        names = [name for name, link in links.items() if getattr(link, "reduce_to", None)]
-        return with_reduction(self.poses.case, dict.fromkeys(names))
+        links = self.poses.case.mechanism.links.items()
+        beams = [
+            n for n, each in links if getattr(each, "reduce_to", 0) and each.type not in IMPORTED
+        ]
+        return with_reduction(self.poses.case, dict.fromkeys(beams))
 
     def _rebuilt(self, case: CaseFile) -> Pencil:
         return build_pencil(case, self.poses.parameters, self.motion)
@@ -217,14 +220,17 @@ class Model:
         """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).
 
         Zero without reduced links; infinite where nothing can be vouched for. Under gravity
-        the links are solved whole.
+        links of beams are solved whole.
         """
         x = self.x(q, y)
-        if self.reduced is None:
-            return np.zeros((len(x), len(modes)))
-        if self.pencil.weight is None:
-            return truncation_error(self.reduced, x, modes)
-        return compared_error(self.pencil, self.whole, x, modes)
+        bounded, error = self.reduced, np.zeros((len(x), len(modes)))
+        if self.pencil.weight is not None and self.reduced is not None:
+            bounded = self.reduced.imported
+            if bounded is None or len(bounded.links) < len(self.reduced.links):
+                error = compared_error(self.pencil, self.whole, x, modes)
+        if bounded is not None:
+            error = (1.0 + error) * (1.0 + truncation_error(bounded, x, modes)) - 1.0
+        return error
 
     def discretisation_error(
         self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)

@@ -16,8 +16,10 @@ the last term being there only where constraint modes change with y. S is taken 
 which is stiffer, and a factor makes up for that.
 All of it is a matter of each link's own matrices: no factor of the whole mechanism is needed.
 
-Under gravity K_g is indefinite and reaches into C, and none of this is known. There the links are
-solved whole, and the error is what it is.
+Under gravity K_g is indefinite and reaches into C, and none of this is known. There links of beams
+are solved whole, and the error is what it is. With the sag of an imported part among what it keeps
+(`elements.craig_bampton`), its K_g is nothing on C, and G without it too large by no more than that
+sag's own part.
 """
 
 from __future__ import annotations
@@ -73,7 +75,7 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
 
 
 def compared_error(reduced: Pencil, whole: Pencil, x: Floats, modes: Sequence[int]) -> Floats:
-    """The same under gravity, against the ``whole`` links; infinite where these buckle."""
+    """The same under gravity, against ``whole`` links of beams; infinite where these buckle."""
     out = np.full((len(x), len(modes)), np.inf)
     for s in range(len(x)):
         with suppress(MechanismError):

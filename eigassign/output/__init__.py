@@ -45,7 +45,6 @@ __all__, __getattr__, __dir__ = face(
         "documents": "results_document to_json",
         "result_files": "sample_files",
         "schema": "FILES NUMBERS results_schema",
-        "store.array_file": "DamagedError content_key get pack put unpack",
         "store.cache": "Cache default_directory",
         "store.run_folder": "run_folder",
         "store.run_record": "run_status",

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.hdf5 import pack
 from eigassign.modal.expansion import Expansion
 from eigassign.output.documents import dumps
-from eigassign.output.store.array_file import pack
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]

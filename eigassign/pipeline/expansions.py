@@ -12,11 +12,11 @@ import scipy
 
 from eigassign._version import __version__
 from eigassign.errors import UsageError
+from eigassign.hdf5 import Array, content_key
 from eigassign.modal.arguments import MOST_TERMS
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
-from eigassign.output.store.array_file import Array, content_key
 from eigassign.output.store.cache import Cache
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions

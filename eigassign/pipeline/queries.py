@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated
 
 import numpy as np
@@ -217,6 +218,7 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
 
 
 def _checked(case: BuiltCase) -> CheckAnswer:
+    started = perf_counter()
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = part_lines(file)
@@ -245,7 +247,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += weight.lines
         warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
     warnings += tuple(_doubts(case, asked, None if trajectory is None else trajectory.q[:1]))
-    takes = None if plan is None else outlook(case, plan, trajectory)
+    takes = None if plan is None else outlook(case, plan, trajectory, started)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
         title=file.title,

@@ -9,14 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
-from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
-from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.assembly.build import (
+    LOWEST,
+    WholeLinks,
+    with_elements,
+    with_reduction,
+)
+from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.cheapest import cheapest
@@ -37,6 +43,11 @@ from eigassign.study.planning import (
 )
 
 Floats = NDArray[np.float64]
+
+
+# Times the highest frequency that matters: where elements are chosen imported parts with
+# `reduce_to: auto` are reduced to that, far beyond what is chosen for them then
+BEYOND = 8.0
 
 
 @dataclass(frozen=True)
@@ -68,12 +79,20 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
     if None not in wanted.values():
         return None
 
-    def meshed(elements: Mapping[str, int]) -> Model:
-        return build_model(with_elements(file, elements))
+    def meshed(to_hz: float, elements: Mapping[str, int]) -> Model:
+        meshed = with_elements(file, elements)
+        return build_model(with_reduction(meshed, dict.fromkeys(parts, to_hz)))
 
-    trial = meshed({name: TRIAL for name, given in wanted.items() if given is None})
+    parts = [name for name in automatic_reduction(file) if is_imported(file, name)]
+    trial = meshed(LOWEST, {name: TRIAL for name, given in wanted.items() if given is None})
     path, q0 = _path(file, trial)
-    return settle_mesh(file, meshed, path, q0, modes_that_matter(file, _bands_hz(file, path)))
+    modes_at = modes_that_matter(file, _bands_hz(file, path))
+    beyond = LOWEST
+    if parts:
+        q, y = q0 if path is None else path.q[0], initial_design(file)
+        highest = max(modes_at(trial, trial.x(q, y)))
+        beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
+    return settle_mesh(file, partial(meshed, beyond), path, q0, modes_at)
 
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
@@ -85,8 +104,12 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
         return build_model(with_reduction(file, dict.fromkeys(names, frequency_hz)), links)
 
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
-    path, q0 = _path(file, whole)
-    x = standing(at_corners(file, path, q0, initial_design(file)), whole).x
+    upright = whole
+    if whole.pencil.weight is not None:  # inside imported parts it changes nothing
+        at_nodes = {n: LOWEST if is_imported(file, n) else None for n in names}
+        upright = build_model(with_reduction(file, at_nodes), links)
+    path, q0 = _path(file, upright)
+    x = standing(at_corners(file, path, q0, initial_design(file)), upright).x
     modes_at = modes_that_matter(file, _bands_hz(file, path))
     return cheapest(reductions(names, whole, reduced, x, modes_at), truncation_share(file))
 

@@ -14,8 +14,8 @@ from chains import model_of, random_chain, two_link
 
 from eigassign import api
 from eigassign.errors import StorageError, UsageError
+from eigassign.hdf5 import pack
 from eigassign.modal import FORMAT, reduce, reduced_arrays, reduced_from_arrays
-from eigassign.output import pack
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 Q = Q0 + np.column_stack([np.zeros(9), np.linspace(-0.5, 0.5, 9)])

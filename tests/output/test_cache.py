@@ -16,7 +16,8 @@ import pytest
 
 from eigassign.cli import main
 from eigassign.errors import StorageError, UsageError
-from eigassign.output import Cache, content_key, default_directory, pack, write_files
+from eigassign.hdf5 import content_key, pack
+from eigassign.output import Cache, default_directory, write_files
 
 ARRAYS = {"numbers": np.array([[1.0, -0.0], [np.nan, 5e-324]]), "nothing": np.zeros((0, 7))}
 META = {"case": "Zweigelenkarm ä [q1]", "modes": "1"}

@@ -44,6 +44,16 @@ def test_what_a_run_takes_grows_with_the_order_and_is_not_stated_without_a_point
     assert '--q "0, 0, 0, 0, 0, 0" --draw' in answer.next
 
 
+def test_what_a_run_takes_counts_large_parts() -> None:
+    """Of 7 685 unknowns before they are reduced."""
+    answer = check(SHIPPED.parent / "casting_arm.yaml")
+    assert answer.outlook is not None
+    assert 350.0 < answer.outlook.memory_mb < 600.0
+    small = check(SHIPPED).outlook
+    assert small is not None
+    assert small.memory_mb < 160.0
+
+
 @pytest.mark.parametrize("trajectory", [True, False])
 def test_a_case_is_drawn_with_and_without_its_trajectory(
     trajectory: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

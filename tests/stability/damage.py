@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output import pack
+from eigassign.hdf5 import pack
 
 Arrays = dict[str, NDArray[Any]]
 Damage = Callable[[Arrays, np.random.Generator], None]

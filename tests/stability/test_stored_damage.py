@@ -12,8 +12,9 @@ from damage import damaged, forged
 
 import eigassign as ea
 from eigassign.errors import StorageError
+from eigassign.hdf5 import pack
 from eigassign.modal import FORMAT, expansion_arrays, reduced_arrays
-from eigassign.output import Cache, pack
+from eigassign.output import Cache
 from eigassign.pipeline import affordable_order, expand_plan, expansion_key
 from eigassign.study import Plan, plan_expansion
 

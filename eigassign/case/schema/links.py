@@ -40,7 +40,7 @@ Roll: TypeAlias = Annotated[
         neutral=0.0,
     ),
 ]
-Dof: TypeAlias = Annotated[int, Field(ge=0)]
+Dof: TypeAlias = Annotated[int, Field(ge=0, le=10**9)]
 
 
 class Taper(Part):

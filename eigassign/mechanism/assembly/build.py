@@ -41,6 +41,7 @@ from eigassign.mechanism.kinematics.travel_limits import rails
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Scalar
 
+LOWEST = 1e-9  # Hz: no part has a mode below, so that it keeps its nodes alone
 LocalLinks: TypeAlias = tuple[list[LocalLink], NodeMotions]
 
 
@@ -108,13 +109,13 @@ def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> C
 def in_few_elements(case: CaseFile) -> CaseFile:
     """The case with one element for each beam whose section does not vary, beams and frames whole.
 
-    Superelements and solids are left their interface: no part has a mode as low as what is named.
+    Superelements and solids are left their interface.
     """
 
     def few(part: Any) -> Any:
         update: dict[str, Any] = {}
         if hasattr(part, "reduce_to"):
-            update["reduce_to"] = 1e-9 if part.type in IMPORTED else None
+            update["reduce_to"] = LOWEST if part.type in IMPORTED else None
         if hasattr(part, "elements") and isinstance(part.section, str):
             update["elements"] = 1
         if hasattr(part, "beams"):

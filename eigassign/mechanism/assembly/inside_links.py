@@ -38,6 +38,12 @@ class ReducedLinks:
     parameters: ModelParameters
     pencil: Pencil
 
+    @property
+    def imported(self) -> ReducedLinks | None:
+        """Those without beams inside: no weight bends what they leave out. None where none is."""
+        own = [each for each in self.links if each.reduction and not each.reduction.mesh.strands]
+        return reduced_links(self.parameters, own, self.pencil)
+
     def values(self, x: Floats) -> list[Floats]:
         """The values of all scalars at x = (q, y) (n_x,)."""
         return [each[0] for each in self.table(self.parameters.z(x[None]))]

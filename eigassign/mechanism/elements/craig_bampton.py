@@ -7,7 +7,10 @@ Craig and Bampton (AIAA J. 6 (1968) 1313): with the interface b and the interior
 Links stay affine in y: the basis is constant, taken in the middle of the design's bounds, and every
 constant matrix of the link is projected on it. Where the link itself changes with y, W also holds
 what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
-rigid-body motion is in the span at every y. What is left out is estimated in modal/truncation.py.
+rigid-body motion is in the span at every y. Under gravity that of an imported part holds its sag as
+well, K_ii⁻¹ (M r)_i of translations r: the weight's stiffness, which joins M r to the nodes
+(`assembly.gravity.imported`), is nothing then on what is left out. That is estimated in
+modal/truncation.py.
 
 The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,
 as of rotations without inertia) do no harm.
@@ -16,7 +19,7 @@ as of rotations without inertia) do no harm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +37,7 @@ from eigassign.mechanism.elements.sparse_factor import (
     largest_beside,
     largest_modes,
 )
-from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
+from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported, link_type
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -66,7 +69,11 @@ def reduced_where_asked(
     central = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
     N, Psi = total(mesh.rigid, central).toarray(), parts[0].Psi
     Psi = Psi + (N[i] - Psi @ N[b]) @ np.linalg.pinv(N[b])  # Ψ N_b = N_i to the last digit
-    W = _span(parts, Psi, mesh.rigid, b, i, lam)
+    heavy = np.zeros((len(i), 0))
+    if is_imported(case, name) and isinstance(case.mechanism.gravity, tuple):
+        axes = len(case.mechanism.gravity)
+        heavy = np.asarray(mesh.mass[0].matrix[i] @ total(mesh.rigid, central)[:, :axes].toarray())
+    W = _span(parts, Psi, mesh.rigid, heavy, b, i, lam)
     if W.shape[1] >= len(i):
         return mesh
     T = np.zeros((mesh.n_local, len(b) + W.shape[1]))
@@ -166,15 +173,25 @@ def coefficients(parameters: ModelParameters, terms: Sequence[Term], p: Floats) 
 
 
 def _span(
-    parts: Sequence[_DesignBlocks], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
+    parts: Sequence[_DesignBlocks],
+    Psi: Floats,
+    rigid: Sequence[Term],
+    heavy: Floats,
+    b: Ints,
+    i: Ints,
+    lam: float,
 ) -> Floats:
-    """W (n_i, k), K_ii-orthonormal: rigid remainders, fixed-interface modes, other designs."""
+    """W (n_i, k), K_ii-orthonormal: rigid remainders, sags under forces ``heavy`` (n_i, n), modes
+    with the interface held, other designs.
+    """
     first = parts[0]
     K = first.K_ii
     W = np.zeros((len(i), 0))
     for term in rigid:
         N = term.matrix.toarray()
         W = _extended(W, K, N[i] - Psi @ N[b], _norms(K, N[i]), EXACT)
+    sags = np.asarray(first.factor.solve(heavy)) if heavy.size else heavy
+    W = _extended(W, K, sags, _norms(K, sags), EXACT)
     Phi = fixed_modes(K, first.M_ii, first.factor, lam)
     W = _extended(W, K, Phi, np.ones(Phi.shape[1]), EXACT)
     for part in parts[1:]:
@@ -245,11 +262,34 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
 
 
+class _Heavy(NamedTuple):
+    """The few dofs h that have mass: a Krylov space would be too small for Lanczos."""
+
+    dofs: Ints
+    mass: Floats  # M_hh
+    flexible: Floats  # the columns h of K⁻¹, (n, n_h)
+
+
+def _few_with_mass(M: sparse.csc_array, factor: linalg.SuperLU) -> _Heavy | None:
+    """The dofs with mass where these are few among many, else None; ``factor`` is that of K."""
+    dofs = np.flatnonzero(abs(M).sum(axis=0))
+    if not len(dofs) <= DENSE < M.shape[0]:
+        return None
+    unit = np.zeros((M.shape[0], len(dofs)))
+    unit[dofs, np.arange(len(dofs))] = 1.0
+    flexible = factor.solve(unit) if len(dofs) else unit
+    return _Heavy(dofs, M[dofs][:, dofs].toarray(), flexible)
+
+
 def fixed_modes(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
 ) -> Floats:
     """The modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
     n, least = K.shape[0], 1.0 / lam
+    if (heavy := _few_with_mass(M, factor)) is not None:
+        root = np.linalg.cholesky(heavy.flexible[heavy.dofs])
+        mu, b = np.linalg.eigh(root.T @ heavy.mass @ root)
+        return np.asarray(heavy.flexible @ np.linalg.solve(root.T, b[:, mu >= least][:, ::-1]))
     # Lanczos is asked for 16 modes first, then for twice as many
     rows, count = M.T, 16  # M is symmetric: products run faster row by row
     while n > DENSE and count < n // 2:
@@ -268,6 +308,10 @@ def largest_left_out(
     n = K.shape[0]
     if W.shape[1] >= n:
         return 0.0
+    if (heavy := _few_with_mass(M, factor)) is not None:
+        across = W[heavy.dofs]
+        beside = heavy.flexible[heavy.dofs] - across @ np.linalg.solve(W.T @ (K @ W), across.T)
+        return float(np.linalg.eigvals(heavy.mass @ beside).real.max(initial=0.0))
     if n > DENSE:
         mu = largest_beside(factor, K.T, lambda v: np.asarray(M @ v), W, LOOSE)[0]
         return mu * (1.0 + LOOSE)

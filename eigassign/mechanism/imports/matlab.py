@@ -1,4 +1,4 @@
-"""MATLAB's .mat files of versions 4 to 7; those of 7.3 are HDF5, which asks for trust."""
+"""MATLAB's .mat files: of versions 4 to 7 by SciPy, of 7.3, which are HDF5, by `eigassign.hdf5`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from eigassign.files import MATRIX, how_to_raise, raised
+from eigassign.hdf5 import ForeignFile
 from eigassign.mechanism.imports.entries import Contents, Matrix, UnfitError, require_few
 
 _HEADER, _COMPRESSED = 128, 15  # bytes before the first element; type of one that is compressed
@@ -35,7 +37,7 @@ def read_matlab(data: bytes) -> Contents | None:
     from scipy.io import whosmat
 
     if data.startswith(b"MATLAB 7.3"):
-        raise UnfitError("is of MATLAB 7.3: write it with save('parts.mat', 'K', 'M', '-v7')")
+        return _of_hdf5(data)
     if data.startswith(b"MATLAB "):
         data = _unpacked(data)
     elif not _is_oldest(data):
@@ -78,3 +80,28 @@ def _matrix(data: bytes, name: str, rows: int, entries: int) -> Matrix:
     if hasattr(read, "check_format"):
         read.check_format(full_check=True)
     return Matrix(read)
+
+
+def _of_hdf5(data: bytes) -> Contents:
+    """Full ones are arrays by columns, sparse ones values, their rows and where columns start.
+
+    Text is stored as whole numbers, and these are passed over.
+    """
+    file = ForeignFile(data)
+    kinds = {name: each.dtype.kind for name, each in file.arrays.items() if each.dtype is not None}
+    by_columns = [name for name in file.arrays if f"{name}/jc" in kinds]
+
+    def matrix(name: str) -> Matrix:
+        if name in kinds:
+            require_few(0, prod(file.arrays[name].shape))
+            return Matrix(file.read(name).T)
+        values, at, starts = (file.read(f"{name}/{key}") for key in ("data", "ir", "jc"))
+        n = len(starts) - 1
+        require_few(n, len(values))
+        found = (values, at.astype(np.int64), starts.astype(np.int64))
+        read = sparse.csc_array(found, (n, n))
+        read.check_format(full_check=True)
+        return Matrix(read)
+
+    full = [name for name, kind in kinds.items() if kind == "f" and "/" not in name]
+    return Contents({name: partial(matrix, name) for name in (*full, *by_columns)})

@@ -27,6 +27,7 @@ from eigassign.mechanism.imports import (
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
+    LARGEST,
     Contents,
     Matrix,
     UnfitError,
@@ -160,4 +161,6 @@ def _real(matrix: Any) -> sparse.csr_array:
         out = sparse.csr_array(matrix, dtype=np.float64)
     if not np.isfinite(out.data).all():
         raise UnfitError("has entries that are not finite")
+    if np.abs(out.data).max(initial=0.0) > LARGEST:
+        raise UnfitError(f"has entries beyond {LARGEST:g}")
     return out

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
+from eigassign.mechanism.imports.entries import LARGEST
 from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
@@ -48,6 +49,12 @@ class SolidMesh:
     x: Floats  # (n, 3)
     elements: dict[int, Ints]  # (m, number of nodes)
     sets: dict[str, Ints]
+
+    def pieces(self, most: int) -> Iterator[tuple[int, Ints]]:
+        """The elements with their number of nodes, so many at a time at most."""
+        for count, rows in self.elements.items():
+            for k in range(0, len(rows), max(most, 1)):
+                yield count, rows[k : k + max(most, 1)]
 
 
 class _UnfitError(Exception):
@@ -115,7 +122,7 @@ def _numbered(raw: _Raw, program: str) -> SolidMesh:
     if missing := place.keys() - raw.nodes.keys():
         raise _UnfitError(f"has elements with nodes that it does not define, as {min(missing)}")
     x = np.array([raw.nodes[node] for node in used], dtype=np.float64)
-    if not np.isfinite(x).all():
+    if not (np.abs(x) < LARGEST).all():
         raise _UnfitError("has nodes at infinite places")
     found = {}
     for count, kind in KINDS.items():

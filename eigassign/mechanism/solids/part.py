@@ -9,7 +9,7 @@ mode, is about what the mesh adds to λ.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.imports.parts import UNITS
 from eigassign.mechanism.solids.elements import (
@@ -26,6 +27,7 @@ from eigassign.mechanism.solids.elements import (
     assembled,
     elasticity,
     gradients,
+    jacobians,
     mass,
     stiffness,
 )
@@ -43,7 +45,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 _log = logging.getLogger(__name__)
 SEVERAL = 50_000  # unknowns above which a factor may take half a minute and a GB
-AT_ONCE = 2_000_000  # strains that are held at a time
+AT_ONCE = 2_000_000  # numbers that are held at a time: strains, entries of elements' matrices
+# Volume of an element at a point, of the box of its edges, that is none: files have few digits
+FLAT = 1e-9
+FOLDED = (
+    "has elements that are folded, or have no volume (their Jacobian is not positive at a point of "
+    "integration): make the mesh finer where its surface is curved, or its elements straight (in "
+    "gmsh Mesh.SecondOrderLinear = 1)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +74,7 @@ class SolidPart:
         """
         x, u = self.mesh.x, (self.motion @ v).reshape(len(self.mesh.x), -1)
         mean, volume = np.zeros((len(x), 2 * u.shape[1])), np.zeros(len(x))
-        for count, rows in self._pieces(u.shape[1]):
+        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
             weight = np.repeat(mass(x[rows], count).sum(axis=(1, 2)), count)
             spread = sparse.csr_array(
                 (weight, (rows.ravel(), np.arange(rows.size))), shape=(len(x), rows.size)
@@ -77,7 +86,7 @@ class SolidPart:
         at, possible = self.boundary
         mean[at] = possible @ mean[at]
         out = np.zeros((v.shape[1],) * 2)
-        for count, rows in self._pieces(u.shape[1]):
+        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
             own = np.einsum("ab,mkbr->mkar", C, _strains(x[rows], count, u[rows]))
             d = mean[rows] - own
             heavy = (mass(x[rows], count) @ d.reshape(*rows.shape, -1)).reshape(d.shape)
@@ -89,13 +98,6 @@ class SolidPart:
     def boundary(self) -> tuple[Ints, Floats]:
         """Nodes where nothing pulls, and the stresses that can be there, `free_directions`."""
         return free_directions(self.mesh, self.held)
-
-    def _pieces(self, width: int) -> Iterator[tuple[int, Ints]]:
-        """The elements, few enough at a time."""
-        for count, elements in self.mesh.elements.items():
-            step = max(1, AT_ONCE // (2 * count * width))
-            for k in range(0, len(elements), step):
-                yield count, elements[k : k + step]
 
 
 def _strains(x: Floats, count: int, u: Floats) -> Floats:
@@ -113,7 +115,7 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
 
     Raises MechanismError for what cannot be read, and for surfaces that the mesh does not have.
     """
-    mesh = _scaled(read_mesh(Path(link.mesh), f"{path}.mesh"), UNITS[link.units].length)
+    mesh = _sound(read_mesh(Path(link.mesh), f"{path}.mesh"), UNITS[link.units].length, path)
     known, found = {name.upper(): own for name, own in mesh.sets.items()}, {}
     for name, node in link.nodes.items():
         own = mesh.sets.get(node.surface, known.get(node.surface.upper()))
@@ -129,8 +131,19 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
 
 
 @lru_cache(maxsize=4)
-def _scaled(mesh: SolidMesh, factor: float) -> SolidMesh:
-    return mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x)
+def _sound(mesh: SolidMesh, factor: float, path: str) -> SolidMesh:
+    """The mesh in metres; raises MechanismError for one that no part has."""
+    far, length = factor * float(np.abs(mesh.x).max()), DIMENSIONS["length"]
+    if not length.smallest < far < length.largest:
+        message = f"has nodes {far:.3g} m from its origin: is it damaged, or in other units?"
+        raise MechanismError(f"{path}.mesh", message)
+    found = mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x)
+    for count, rows in found.elements.items():
+        for xi in (KINDS[count].points, KINDS[count].heavy[0]):
+            J = jacobians(found.x[rows], count, xi)
+            if (np.linalg.det(J) <= FLAT * np.linalg.norm(J, axis=3).prod(axis=2)).any():
+                raise MechanismError(f"{path}.mesh", FOLDED)
+    return found
 
 
 def solid_part(link: Any, nu: float, path: str) -> tuple[SolidPart, Mapping[str, Floats]]:
@@ -156,15 +169,8 @@ def _made(
     _tell_size(T.shape[1], path)
     n = T.shape[0]
     K, M = sparse.csr_array((n, n)), sparse.csr_array((n, n))
-    for count, rows in mesh.elements.items():
+    for count, rows in mesh.pieces(AT_ONCE // 2000):
         x = mesh.x[rows]
-        for xi in (KINDS[count].points, KINDS[count].heavy[0]):
-            if (gradients(x, count, xi)[1] <= 0.0).any():
-                raise MechanismError(
-                    f"{path}.mesh",
-                    "has elements that are folded (their Jacobian is not positive): mesh finer "
-                    "where it is curved, or with straight edges (gmsh: Mesh.SecondOrderLinear = 1)",
-                )
         dofs = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
         K = K + assembled(stiffness(x, count, nu), dofs, n)
         M = M + assembled(np.asarray(np.kron(mass(x, count), np.eye(3))), dofs, n)

@@ -101,7 +101,8 @@ def free_directions(mesh: SolidMesh, held: Ints) -> tuple[Ints, Floats]:
             nodes = elements[:, KINDS[count].face(k)]
             x = mesh.x[nodes[:, : len(corners)]]
             n = np.cross(x[:, 1] - x[:, -1], x[:, 2] - x[:, 0])
-            n /= np.linalg.norm(n, axis=1, keepdims=True)
+            area = np.linalg.norm(n, axis=1, keepdims=True)
+            n = np.divide(n, area, out=np.zeros_like(n), where=area > 0.0)  # of a collapsed face
             keys = np.sort(nodes[:, : len(corners)], axis=1).tolist()
             for key, own, normal in zip(map(tuple, keys), nodes.tolist(), n, strict=True):
                 normals[key] = (own if key not in normals else [], normal)

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import StorageError, UsageError
+from eigassign.hdf5 import DamagedError, get, pack
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.exchange.files import ENDINGS, write_exchange
-from eigassign.output.store.array_file import DamagedError, get, put
+from eigassign.output.store.atomic import replace_synced
 
 
 def save_reduced(
@@ -35,7 +36,7 @@ def save_reduced(
         "expansion points": str(len(reduced.points)),
     }
     try:
-        put(path, FORMAT, reduced_arrays(reduced), meta)
+        replace_synced(path, pack(FORMAT, reduced_arrays(reduced), meta))
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
     return (path,)

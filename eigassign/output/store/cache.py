@@ -19,8 +19,8 @@ from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
 from eigassign.files import CACHE, at_home, raised
-from eigassign.output.store.array_file import Array, DamagedError, get, put
-from eigassign.output.store.atomic import sweep_files
+from eigassign.hdf5 import Array, DamagedError, get, pack
+from eigassign.output.store.atomic import replace_synced, sweep_files
 
 VARIABLE = "EIGASSIGN_CACHE"
 WORTH_S = 0.1  # of work: reading a file and making its key take 5 ms, writing it 10 ms and a sync
@@ -104,7 +104,7 @@ class Cache:
         """
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
-            put(self.directory / f"{key}{_SUFFIX}", key, arrays, meta)
+            replace_synced(self.directory / f"{key}{_SUFFIX}", pack(key, arrays, meta))
             if not self._trimmed:
                 self._trimmed = True
                 self._trim()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,9 @@ from solid_parts import METAL, Bar, bar, bdf, case, inp, msh
 
 import eigassign
 import eigassign as ea
-from eigassign.errors import CaseError, MechanismError
+from eigassign.errors import CaseError, MechanismError, MissingMassError
 from eigassign.mechanism import Coupling, joined, read_mesh, solid_part
+from eigassign.study import load_case
 
 # Hz, of the bar with rigid ends, one of them fixed: bending in its flat and its upright plane
 BENDING = (103.05, 154.06)
@@ -225,6 +228,34 @@ def test_random_damage_is_an_error_and_no_crash(tmp_path: Path) -> None:
             assert np.isfinite(mesh.x).all()
 
 
+def test_meshes_without_volume_or_of_any_size_are_refused_and_no_crash(tmp_path: Path) -> None:
+    """Corners of an element that coincide, places that no part has: read into a whole model."""
+    rng, part = np.random.default_rng(4), bar((2, 1, 1), 4)
+    x, corners = part.x.copy(), part.elements[3, :2]
+    x[corners[1]] = x[corners[0]]
+    spoiled = [(x, "have no volume"), (1e-12 * part.x, "from its origin: is it damaged")]
+    spoiled += [(np.where(part.x > 0.39, far, part.x), "has nodes") for far in (1e300, 1e7)]
+    for _ in range(16):
+        x = part.x.copy()
+        x[rng.integers(len(x), size=4), rng.integers(3, size=4)] *= 10.0 ** rng.uniform(-300, 300)
+        spoiled.append((x, "has (nodes|elements) "))
+    for places, why in spoiled:
+        try:
+            ea.load_case(case(tmp_path, part._replace(x=places)), allow_outside=True).model()
+        except CaseError as error:
+            assert re.search(why, str(error))  # noqa: PT017
+        else:
+            assert why == "has (nodes|elements) "
+
+
+@pytest.mark.parametrize("reduce_to", [4e3, "auto", 1e9])
+def test_a_solid_without_mass_is_told(tmp_path: Path, reduce_to: Any) -> None:
+    given = case(tmp_path, bar((8, 1, 1), 10), reduce_to=reduce_to)
+    given["mechanism"]["materials"]["metal"] = METAL | {"density": 0.0}
+    with pytest.raises(MissingMassError, match="only 0 modes with mass"):
+        ea.load_case(given, allow_outside=True).model().frequencies([0.0], [], 1)
+
+
 # --- nodes that stand for surfaces
 
 
@@ -306,16 +337,55 @@ def test_modulus_and_density_of_a_solid_are_design(tmp_path: Path) -> None:
     assert mesh == pytest.approx(np.tile(mesh[0], (3, 1)), rel=1e-6)
 
 
-def test_what_a_solid_leaves_out_is_bounded(tmp_path: Path) -> None:
+@pytest.mark.parametrize("g", [0.0, 9.81, 700.0])
+def test_what_a_solid_leaves_out_is_bounded(tmp_path: Path, g: float) -> None:
+    """Under its weight too, which softens it by up to a third: what is left out feels none."""
+
+    def model_to(reduce_to: float) -> ea.Model:
+        given = case(tmp_path, part, reduce_to=reduce_to)
+        given["mechanism"]["bodies"] = {"tool": {"at": "bar.end", "mass": 0.3}}
+        given["mechanism"]["gravity"] = [-g, 0.0, 0.3 * g] if g else "none"
+        return ea.load_case(given, allow_outside=True).model()
+
     part = bar((6, 1, 1), 20)
-    whole = ea.load_case(case(tmp_path, part, reduce_to=1e7), allow_outside=True).model()
-    exact = whole.frequencies([0.0], [], 3)[0]
-    for to in (300.0, 1000.0, 4000.0):
-        model = ea.load_case(case(tmp_path, part, reduce_to=to), allow_outside=True).model()
+    exact = model_to(1e7).frequencies([0.0], [], 3)[0]
+    for to in (100.0, 1000.0, 4000.0):
+        model = model_to(to)
         raised = model.frequencies([0.0], [], 3)[0] / exact - 1.0
         bound = model.truncation_error([0.0], [], (1, 2, 3))[0]
         assert (raised > -1e-9).all()
         assert (bound >= raised - 1e-9).all()
+
+
+def test_weight_of_a_solid_takes_no_dense_matrix(tmp_path: Path) -> None:
+    mesh = bar((16, 3, 3), 10)
+    given = case(tmp_path, mesh, reduce_to=2e4)
+    given["mechanism"]["gravity"] = [0.0, 0.0, -9.81]
+    tracemalloc.start()
+    model = ea.load_case(given, allow_outside=True).model()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert model.pencil.weight is not None
+    assert peak < 8 * (3 * len(mesh[0])) ** 2 / 2
+
+
+def test_elements_are_chosen_alike_beside_parts_whose_reduction_is_not_chosen_yet(
+    tmp_path: Path,
+) -> None:
+    found = []
+    for reduce_to in ("auto", 5e4):
+        given = case(tmp_path, bar((8, 1, 1), 20), reduce_to=reduce_to)
+        beam = {"length": 0.6, "material": "metal", "section": "rod", "elements": "auto"}
+        given["mechanism"]["sections"] = {"rod": {"shape": "circle", "diameter": 0.02}}
+        given["mechanism"]["links"]["arm"] = beam
+        joint = {"type": "revolute", "base": "bar.end", "follower": "arm.start", "axis": [0, 0, 1]}
+        given["mechanism"]["joints"]["turn"] = joint
+        given["coordinates"]["turn"] = {"joint": "turn", "drive": {"stiffness": 1e4}}
+        given["expansion"] = {"q": [0.0, 0.3], "accuracy": 1e-4}
+        built = load_case(given, allow_outside=True)
+        found.append(built.mesh.elements["arm"])
+        assert built.model().discretisation_error([0.0, 0.3], [], (1,)) < 2e-2
+    assert found[0] == found[1]
 
 
 def test_in_a_plane_a_solid_bends_in_it_only(tmp_path: Path) -> None:

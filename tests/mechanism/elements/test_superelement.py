@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imported_parts import ELEMENTS, FLAT, arm, beam_arm, exported, part, write
+from imported_parts import ELEMENTS, FLAT, LENGTH, arm, beam_arm, exported, part, write
 from spatial_cases import ALLOY, built
 from spatial_oracle import Tree, element, section
 
+import eigassign as ea
 from eigassign.errors import CaseError, MechanismError
 
 
@@ -105,6 +106,56 @@ def test_the_order_of_a_bent_part_s_dofs_does_not_matter(tmp_path: Path, seed: i
     plain = np.arange(6 * (2 * ELEMENTS + 1))
     mixed = np.random.default_rng(seed).permutation(plain)
     np.testing.assert_allclose(eigenvalues(mixed), eigenvalues(plain), rtol=1e-8)
+
+
+@pytest.mark.parametrize("reduce_to", [20.0, 3e3])
+def test_few_masses_on_many_springs_have_their_modes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reduce_to: float
+) -> None:
+    """Of 160 nodes three have mass: those of the whole part, and a bound that holds."""
+    n = 160
+    K, M = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
+    k, _ = element(ALLOY, lambda _: section(FLAT), LENGTH / (n - 1), False)
+    flat = np.ix_([0, 1, 5, 6, 7, 11], [0, 1, 5, 6, 7, 11])
+    for e in range(n - 1):
+        K[3 * e : 3 * e + 6, 3 * e : 3 * e + 6] += k[flat]
+    for node in (40, 80, 120):
+        M[3 * node, 3 * node] = M[3 * node + 1, 3 * node + 1] = 0.3
+    files = write(tmp_path, "npz", K, M)
+    nodes = {
+        "start": {"position": [0.0, 0.0], "dofs": [0, 1, 2]},
+        "end": {"position": [LENGTH, 0.0], "dofs": [3 * n - 3, 3 * n - 2, 3 * n - 1]},
+    }
+    link = {"type": "superelement", "stiffness": files[0], "mass": files[1], "nodes": nodes}
+    q = np.array([[0.4, 0.9]])
+    monkeypatch.chdir(tmp_path)
+    whole, small = (
+        ea.load_case(arm("planar", {"part": each}) | {"title": "few masses"}).model()
+        for each in (link, link | {"reduce_to": reduce_to})
+    )
+    exact, found = (model.frequencies(q, [], 3)[0] for model in (whole, small))
+    bound = small.truncation_error(q, [], (1, 2, 3))[0]
+    assert (found > exact * (1.0 - 1e-6)).all()
+    assert (found <= exact * (1.0 + bound + 1e-6)).all()
+    assert bound[0] < 0.5
+
+
+@pytest.mark.parametrize("power", [-290, -150, 29, 31, 160, 307])
+@pytest.mark.parametrize("what", ["both", "one", "mass"])
+def test_entries_of_any_size_are_read_or_refused(tmp_path: Path, power: int, what: str) -> None:
+    K, M = exported("planar")
+    scale = 10.0**power
+    if what == "both":
+        K, M = K / abs(K).max() * scale, M / abs(M).max() * scale
+    elif what == "mass":
+        M = M / abs(M).max() * scale
+    else:
+        K[4, 4] = scale
+    tree = arm("planar", {"part": part("planar", write(tmp_path, "npy", K, M), reduce_to=4e3)})
+    try:
+        _ = built(tree, tmp_path / "case.yaml").pencil
+    except MechanismError as error:
+        assert power < 31 or "beyond 1e+30" in error.message  # noqa: PT017
 
 
 # Wrong ones

@@ -306,7 +306,7 @@ def test_an_asymmetric_matrix_is_told(tmp_path: Path, write: Any) -> None:
         ("t\n  3  1  1  1\nRSA  2 3 2\n(8I10) (8I10) (3E26.18)\n", "square"),
         ("t\n  3  1  1  1\nRSA  2 2 999999999\n(8I10) (8I10) (3E26.18)\n", "entries: more than"),
         ("t\n  3  1  1  1\nRSA  2 2 9\n(8I999) (8I10) (3E26.18)\n", "cannot read"),
-        ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "'-v7'"),
+        ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "cannot read"),
         ("MATLAB 5.0 MAT-file" + 109 * " ", "cannot read"),
         ("hello\n", "cannot read"),
         ("", "cannot read"),

@@ -34,14 +34,15 @@ def strut_terms(
 
     g is times the coefficient of the part's own mass: the density of a solid.
     """
-    moved = {name: _motion(mesh, name) for name in mesh.nodes}
+    moved, of_nodes = _motions(mesh)
     kept = [d - 3 for d in DOFS[space] if d >= 3]
     phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)
     Mr, first = _momentum(mesh, space)
     out: list[Term] = []
 
-    def add(coefficient: Scalar, matrix: Floats) -> None:
-        if some(coefficient) and matrix.any():
+    def add(coefficient: Scalar, columns: Floats) -> None:
+        if some(coefficient) and columns.any():
+            matrix = sparse.csr_array(columns) @ of_nodes.T
             out.append(Term(coefficient, sparse.csr_array(matrix + matrix.T)))
 
     for name, wrench in wrenches:
@@ -49,11 +50,11 @@ def strut_terms(
         X = mesh.positions[name].astype(float)
         for axis in range(3):
             lever = _turned_twice(phi, X, axis) - _mixed(axis, phi, v)
-            add(wrench[axis], lever)
-            add(wrench[3 + axis], -0.5 * _mixed(axis, phi, theta))
+            add(wrench[axis], of_nodes @ lever)
+            add(wrench[3 + axis], of_nodes @ (-0.5 * _mixed(axis, phi, theta)))
     for axis in range(3):
-        turned = sum(np.outer(Mr[k], CROSSED[k, :, axis] @ phi) for k in range(3))
-        add(g[axis], np.asarray(turned) + _turned_twice(phi, first, axis))
+        turned = Mr.T @ (CROSSED[:, :, axis] @ phi)
+        add(g[axis], turned + of_nodes @ _turned_twice(phi, first, axis))
     return out
 
 
@@ -67,17 +68,17 @@ def _turned_twice(phi: Floats, X: Floats, axis: int) -> Floats:
     return np.asarray(0.5 * (np.outer(phi[axis], X @ phi) - X[axis] * (phi.T @ phi)))
 
 
-def _motion(mesh: LinkMesh, name: str) -> Floats:
-    """The motion (6, n_local) of a node."""
-    out = np.zeros((6, mesh.n_local))
-    for axis, slot in enumerate(mesh.nodes[name].tolist()):
-        if slot >= 0:
-            out[axis, slot] = 1.0
-    return out
+def _motions(mesh: LinkMesh) -> tuple[dict[str, Floats], sparse.csr_array]:
+    """The motion (6, n) of each node in the n dofs of all nodes, and these among all dofs."""
+    own = np.concatenate([slots[slots >= 0] for slots in mesh.nodes.values()])
+    of_nodes = sparse.csr_array(
+        (np.ones(len(own)), (own, np.arange(len(own)))), (mesh.n_local, len(own))
+    )
+    return {name: 1.0 * (slots[:, None] == own) for name, slots in mesh.nodes.items()}, of_nodes
 
 
 def _rotation(nodes: Sequence[tuple[Floats, Floats]], kept: Sequence[int]) -> Floats:
-    """φ (3, n_local): least squares of the displacements, about a line the mean of the turns."""
+    """φ (3, n): least squares of the displacements, about a line the mean of the turns."""
     places, motions = np.array([X for X, _ in nodes]), np.array([v for _, v in nodes])
     arms = places - places.mean(axis=0)
     moment = sum((arm @ arm) * AXES - np.outer(arm, arm) for arm in arms)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.output import DamagedError, content_key, pack, unpack
+from eigassign.hdf5 import DamagedError, content_key, pack, unpack
 
 ARRAYS = {
     "coefficients": np.array([1.0, -0.0, 5e-324, np.nan, np.inf, 1.7e308]).reshape(2, 3),
