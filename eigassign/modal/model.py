@@ -211,7 +211,9 @@ class Model:
         return drive_forces(self.poses.case, self.poses.parameters, self.motion)
 
     def _design(self, y: ArrayLike) -> Floats:
-        x = self.one(np.zeros(len(self.q_names)), y)
+        q = np.zeros(len(self.q_names))
+        q[len(q) - len(self.total_mass.loads) :] = self.total_mass.loads
+        x = self.one(q, y)
         if self.pencil.limits is not None:
             self.pencil.limits.require(x)
         return x[0, len(self.q_names) :]

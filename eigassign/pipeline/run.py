@@ -143,6 +143,8 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
         wanted = requirements_of(file, scene.path)
         with stages("assignment", "assigning the frequencies"):
             answer = find_answer(scene, wanted, options.progress)
+        if answer.found is not None:  # on instants between the samples too
+            scene, wanted = answer.found.task.scene, answer.found.task.wanted
         solved = _solved(scene, wanted, answer, stages)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)

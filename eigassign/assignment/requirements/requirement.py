@@ -152,6 +152,11 @@ class Requirement(Brief):
         """The terms that are modes."""
         return tuple((term, c) for term, c in self.terms if isinstance(term, int))
 
+    @property
+    def top(self) -> int:
+        """The highest numbered mode of its terms; 1 if there is none."""
+        return max((1, *(mode for mode, _ in self.mode_terms)))
+
     def part(self, name: str, own: slice) -> Self:
         """The same along one trajectory only, at these of its own samples."""
         first, n = self.rows.start + own.start, own.stop - own.start

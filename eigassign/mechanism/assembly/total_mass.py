@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.loop_closure import reference
-from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters, written_loads
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
@@ -31,6 +31,7 @@ class TotalMass:
     table: CompiledTable  # one row
     at: Floats  # z = (s, y) (n_z,) where the mechanism can be put together
     n_y: int
+    loads: Floats  # (n_loads,) that it is with: as written
 
     @property
     def is_affine(self) -> bool:
@@ -60,4 +61,4 @@ def total_mass(
             mass = mass + term.coefficient * float(e @ (term.matrix @ e))
     at = reference(case, parameters)
     table = compile_table(parameters.recorder, [mass], len(at))
-    return TotalMass(table, at, len(parameters.design))
+    return TotalMass(table, at, len(parameters.design), written_loads(case))

@@ -20,7 +20,7 @@ from eigassign.facts import capital
 from eigassign.study.accuracy import model_errors
 from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.clearance import check_band, error_between, followed_between
+from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
 from eigassign.study.design.conclusions import extreme, is_proved
 from eigassign.study.design.judgement import judged_modes
 from eigassign.study.design.one_shot import cost
@@ -47,7 +47,7 @@ from eigassign.study.weight import weight_doubt
 Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
-LIMIT = 1e-4  # of a limit, by which it may be missed between samples
+CROSSED = 0.9  # of a gap, missed where both modes go through each other
 UNTRUSTED = "the error of the expansion is above validation.max_error"
 FINER = "give the links more elements, raise reduce_to, or write auto for them"
 
@@ -182,7 +182,7 @@ def _deviated(
 def _missed_between(
     scene: Scene, designs: Sequence[Floats], targets: Sequence[TargetStudy], accepted: float
 ) -> Iterator[str]:
-    """Say which targets are missed between samples that are far apart, by how much at worst.
+    """Say which targets are missed between samples, by how much at worst.
 
     The first of the designs is the answer, others are deviations.
     """
@@ -190,17 +190,17 @@ def _missed_between(
     statics = [one for one in scene.statics if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
         each = zip(poses, designs, strict=True)
-        error = max(error_between(scene.model, one, *design) for design in each)
+        error = -min(lowest_room(scene.model, one, *design).room for design in each)
         try:
             error = max(error, *(followed_between(scene, one, y) for y in designs))
         except LostModeError as lost:
             yield f"{one.label} is not known between the samples: {lost}"
             continue
         if error > (accepted if one.is_goal else LIMIT):
-            yield (
-                f"{one.label} is missed by {100 * error:.3g} % between samples: give the "
-                "trajectory more samples"
-            )
+            help_ = "give the trajectory more samples"
+            if len(one.mode_terms) > 1 and error > CROSSED:
+                help_ = "its modes cross there; name them by their shapes"
+            yield f"{one.label} is missed by {100 * error:.3g} % between samples: {help_}"
 
 
 def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:

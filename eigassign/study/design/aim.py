@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.study.design.clearance import WITHIN, least_frequency, least_room
+from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.variants import lacking
 from eigassign.study.results import AimRow
@@ -66,7 +66,7 @@ def _least(found: Found, asked: Requirement, y: Floats) -> float:
     """The least of a curve, or the least room of a gap, of a design and of its scenarios."""
     model, path = found.task.scene.model, found.task.scene.path
     each = ((path.at(one)[0], one) for one in found.task.designs(y))
-    return min(least_frequency(model, asked, *own) for own in each)
+    return min(lowest_room(model, asked, *own).room for own in each)
 
 
 def _rooms(found: Found, wanted: Sequence[Requirement], y: Floats) -> Iterator[float]:

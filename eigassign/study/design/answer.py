@@ -8,17 +8,21 @@ otherwise.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
-from eigassign.assignment.exact.design_problem import MET
+from eigassign.assignment.exact.design_problem import MET, ON
+from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import requirements_of
 from eigassign.assignment.targets import hz_from_lam
+from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError
+from eigassign.study.design.clearance import finer_path
 from eigassign.study.design.conclusions import (
     Conflict,
     conflict,
@@ -28,12 +32,14 @@ from eigassign.study.design.conclusions import (
 from eigassign.study.design.followed import require_one_shape
 from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.robust import robust_optimum
-from eigassign.study.design.search.optimum import Found, find_optimum
+from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
 from eigassign.study.results import RobustRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
 SAID = 5  # choices of the numbers of modes below the bands whose outcome is told
+FINER = 6  # times that instants between samples are added: known cases took at most 3
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 
@@ -72,9 +78,7 @@ class Answer:
         return 1 if self.found is None else self.found.variant.requirements.modes
 
 
-def find_answer(
-    scene: Scene, wanted: Sequence[Requirement], progress: Callable[[str], None]
-) -> Answer:
+def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress) -> Answer:
     """The design asked for by the case's method.
 
     Raises CaseError where a mode to be followed has no shape of its own; under `method: one_shot`
@@ -101,19 +105,49 @@ def find_answer(
     if one_shot is not None:  # of catalogues the best few combinations
         search = one_shot.search
         starts = [one_shot.y] if search is None else [one.y for one in search.best]
-    robust = None
-    if scene.file.assignment.robust:
-        found, robust = robust_optimum(scene, wanted, starts, progress)
-    else:
-        found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
+    found, robust, more = _between_samples(scene, wanted, starts, progress)
+    notes += more
     steps = scene.file.assignment.steps
-    contradiction = conflict(found, catalogues(scene.file), steps, scene.limits)
+    contradiction = conflict(found, catalogues(scene.file), steps, found.task.scene.limits)
     notes += idle_notes(scene.model.y_names, found, scene.initial)
     notes += _band_notes(found)
     if found.lost:
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction, robust)
+
+
+def _between_samples(
+    scene: Scene, wanted: Sequence[Requirement], starts: Sequence[Floats], progress: Progress
+) -> tuple[Found, RobustRow | None, list[str]]:
+    """The optimum for samples, and for instants between them where its limits would be missed.
+
+    Each optimum is looked at between the samples; where a limit that it keeps at samples is missed
+    there, or what shall be high is lower, these instants are samples too, and it is sought anew.
+    """
+    deadline, count = deadline_of(scene.file), len(scene.path.q)
+    robust, notes = None, list[str]()
+    for finer in range(FINER + 1):
+        if scene.file.assignment.robust:
+            found, robust = robust_optimum(scene, wanted, starts, progress, deadline)
+        else:
+            found = find_optimum(scene, wanted, starts, progress, deadline=deadline)
+            found = least_changed(found, scene.initial)
+        missed = found.best.seen.violation > ON
+        if finer == FINER or missed or found.best.end in (End.SECONDS, End.INTERRUPTED):
+            break
+        limits = [one for one in (*wanted, *scene.statics) if not one.is_goal]
+        path = finer_path(scene.path, scene.model, limits, found.task.designs(found.best.y))
+        if len(path.q) == len(scene.path.q):
+            break
+        scene, starts = replace(scene, trajectory=path), [found.best.y]
+        wanted = requirements_of(scene.file, path)
+        more = (
+            f"{counted(len(path.q) - count, 'instant')} between samples, where limits are nearest"
+        )
+        notes = [f"{more}, were looked at like samples"]
+        progress(f"with {more}")
+    return found, robust, notes
 
 
 def _band_notes(found: Found) -> Iterator[str]:

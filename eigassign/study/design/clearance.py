@@ -19,9 +19,11 @@ the model has no mode k + 1, which the beams themselves have, nothing is clear.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +46,8 @@ Ints = NDArray[np.intp]
 # dip of 0.24 % that points 15° apart have missed, and rises by 5 % within 10° beside it.
 TURN = np.radians(10.0)
 SHARE = 0.05  # of the way of a coordinate, which may be a slide
+LIMIT = 1e-4  # of a limit, by which it may be missed between samples
+FINE = 1e-6  # of an edge, or Hz: a room that is told no nearer
 WITHIN = 1e-4  # of a least frequency or room that is stated: what four digits show
 STILL = (
     1e-6  # rad or m: over less no frequency changes; a coordinate may be still but for round-off
@@ -147,7 +151,7 @@ class _Motion:
 
     def judged(self) -> ClearanceRow:
         """What is found of it."""
-        counted, room = self.counted(), least_along(self.room, self.q)
+        counted, room = self.counted(), least_along(self.room, self.q).room
         raised = self.raised if np.isfinite(self.raised) else None
         clear = counted and room > 0.0
         return ClearanceRow(self.band.label, self.below, clear, room, counted, raised)
@@ -200,35 +204,46 @@ class _Motion:
         return g if np.isfinite(self.raised) else np.minimum(g, 0.0)
 
 
-def least_along(curve: Callable[[Floats], Floats], q: Floats, within: float | None = None) -> float:
+class Lowest(NamedTuple):
+    """The least of a curve along samples, and the place where it was found."""
+
+    room: float
+    at: float  # 1.5 is midway between second and third
+
+
+def least_along(
+    curve: Callable[[Floats], Floats], q: Floats, within: float | None = None
+) -> Lowest:
     """The least of a curve over the samples q (n, n_q), less its possible deviation between them.
 
-    As far as it takes to tell whether it is above 0; or ``within`` a share of itself. ``curve`` is
-    of places along the samples, as `places` returns them.
+    As far as it takes to tell whether it is above 0; or ``within`` a share of itself, or `FINE`.
+    ``curve`` is of places along the samples, as `places` returns them.
     """
     at = places(q)
     g = curve(at)
-    least = low = float(g.min())
-    if (within is None and least <= 0.0) or len(at) < 2:
+    least = Lowest(float(g.min()), float(at[g.argmin()]))
+    low = least.room
+    if (within is None and low <= 0.0) or len(at) < 2:
         return least
     start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
     for _ in range(9):  # halvings: 512 points between two samples
         middle = 0.5 * (start + end)
         g_middle = curve(middle)
-        ends = np.minimum(np.minimum(g_start, g_end), g_middle)
-        least = min(least, float(ends.min()))
-        if within is None and least <= 0.0:
+        least = min(least, Lowest(float(g_middle.min()), float(middle[g_middle.argmin()])))
+        if within is None and least.room <= 0.0:
             return least
+        ends = np.minimum(np.minimum(g_start, g_end), g_middle)
         bound = ends - _beside(0.5 * np.abs(g_start - 2.0 * g_middle + g_end), start, end)
-        open_ = bound <= (0.0 if within is None else least - within * abs(least))
-        low = min(low, least, float(bound[~open_].min(initial=np.inf)))
+        deep = 0.0 if within is None else least.room - max(within * abs(least.room), FINE)
+        open_ = bound <= deep
+        low = min(low, least.room, float(bound[~open_].min(initial=np.inf)))
         if not open_.any():
-            return low
+            return Lowest(low, least.at)
         halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
         start, end, g_start, g_end = (
             np.concatenate([half[k][open_] for half in halves]) for k in range(4)
         )
-    return min(low if within is not None else 0.0, float(bound.min()))
+    return Lowest(min(low if within is not None else 0.0, float(bound.min())), least.at)
 
 
 def places(q: Floats) -> Floats:
@@ -259,67 +274,75 @@ def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
     return found
 
 
-def error_between(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
-    """The largest error of a target between samples that are far apart, else 0."""
-    if isinstance(asked, StaticLimit):
-        ways = ((fine, asked.way.at(poses, y)) for fine, poses in _apart(asked, q))
-        each = (fine.outside(w, w) for fine, w in ways)
-    else:
-        each = (_errors(model, fine, poses, y) for fine, poses in _apart(asked, q))
-    return max((float(np.abs(errors).max()) for errors in each), default=0.0)
+def lowest_room(model: Model, asked: Requirement, q: Floats, y: Floats) -> Lowest:
+    """The least room that a target leaves along its trajectories, relative, and the place of it.
 
-
-def _errors(model: Model, asked: Requirement, q: Floats, y: Floats) -> Floats:
-    """The errors (n,) of a target at poses q (n, n_q); 0 where it is on no modes by number.
-
-    Bands are checked for themselves, and modes that are followed by their shape are known at
-    samples only.
+    Of poses q (n, n_q) of all samples and a design y (n_y,), within `WITHIN`. The room of a wanted
+    frequency is its error, negative; that of what shall be highest is its frequency in Hz. Bands
+    are checked for themselves, modes that are followed by their shape are known at samples only.
     """
     if not asked.terms or asked.followed:
-        return np.zeros(1)
-    hz = model.frequencies(q, y, max(m for m, _ in asked.mode_terms))
-    nothing = np.zeros((len(hz), 0))
-    return asked.errors(Solved(hz, nothing, nothing.astype(np.intp)))
+        return Lowest(0.0, 0.0)
+    found = []
+    for name, own in asked.along:
+        part = asked.part(name, own)
+        low = least_along(_Room(model, part, q[part.rows], y), q[part.rows], WITHIN)
+        found.append(Lowest(low.room, part.rows.start + low.at))
+    return min(found)
 
 
-def least_frequency(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
-    """The least of a mode's curve along its trajectories; of a gap its least room, relative.
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """The room (n,) of one part of a target at places along its samples, of poses q (n, n_q)."""
 
-    Of poses q (n, n_q) of all samples and a design y (n_y,), within `WITHIN`.
-    """
-    parts = (asked.part(name, own) for name, own in asked.along)
-    return min(_least_of_part(model, part, q[part.rows], y) for part in parts)
+    model: Model
+    asked: Requirement
+    q: Floats
+    y: Floats
 
-
-def _least_of_part(model: Model, asked: Requirement, q: Floats, y: Floats) -> float:
-    top = max(mode for mode, _ in asked.mode_terms)
-
-    def curve(at: Floats) -> Floats:
-        hz = model.frequencies(_between(at, q), y, top)
-        edge = _between(at, asked.lower[:, None])[:, 0]
-        value = np.asarray(sum(c * hz[:, mode - 1] for mode, c in asked.mode_terms))
-        return value if asked.is_aim else value / edge - 1.0
-
-    return least_along(curve, q, WITHIN)
+    def __call__(self, at: Floats) -> Floats:
+        edges = _between(at, np.column_stack([self.asked.lower, self.asked.upper]))
+        fine = replace(self.asked, lower=edges[:, 0], upper=edges[:, 1], along=())
+        fine, q = replace(fine, rows=slice(0, len(at))), _between(at, self.q)
+        if isinstance(fine, StaticLimit):
+            curve = fine.way.at(q, self.y)
+        else:
+            hz, nothing = self.model.frequencies(q, self.y, fine.top), np.zeros((len(at), 0))
+            curve = fine.curve(Solved(hz, nothing, nothing.astype(np.intp)))
+        beyond = [rows.scale * (curve - rows.edge) for rows in fine.edge_rows()]
+        return np.asarray(-np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0))
 
 
 def least_room(model: Model, band: ForbiddenBand, row: ClearanceRow, q: Floats, y: Floats) -> float:
     """The room of a band that was found to be clear, within `WITHIN` of itself."""
     if not row.clear:
         return row.room
-    return least_along(_Motion(model, band, row.below, q, y, row.raised).room, q, WITHIN)
+    return least_along(_Motion(model, band, row.below, q, y, row.raised).room, q, WITHIN).room
 
 
-def _apart(asked: Requirement, q: Floats) -> Iterator[tuple[Requirement, Floats]]:
-    """Yield what is asked, and poses, at samples that are far apart and between them."""
-    for name, own in asked.along:
-        part = asked.part(name, own)
-        poses = q[part.rows]
-        at = places(poses)
-        if len(at) > len(poses):
-            edges = _between(at, np.column_stack([part.lower, part.upper]))
-            fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=())
-            yield replace(fine, rows=slice(0, len(at))), _between(at, poses)
+def finer_path(
+    path: Trajectories, model: Model, asked: Iterable[Requirement], designs: Sequence[Floats]
+) -> Trajectories:
+    """The trajectories with instants where designs (n_y,) have less room than at samples.
+
+    By more than `LIMIT`, and none for what keeps its limit all along.
+    """
+    times: list[list[float]] = [[] for _ in path.parts]
+    for one, y in itertools.product(asked, designs):
+        q = path.at(y)[0]
+        low = lowest_room(model, one, q, y)
+        room = low.room
+        if one.is_aim:  # what it has at samples is what counts
+            own = _Room(model, one, q[one.rows], y)(np.arange(len(one.lower), dtype=np.float64))
+            room = low.room / float(own.min()) - 1.0
+        if room < -LIMIT:
+            k = int(low.at)
+            name, last = path.name_of(k), min(k + 1, len(path.q) - 1)
+            time_s = float(np.interp(low.at, [k, last], path.time_s[[k, last]]))
+            next(t for t, part in zip(times, path.parts, strict=True) if part.name == name).append(
+                time_s
+            )
+    return path.with_instants(times)
 
 
 def followed_between(scene: Scene, asked: Requirement, y: Floats) -> float:

@@ -23,7 +23,7 @@ from eigassign.assignment.requirements.requirement import EdgeRows, Requirement
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.one_shot import cost
-from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
+from eigassign.study.design.search.optimum import Found, find_optimum
 from eigassign.study.design.search.response import reduced_about
 from eigassign.study.design.search.variants import variant_of
 from eigassign.study.monotone import box_corners
@@ -55,12 +55,13 @@ def robust_optimum(
     wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
+    deadline: float,
 ) -> tuple[Found, RobustRow]:
     """The best design that keeps what is asked in the box of tolerances about it, and at what cost.
 
     Raises AccuracyError where a deviation of an optimum has no answer.
     """
-    deadline, search = deadline_of(scene.file), (scene, wanted, starts, progress)
+    search = (scene, wanted, starts, progress)
     scenarios: list[Floats] = []
     seen: list[tuple[Found, tuple[WorstDeviation, ...]]] = []
     last, solves = None, 0
