@@ -93,7 +93,7 @@ def assignment_row(
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
     aim = None if found is None else aim_row(scene, found, wanted, of_model)
-    undecided = dict(_undecided(targets, exact, of_model, accepted))
+    undecided = dict(_undecided(targets, exact, of_model, largest))
     beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
     doubts = [] if trusted else [UNTRUSTED]
     judged = judged_modes(scene.file, targets)
