@@ -525,7 +525,10 @@ class RobustTarget:
     is_goal: Annotated[bool, Fact("a wanted frequency")]
     nominal: Annotated[float, Fact("of the optimum without deviations", "alone", digits=number)]
     robust: Annotated[float, Fact(digits=number)]
-    nominal_worst: Annotated[Share, Fact("of the optimum without deviations", "deviated alone")]
+    nominal_worst: Annotated[
+        Share | None,
+        Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
+    ]
     worst: Annotated[Share, Fact("found by a search", "deviated")]
     drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
 

@@ -64,10 +64,12 @@ def with_end(
 def _no_barrier(problem: DesignProblem, a: Optimum, b: Optimum) -> bool:
     """True where a way from one end to the other was found that is nowhere worse than both."""
     violation, value = (max(pair) for pair in zip(worth(a), worth(b), strict=True))
-    room = SAME * abs(value) + NOTHING
-    missed = SAME * violation + MET
+    if min(a.seen.violation, b.seen.violation) > MET:
+        value = np.inf  # where limits are missed nothing else counts
+    room, missed = SAME * abs(value) + NOTHING, SAME * violation + MET
     alike = a.seen.violation + b.seen.violation >= 2.0 * violation - missed
-    alike = alike and a.objective + b.objective >= 2.0 * value - room
+    if np.isfinite(value):
+        alike = alike and a.objective + b.objective >= 2.0 * value - room
     if not alike and a.end in FINISHED and b.end in FINISHED:
         return False  # from the worse one, which is an optimum, no way leads down
     return _joined(problem, a.y, b.y, (violation + missed, value + room), HALVINGS)

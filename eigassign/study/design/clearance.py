@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.requirement import Requirement, Solved
-from eigassign.assignment.requirements.static_limit import StaticLimit
+from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit
 from eigassign.errors import LostModeError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.inertia import count_below
@@ -306,6 +306,8 @@ class _Room:
         fine, q = replace(fine, rows=slice(0, len(at))), _between(at, self.q)
         if isinstance(fine, StaticLimit):
             curve = fine.way.at(q, self.y)
+            if fine.way.target.limit == "at_least":  # of the stiffness, not of its inverse
+                return np.asarray(fine.upper / np.maximum(curve, RIGID) - 1.0)
         else:
             hz, nothing = self.model.frequencies(q, self.y, fine.top), np.zeros((len(at), 0))
             curve = fine.curve(Solved(hz, nothing, nothing.astype(np.intp)))

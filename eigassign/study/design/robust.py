@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import monotonic
 
 import numpy as np
@@ -20,6 +21,7 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, 
 from eigassign.assignment.exact.sequential import End, minimise
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import EdgeRows, Requirement
+from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.one_shot import cost
@@ -34,6 +36,10 @@ Floats = NDArray[np.float64]
 ROUNDS = 12  # of scenarios: known cases took at most 4
 STEPS = 20  # to the worst deviation: from the best corner mostly none
 CUT = 1e-5  # relative: a deviation that is worse by more is a scenario
+LOST = (
+    "no design was found of which all deviations within the tolerances have modes ({}): give "
+    "smaller tolerances, or bounds that leave more room"
+)
 DRAWS = 10_000  # random deviations
 AT = 6  # samples at which they are solved
 ESTIMATED = 64  # of the draws, for which the reduced model's error is estimated; of followed modes
@@ -66,22 +72,28 @@ def robust_optimum(
     seen: list[tuple[Found, tuple[WorstDeviation, ...]]] = []
     last, solves = None, 0
     for _ in range(ROUNDS):
-        found = find_optimum(*search, last, scenarios, deadline)
+        try:
+            found = find_optimum(*search, last, scenarios, deadline)
+        except EigassignError as why:
+            if scenarios:
+                raise AccuracyError(LOST.format(why)) from why
+            raise
         last = found = least_changed(found, scene.initial)
         look = _Deviations(found)
-        try:
-            worst = look.worst()
-        except EigassignError as why:
-            message = f"with a deviation within the tolerances the mechanism has no modes: {why}"
-            raise AccuracyError(message) from why
-        seen.append((found, worst))
-        solves += found.exact_solves + look.response.exact_solves
-        more = list(look.cuts(worst))
         ended = found.best.end in (End.SECONDS, End.INTERRUPTED) or monotonic() > deadline
+        lost = look.lost()
+        if lost and ended:
+            raise AccuracyError(LOST.format("the search was ended before"))
+        worst = () if lost else look.worst()
+        seen.append((found, worst))
+        more = [sigma for sigma, _ in lost] or list(look.cuts(worst))
+        solves += found.exact_solves + look.response.exact_solves
         if not more or ended:
             break
         scenarios += more
-        progress(f"robust: the targets are to hold for {len(scenarios)} deviations too")
+        progress(f"robust: the targets are to hold for {counted(len(scenarios), 'deviation')} too")
+    if lost:
+        raise AccuracyError(LOST.format(lost[0][1]))
     (nominal, before), found = seen[0], replace(found, exact_solves=solves)
     progress(f"robust: {look.draws} random deviations")
     drawn, error = look.drawn(worst)
@@ -136,13 +148,29 @@ class _Deviations:
         k = int(missed.argmax())
         return float(missed[k]), rows.of.rows.start + k, unit[k] * slopes[k]
 
-    def worst(self) -> tuple[WorstDeviation, ...]:
-        """The worst found of each edge: from the worst corner, and from the design itself."""
+    @cached_property
+    def corners(self) -> Floats:
+        """The corners (n, n_y) of the box."""
         moving = self.upper > self.lower
         sides = box_corners(int(moving.sum()))
         corners = np.repeat(self.y[None], len(sides), axis=0)
         corners[:, moving] = np.where(sides > 0.5, self.upper[moving], self.lower[moving])
-        box, none, found = (self.lower, self.upper), (np.zeros(0), np.zeros((0, moving.size))), []
+        return corners
+
+    def lost(self) -> list[tuple[Floats, EigassignError]]:
+        """The scenarios of corners at which the mechanism has no modes, and why."""
+        found = []
+        for corner in self.corners:
+            try:
+                self.response(corner)
+            except EigassignError as why:
+                found.append((self.scene.tolerances.scenario(self.y, corner), why))
+        return found
+
+    def worst(self) -> tuple[WorstDeviation, ...]:
+        """The worst found of each edge: from the worst corner, and from the design itself."""
+        box, found = (self.lower, self.upper), []
+        none = np.zeros(0), np.zeros((0, len(self.y)))
         for rows in self.edges:
 
             def appraise(y: Floats, rows: EdgeRows = rows) -> Appraisal:
@@ -150,7 +178,7 @@ class _Deviations:
                 return Appraisal(np.array([-missed]), -slopes[None], *none)
 
             problem = DesignProblem(appraise, *box, objective=Objective.LARGEST)
-            corner = max(corners, key=lambda one: self.worst_at(rows, one)[0])
+            corner = max(self.corners, key=lambda one: self.worst_at(rows, one)[0])
             ends = (minimise(problem, start, STEPS).y for start in (corner, self.y))
             design = max(ends, key=lambda one: self.worst_at(rows, one)[0])
             found.append(WorstDeviation(rows, *self.worst_at(rows, design)[:2], design))
@@ -231,7 +259,7 @@ class _Deviations:
                 is_goal=of.is_goal,
                 nominal=amounts[0],
                 robust=amounts[1],
-                nominal_worst=before[name],
+                nominal_worst=before.get(name),
                 worst=after[name],
                 drawn=drawn.get(name),
             )

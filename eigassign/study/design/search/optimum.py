@@ -23,7 +23,7 @@ from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import InfeasibleError
+from eigassign.errors import EigassignError, InfeasibleError
 from eigassign.study.design.clearance import check_band, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.search.response import reduced_models
@@ -469,9 +469,17 @@ def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:
-    """Violation (of bounds and constraints too, relative to their ranges) and F at the start."""
+    """Violation (of bounds and constraints too, relative to their ranges) and F at the start.
+
+    Alone where it has no answer in a scenario.
+    """
     y, problem = scene.initial, variant.problem
-    seen = problem.appraise(y)
+    try:
+        seen = problem.appraise(y)
+    except EigassignError:
+        if not variant.task.scenarios:
+            raise
+        seen = variant.requirements.appraise(y, variant.response(y))
     width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
     outside = np.maximum(problem.lower - y, y - problem.upper) / width
     worst = max(seen.violation, float(outside.max(initial=0.0)))

@@ -77,15 +77,23 @@ def search_starts(
 
     So many starts were ``made`` before.
     ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
-    answer.
+    answer; with scenarios, in which others may have one, where none has.
     """
     first, keys = levels[0], levels[0].scene.file.assignment
-    search = Searched(variant_of(first, below))
+    search, lost = Searched(variant_of(first, below)), list[EigassignError]()
     for start in _in_turn(first, search.variant, starts) if spread else starts:
         progress(f"  from start {made + search.starts + 1}")
-        search = replace(_after(search, start, keys.steps, deadline), starts=search.starts + 1)
+        try:
+            search = _after(search, start, keys.steps, deadline)
+        except EigassignError as error:
+            if not first.scenarios:
+                raise
+            lost.append(error)
+        search = replace(search, starts=search.starts + 1)
         if search.ended or (keys.starts == "auto" and _is_enough(search)):
             break
+    if lost and not search.optima:
+        raise lost[0]
     responses = [search.variant.response]
     for level in levels[1:]:
         if not search.ended:
@@ -140,7 +148,12 @@ def _refined(
         search = _after(search, optimum.y, steps, deadline, optimum)
         if search.ended:
             break
-    seen = problem.appraise(initial)
+    try:
+        seen = problem.appraise(initial)
+    except EigassignError:
+        if not search.optima:
+            raise
+        return search
     inside = np.all((initial >= problem.lower) & (initial <= problem.upper))
     own, known = (seen.violation, problem(initial, seen)), map(worth, search.optima)
     if not search.optima or (inside and best_first([*known, own], lambda each: each)[0] is own):
