@@ -211,7 +211,7 @@ def _told(folder: Path, rows: InOrder, since: EarlierResult | None, reporter: Re
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])
     if bad := total - ends["ok"]:
-        reporter.error(f"{bad} of {_cases(total)} failed")
+        reporter.error(f"{bad} of {_cases(total)} gave no answer to use")
     show(f"{_cases(total)} in {folder}: {said(ends) or 'nothing to run'}")
     return 1 if bad or (since is not None and since.moves) else 0
 

@@ -97,8 +97,10 @@ def _sentence(findings: Sequence[Finding]) -> str:
     before = "" if worst.before == "met" else f" ({worst.before} before)"
     said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after}{before}"
     if others:
-        what = f"all {len(others)} others are met" if len(others) > 1 else "the other is met"
-        said += f"; {what if not missed else f'{missed} of {len(others)} others are missed'}"
+        many = f"{missed} of {len(others)} others are missed" if missed else ""
+        many = many or f"all {len(others)} others are met"
+        alone = "the other is missed" if missed else "the other is met"
+        said += f"; {many if len(others) > 1 else alone}"
     return f"{said}."
 
 
