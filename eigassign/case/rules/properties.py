@@ -389,6 +389,9 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
     for k, column in enumerate(columns):
         if document.assignment.robust and column.tolerance is not None:
             low, high = (column.tolerance.deviation(end) for end in box[k])
+            prop = known_property(tree, column.parameter)
+            if prop and 0 in (prop.at_least, prop.above):  # as masses are never below 0
+                low = min(low, max(column.min, 0.0))
             box[k] = column.min - low, column.max + high
     for row, message in impossible(document.mechanism.sections, varied, box):
         k, factor = next(iter(row.items()))

@@ -255,7 +255,8 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
     if not contradiction.smallest:
         return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
-    return f"no design within the bounds {meets} {listed}{together}"
+    deviating = " for all deviations within the tolerances" if answer.robust is not None else ""
+    return f"no design within the bounds {meets} {listed}{together}{deviating}"
 
 
 def _too_coarse(

@@ -185,3 +185,17 @@ def test_sections_exist_within_the_tolerances() -> None:
     assert parse(text.encode(), "case.yaml")
     with pytest.raises(CaseError, match="section 'rod' cannot exist"):
         parse((text + ROBUST).encode(), "case.yaml")
+
+
+def test_what_cannot_be_below_0_may_be_0_and_deviate() -> None:
+    masses = MASSES.replace("min: 20 g", "min: 0")
+    _, results = solved(masses, "  - {mode: 1, at_least: 190 Hz}\n")
+    assert results.assignment.verdict == "reached"
+
+
+def test_a_limit_that_only_deviations_miss_is_said_to_contradict_for_them() -> None:
+    same = "  constraints: {same: {terms: {m1: 1, m2: -1}, min: 0, max: 0}}\n"
+    _, results = solved(MASSES + same, "  - {mode: 1, at_least: 150 Hz}\n")
+    assert results.assignment.verdict == "infeasible"
+    expected = "meets same (line 51) for all deviations within the tolerances (same: missed by "
+    assert expected in results.assignment.reason
