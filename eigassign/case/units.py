@@ -140,6 +140,11 @@ def handy_unit(unit: str, *values: float) -> tuple[str, float]:
     return next(((n, size) for n, size in units.items() if most >= size), [*units.items()][-1])
 
 
+def limit_unit(unit: str, *values: float) -> tuple[str, float]:
+    """The unit that limits are said in: kg and degrees always, else the handy one."""
+    return angle_unit(unit, True) if unit in ("kg", "rad") else handy_unit(unit, *values)
+
+
 def angle_unit(unit: str, in_degrees: bool) -> tuple[str, float]:
     """``unit`` and 1, but of angles degrees, and their size in rad, where a case has these."""
     return ("deg", math.pi / 180.0) if unit == "rad" and in_degrees else (unit, 1.0)

@@ -171,7 +171,7 @@ def _deviated(
     robust: RobustRow, targets: Sequence[TargetStudy], limits: Sequence[LimitRow], largest: float
 ) -> Iterator[str]:
     """Say what the design itself meets, and some deviation within the tolerances does not."""
-    met = {one.label for one in targets if one.satisfied} | {r.name for r in limits if r.satisfied}
+    met = {one.label for one in targets if one.satisfied} | {r.words for r in limits if r.satisfied}
     for one in robust.targets:
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
             yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"

@@ -11,6 +11,7 @@ import pytest
 from eigassign.assignment import Appraisal, Tolerances, with_scenarios
 from eigassign.case import parse
 from eigassign.errors import CaseError
+from eigassign.output import run_tables
 from eigassign.pipeline import solve_case
 from eigassign.study import BuiltCase, RunResults
 
@@ -115,7 +116,7 @@ def test_limits_bands_and_the_mass_hold_for_every_deviation() -> None:
     assert robust.objective > robust.objective_nominal
     assert robust.mass == pytest.approx(model.mass(y), rel=1e-12)
     assert max(one.most for one in robust.targets) <= WITHIN
-    assert [one.label for one in robust.targets][-1] == "design.mass"
+    assert [one.label for one in robust.targets][-1] == "mass at most 2.8 kg"
 
 
 def test_what_only_deviations_miss_is_not_reached() -> None:
@@ -197,5 +198,23 @@ def test_a_limit_that_only_deviations_miss_is_said_to_contradict_for_them() -> N
     same = "  constraints: {same: {terms: {m1: 1, m2: -1}, min: 0, max: 0}}\n"
     _, results = solved(MASSES + same, "  - {mode: 1, at_least: 150 Hz}\n")
     assert results.assignment.verdict == "infeasible"
-    expected = "meets same (line 51) for all deviations within the tolerances (same: missed by "
+    expected = "meets same (line 51) for all deviations within the tolerances (same at least 0 kg "
     assert expected in results.assignment.reason
+
+
+def test_the_table_says_what_it_costs_in_units_and_counts_the_same_for_both_designs() -> None:
+    design = (
+        "  mass: {parameter: bodies.elbow_mass.mass, values: [100 g], tolerance: 20 g}\n"
+        "  tip: {parameter: bodies.tool_mass.mass, values: [100 g], tolerance: 20 g}\n"
+        "  constraints: {thick: {terms: {rod: 1}, max: 45 mm}}\n"
+    )
+    text = "assignment: {robust: true, starts: 1, objective: {highest: 1}}\n"
+    _, results = solved(ROD + design, "  - {mode: 2, at_least: 300 Hz}\n", text)
+    robust = results.assignment.robust
+    assert "least frequency " in robust.words
+    assert " Hz at the worst deviation" in robust.words
+    highest = next(one for one in robust.targets if "high" in one.label)
+    assert highest.nominal_worst == pytest.approx(highest.worst, abs=1e-9)  # of the same design
+    tables = {one.title: one.rows for one in run_tables(results)}
+    assert ("thick at most 45 mm", "mm") in [row[:2] for row in tables["Robust"]]
+    assert "total mass" in [row[0] for row in tables["Design"]]
