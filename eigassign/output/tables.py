@@ -332,6 +332,8 @@ def optima(results: RunResults) -> Table:
         for k, each in enumerate(row.local_optima, 1)
     )  # fmt: skip
     caption = f"Found from {row.starts} starts; the first is the answer."
+    if results.price is not None and row.objective != "lightest":
+        caption += " Objectives include prices."
     return Table("Local optima", columns, rows, caption)
 
 
