@@ -415,8 +415,10 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
 
 def _bound(design: Design, name: str, lower: bool) -> KeyPath:
     """Where the file gives a bound of a parameter, or its values."""
-    values = getattr(design.entries[name], "values", None)
-    return ("design", name, "values" if values is not None else "min" if lower else "max")
+    entry = design.entries[name]
+    if isinstance(entry, Choices):
+        return "design", name, "choices"
+    return ("design", name, "values" if entry.values is not None else "min" if lower else "max")
 
 
 def load_cases_set_nothing_impossible(

@@ -166,10 +166,11 @@ def _of_design(tree: Tree, known: Mapping[str, Quantity | None]) -> Iterator[Und
             yield ("design", name, key), at(body, key), own
         for k, value in enumerate(entries(body, "values")):
             yield ("design", name, "values", k), value, own
-        amount = at(body, "tolerance")
-        if isinstance(amount, str) and not amount.rstrip().endswith("%"):
-            either = Quantity(own.dimension, above=0) if prop else ANY
-            yield ("design", name, "tolerance"), amount, either
+        of_choices = (((p,), known_property(tree, p), v) for p, v in items(body, "tolerance"))
+        for below, of, amount in (((), prop, at(body, "tolerance")), *of_choices):
+            if isinstance(amount, str) and not amount.rstrip().endswith("%"):
+                either = Quantity(of.dimension, above=0) if of else ANY
+                yield ("design", name, "tolerance", *below), amount, either
     drives = dict(zip(names(tree, "coordinates"), coordinate_quantities(tree), strict=True))
     for name, body in items(tree, "design", "torque"):
         kind = drives.get(name, ANY)

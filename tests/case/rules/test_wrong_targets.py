@@ -88,6 +88,8 @@ ENTRIES = {
     "choice of more": (f"b: {{choices: {{x: {{{ONE}}}, y: {{{ONE}, ¦links.fore.length: 1}}}}}}", "b.choices.y.links.fore.length", "choice 'x' does not set it"),
     "price of what is not set": (f"b: {{choices: {{x: {{{ONE}}}}}, price: {{¦links.fore.length: 1}}}}", "b.price.links.fore.length", "the choices do not set it"),
     "price of another unit, of a choice": (f"b: {{choices: {{x: {{{ONE}}}}}, price: {{¦sections.rod.diameter: 1 / kg}}}}", "b.price.sections.rod.diameter", "which is mass"),
+    "tolerance of what is not set": (f"b: {{choices: {{x: {{{ONE}}}}}, tolerance: {{¦links.fore.length: 1 mm}}}}", "b.tolerance.links.fore.length", "the choices do not set it"),
+    "tolerance of another unit, of a choice": (f"b: {{choices: {{x: {{{ONE}}}}}, tolerance: {{¦sections.rod.diameter: 1 g}}}}", "b.tolerance.sections.rod.diameter", "which is mass"),
     "choice of nothing": ("b: {choices: {x: {¦sections.rod.diametr: 3}}}", "b.choices.x.sections.rod.diametr", "did you mean 'diameter'"),
     "choice in kg": ("b: {choices: {x: {¦sections.rod.diameter: 3 kg}}}", "b.choices.x.sections.rod.diameter", "which is mass"),
     "choice of a parameter": ("b: {choices: {x: {¦bodies.tool.mass: 3 kg}}}", "b.choices.x.bodies.tool.mass", "is a design parameter already: 'm'"),

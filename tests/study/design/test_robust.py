@@ -163,6 +163,20 @@ def test_combinations_of_catalogues_hold_for_every_deviation() -> None:
     assert row.robust.price > row.robust.price_nominal
 
 
+def test_choices_deviate_by_property() -> None:
+    path = "sections.rod.diameter"
+    listed = ", ".join(f"d{mm}: {{{path}: {mm} mm}}" for mm in (28, 29, 30, 31, 32, 33))
+    design = f"  rod: {{choices: {{{listed}}}, price: {{{path}: 1 / mm}}, tolerance: {{{path}: "
+    case, results = solved(design + "0.5 mm}}\n", "  - {mode: 1, at_least: 200 Hz}\n")
+    chosen = results.assignment.robust.nominal[0], results.design[0].optimal
+    hz = [
+        frequencies(case, np.array([[y - 5e-4]]))[..., 0].min() for y in (*chosen, chosen[1] - 1e-3)
+    ]
+    assert results.assignment.verdict == "reached"
+    assert hz[0] < 200.0 <= hz[1]
+    assert hz[2] < 200.0  # the next one down misses
+
+
 @pytest.mark.parametrize(
     ("design", "assignment", "expected"),
     [
