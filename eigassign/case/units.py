@@ -93,9 +93,14 @@ _DIMENSIONS = (
     Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2", 1e-6, 1e24),
     Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad", 1e-12, 1e6),
     Dimension(
-        "rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/arcmin", 1e-24, 1e24
+        "rotational stiffness",
+        (1, 2, -2, -1, 0),
+        "N m/rad",
+        "kN m/rad, N m/arcmin, kgf m/arcmin",
+        1e-24,
+        1e24,
     ),
-    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm", 1e-24, 1e24),
+    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm, N/um", 1e-24, 1e24),
     Dimension("compliance", (-1, 0, 2, 0, 0), "m/N", "mm/N, um/N", 1e-24, 1e24),
     Dimension("transmission", (0, -1, 0, 1, 0), "rad/m", "rad/mm, deg/mm", 1e-12, 1e12),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),

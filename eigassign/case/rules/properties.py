@@ -174,7 +174,7 @@ def _of_component(
     if len(inner) != 1 or inner[0] not in [str(k) for k in range(len(axes))]:
         forms = listed([f"{owner}.{k}" for k in range(len(axes))])
         raise NoPropertyError(f"{owner} varies by component ({', '.join(axes)}): {forms}")
-    if value is None and group != "joints":  # a joint is at its base and not turned, unless given
+    if value is None and group == "links":  # joints and bodies are at their node, and not turned
         raise NoPropertyError(f"{owner} has no value in this file: give it an initial value")
     return _VECTORS[group][key]
 

@@ -67,7 +67,7 @@ class AssignmentKeys(Part):
             linear limits
         objective: what is made small or large: `least_squares` the mean square error, `worst_case`
             the largest weighted error, `lightest` the mass, `{highest: 1}` the least frequency of a
-            mode, `widest` the least relative room of all bands and gaps
+            mode, `widest` the least relative room of all bands and gaps, of numbered modes
         starts: number of designs to start from; the first are the initial design and the one shot,
             the others by turns the most promising of a sample and spread ones. `auto` goes on
             while more than half an optimum is expected unseen, to 100 starts at most
