@@ -324,7 +324,7 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
 def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
     match = _FACTOR.fullmatch(factor)
     symbol = match.group(1) if match else factor
-    if symbol == "rpm" and dimension in (SPEED, None):
+    if symbol == "rpm" and dimension in (SPEED, PLAIN, None):
         return _RPM
     if match is None or symbol not in UNITS:
         raise QuantityError(_unknown(symbol, text, dimension))

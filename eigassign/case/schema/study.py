@@ -5,7 +5,8 @@ Measurements are frequencies that were measured, listed or in a CSV file.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self, TypeAlias
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import Field, model_validator
 
@@ -26,6 +27,7 @@ from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
 
 QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
 Auto: TypeAlias = Literal["auto"]
+Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
 MOST_MEASUREMENTS = 10_000  # of one case
 
 
@@ -49,6 +51,13 @@ class Highest(Part):
     """
 
     highest: ValueOr[Mode, HighestMode]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_a_mode(cls, given: Any) -> Any:
+        for word in set(get_args(Word)).intersection(given if isinstance(given, Mapping) else ()):
+            raise wrong(f"stands alone: write objective: {word}", word)
+        return given
 
     @property
     def target(self) -> HighestTarget:
@@ -80,9 +89,7 @@ class AssignmentKeys(Part):
     """
 
     method: Literal["sequential", "one_shot"] = "sequential"
-    objective: ValueOr[Literal["least_squares", "worst_case", "lightest", "widest"], Highest] = (
-        "least_squares"
-    )
+    objective: ValueOr[Word, Highest] = "least_squares"
     starts: NumberOr[Annotated[int, Field(ge=1, le=1000)], Auto] = "auto"
     steps: Annotated[int, Field(ge=1, le=1_000_000)] = 100
     seconds: Annotated[float, DURATION] | None = None

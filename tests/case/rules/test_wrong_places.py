@@ -33,6 +33,7 @@ WRONG = [
     Wrong("offset of no body", D, "¦parameter: bodies.tol.offset.1, min: 0, max: 1", "design.d.parameter", "did you mean 'tool'"),
     Wrong("node of a beam", D, "¦parameter: links.hand.nodes.end.0, min: 0, max: 1", "design.d.parameter", "can where it is rigid"),
     Wrong("angle of a spring", D, "¦parameter: springs.s.angle, min: 0, max: 1", "design.d.parameter", "unknown spring 's'"),
+    Wrong("factors alone", D, "¦parameter: {sections.rod.diameter: 1}, min: 20 mm, max: 40 mm", "design.d.parameter", "write a path, or several as [path, {path: factor}]"),
     Wrong("no path first", D, "parameter: [¦{sections.rod.diameter: 1}, sections.pipe.outer_diameter], min: 20 mm, max: 40 mm", "design.d.parameter[0]", "the first is a path alone"),
     Wrong("listed twice", D, "parameter: [sections.rod.diameter, ¦{sections.rod.diameter: 2}], min: 20 mm, max: 40 mm", "design.d.parameter[1]", "listed twice"),
     Wrong("factor of zero", D, "parameter: [sections.rod.diameter, {¦sections.pipe.outer_diameter: 0}], min: 20 mm, max: 40 mm", "design.d.parameter[1].sections.pipe.outer_diameter", "must not be 0"),
