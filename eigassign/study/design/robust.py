@@ -71,7 +71,10 @@ def robust_optimum(
         try:
             worst = look.worst()
         except EigassignError as why:
-            message = f"with a deviation within the tolerances the mechanism has no modes: {why}"
+            message = (
+                f"robust: a deviation of the optimum within the tolerances has no answer: {why}"
+            )
+            message += ". Narrow the bounds or the tolerances, so that each has one"
             raise AccuracyError(message) from why
         seen.append((found, worst))
         solves += found.exact_solves + look.response.exact_solves

@@ -10,7 +10,7 @@ import pytest
 
 from eigassign.assignment import Appraisal, Tolerances, with_scenarios
 from eigassign.case import parse
-from eigassign.errors import CaseError
+from eigassign.errors import AccuracyError, CaseError
 from eigassign.output import run_tables
 from eigassign.pipeline import solve_case
 from eigassign.study import BuiltCase, RunResults
@@ -188,6 +188,13 @@ def test_robust_where_it_cannot_be_is_refused(design: str, assignment: str, expe
     with pytest.raises(CaseError) as error:
         solved(design, "  - {mode: 1, frequency: 200 Hz}\n", assignment)
     assert expected in str(error.value)
+
+
+def test_a_deviation_that_cannot_follow_the_path_is_named_with_what_to_do() -> None:
+    fore = "  fore: {parameter: links.forearm.length, min: 420 mm, max: 450 mm, tolerance: 10 mm}\n"
+    text = "assignment: {robust: true, objective: lightest, starts: 1}\n"
+    with pytest.raises(AccuracyError, match=r"has no answer: .* Narrow the bounds or the toler"):
+        solved(fore, "  - {mode: 1, at_least: 100 Hz}\n", text)
 
 
 def test_sections_exist_within_the_tolerances() -> None:
