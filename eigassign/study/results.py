@@ -554,7 +554,9 @@ class RobustRow(Brief):
     nominal: Floats
     measured: Annotated[str, Fact("the objective")]
     objective_nominal: Annotated[float, Fact("without masses and prices, not deviating")]
-    objective: Annotated[float, Fact("the same; but of least_squares, at the worst deviation")]
+    objective: Annotated[
+        float, Fact("the same at the worst deviation; of least_squares not deviating")
+    ]
     mass_nominal: Kilograms
     mass: Kilograms
     price_nominal: float | None

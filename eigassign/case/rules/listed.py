@@ -43,12 +43,12 @@ def _choices(tree: Tree, file: Path, key: str) -> Iterator[tuple[str, Mapping[st
     header = read_words(file, key)[0][1]
     name, *paths = (cell.partition("[")[0].strip() for cell in header)
     if name == PRICE or known_property(tree, name):
-        message = f"column {name}: the first column names the choices: put one before it"
-        raise MechanismError(key, f"{file.name}: {message}, such as name")
+        message = f"{file.name}: the first column names the choices: put one before {name}"
+        raise MechanismError(key, message)
     for cell, path in zip(header[1:], paths, strict=True):
         if path == PRICE != cell:
-            message = f"column {cell}: prices are plain numbers, all in one currency: call it price"
-            raise MechanismError(key, f"{file.name}: {message}")
+            message = f"{file.name}: column {cell}: prices are plain numbers: call it {PRICE}"
+            raise MechanismError(key, message)
     columns = [CsvColumn(name)]
     for path in paths:
         try:

@@ -71,11 +71,8 @@ def robust_optimum(
         try:
             worst = look.worst()
         except EigassignError as why:
-            message = (
-                f"robust: a deviation of the optimum within the tolerances has no answer: {why}"
-            )
-            message += ". Narrow the bounds or the tolerances, so that each has one"
-            raise AccuracyError(message) from why
+            message = f"robust: a deviation within the tolerances has no answer: {why}"
+            raise AccuracyError(f"{message}. Narrow the bounds or the tolerances") from why
         seen.append((found, worst))
         solves += found.exact_solves + look.response.exact_solves
         more = list(look.cuts(worst))
