@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.assignment import Appraisal, Tolerances, with_scenarios
+from eigassign.assignment import Appraisal, Tolerances, design_limits, with_scenarios
 from eigassign.case import parse
 from eigassign.errors import AccuracyError, CaseError
 from eigassign.output import run_tables
@@ -239,3 +239,12 @@ def test_the_table_says_what_it_costs_in_units_and_counts_the_same_for_both_desi
     tables = {one.title: one.rows for one in run_tables(results)}
     assert ("thick at most 45 mm", "mm") in [row[:2] for row in tables["Robust"]]
     assert "total mass" in [row[0] for row in tables["Design"]]
+
+
+def test_a_limit_between_angles_is_said_in_degrees() -> None:
+    text = HEAD.replace(", angle: absolute", "") + "design:\n"
+    text += "  a: {parameter: joints.elbow.angle, min: 0, max: 3 deg}\n"
+    text += "  constraints: {tilt: {terms: {a: 2}, max: 2 deg}}\n"
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
+    (limit,) = design_limits(case.file, case.model(), case.trajectory)
+    assert limit.asked_words == "tilt at most 2 deg"
