@@ -577,9 +577,9 @@ class RobustRow(Brief):
             pairs = [(f"largest error {percent(both[0])}", percent(both[1]) + at_worst)]
         elif has_goals:
             pairs = [(f"rms error {percent(both[0] ** 0.5)}", percent(both[1] ** 0.5))]
-        pairs += [(f"mass {self.mass_nominal:.6g}", f"{self.mass:.6g} kg")]
+        pairs += [(f"mass {number(self.mass_nominal)}", f"{number(self.mass)} kg")]
         if self.price is not None and self.price_nominal is not None:
-            pairs += [(f"price {self.price_nominal:.6g}", f"{self.price:.6g}")]
+            pairs += [(f"price {number(self.price_nominal)}", number(self.price))]
         return ", ".join(" → ".join(pair) for pair in pairs)
 
 
