@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from eigassign.case.reader import resolve
 from eigassign.case.schema.design import RESERVED, Design, Tolerance
 from eigassign.case.schema.joints import JointBase
-from eigassign.case.schema.mechanism import Spring
+from eigassign.case.schema.mechanism import Body, Spring
 from eigassign.case.schema.parts import Part
 from eigassign.case.schema.trajectory import AnyTrajectory, Timed
 
@@ -48,6 +48,8 @@ def _superfluous(value: Part) -> set[str]:
         keys.add("angle")
     if isinstance(value, JointBase) and value.base != "ground" and not any(value.position or ()):
         keys.add("position")
+    if isinstance(value, Body) and not any(value.offset or ()):
+        keys.add("offset")
     if isinstance(value, Timed) and value.timing != "trapezoidal":
         keys.add("acceleration_share")
     if isinstance(value, AnyTrajectory) and not value.set:

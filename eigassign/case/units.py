@@ -93,9 +93,14 @@ _DIMENSIONS = (
     Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2", 1e-6, 1e24),
     Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad", 1e-12, 1e6),
     Dimension(
-        "rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/arcmin", 1e-24, 1e24
+        "rotational stiffness",
+        (1, 2, -2, -1, 0),
+        "N m/rad",
+        "kN m/rad, N m/arcmin, kgf m/arcmin",
+        1e-24,
+        1e24,
     ),
-    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm", 1e-24, 1e24),
+    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm, N/um", 1e-24, 1e24),
     Dimension("compliance", (-1, 0, 2, 0, 0), "m/N", "mm/N, um/N", 1e-24, 1e24),
     Dimension("transmission", (0, -1, 0, 1, 0), "rad/m", "rad/mm, deg/mm", 1e-12, 1e12),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
@@ -138,6 +143,11 @@ def handy_unit(unit: str, *values: float) -> tuple[str, float]:
     most = max((abs(value) for value in values), default=0.0)
     units = _HANDY.get(unit, {unit: 1.0}) if most else {unit: 1.0}
     return next(((n, size) for n, size in units.items() if most >= size), [*units.items()][-1])
+
+
+def limit_unit(unit: str, *values: float) -> tuple[str, float]:
+    """The unit that limits are said in: kg and degrees always, else the handy one."""
+    return angle_unit(unit, True) if unit in ("kg", "rad") else handy_unit(unit, *values)
 
 
 def angle_unit(unit: str, in_degrees: bool) -> tuple[str, float]:
@@ -314,7 +324,7 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
 def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
     match = _FACTOR.fullmatch(factor)
     symbol = match.group(1) if match else factor
-    if symbol == "rpm" and dimension in (SPEED, None):
+    if symbol == "rpm" and dimension in (SPEED, PLAIN, None):
         return _RPM
     if match is None or symbol not in UNITS:
         raise QuantityError(_unknown(symbol, text, dimension))

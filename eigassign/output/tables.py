@@ -154,7 +154,8 @@ def design(results: RunResults) -> Table:
         cells = ["" for _ in more]
         if mass.price is not None:
             cells[-1] = number(mass.cost)
-        rows.append(("mass", "of all links and bodies", "kg", *both, *edges, *cells))
+        own = "total mass" if any(row.name == "mass" for row in results.design) else "mass"
+        rows.append((own, "of all links and bodies", "kg", *both, *edges, *cells))
     constraints = [limit.name for limit in active if limit.kind == "constraint"]
     caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
     if results.price is not None:
@@ -331,6 +332,8 @@ def optima(results: RunResults) -> Table:
         for k, each in enumerate(row.local_optima, 1)
     )  # fmt: skip
     caption = f"Found from {row.starts} starts; the first is the answer."
+    if results.price is not None and row.objective != "lightest":
+        caption += " Objectives include prices."
     return Table("Local optima", columns, rows, caption)
 
 
@@ -397,10 +400,11 @@ def robust(results: RunResults) -> Table:
         return Table("Robust", (), ())
     caption = (
         f"Missed at the worst deviation that a search found within the tolerances, and at the "
-        f"worst of {row.draws} random ones. Alone: the optimum without deviations. From alone to "
+        f"worst of {row.draws} random ones; of what is as high or wide as can be, what it is short "
+        "of the robust design's. Alone: the optimum without deviations. From alone to "
         f"robust: {row.words}."
     )
-    names = "label unit nominal robust nominal_worst worst drawn"
+    names = "label handy nominal robust nominal_worst worst drawn"
     return facts_table("Robust", row.targets, names, caption)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
-from eigassign.case.units import angle_unit, handy, handy_unit, is_bare
+from eigassign.case.units import angle_unit, handy, handy_unit, is_bare, limit_unit
 from eigassign.facts import (
     OF_ROW,
     Curve,
@@ -30,6 +30,7 @@ from eigassign.facts import (
     Residual,
     Share,
     number,
+    percent,
     positive_percent,
 )
 
@@ -435,7 +436,7 @@ class LimitRow:
     def said(self, amount: float) -> str:
         """An amount with the unit that the limit is said in: masses are in kg."""
         edges = [edge for edge in (self.lower, self.upper) if edge is not None]
-        unit, size = ("kg", 1.0) if self.unit == "kg" else handy_unit(self.unit, *edges)
+        unit, size = limit_unit(self.unit, *edges)
         return f"{number(amount / size)} {unit}".rstrip()
 
 
@@ -523,14 +524,19 @@ class RobustTarget:
     label: Annotated[str, Fact("in words", "target")]
     unit: str
     is_goal: Annotated[bool, Fact("a wanted frequency")]
-    nominal: Annotated[float, Fact("of the optimum without deviations", "alone", digits=number)]
-    robust: Annotated[float, Fact(digits=number)]
+    nominal: Annotated[InUnit, Fact("of the optimum without deviations", "alone")]
+    robust: InUnit
     nominal_worst: Annotated[
         Share | None,
         Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
     ]
     worst: Annotated[Share, Fact("found by a search", "deviated")]
     drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read both in, and the size of that in SI."""
+        return limit_unit(self.unit, self.nominal, self.robust)
 
     @property
     def most(self) -> float:
@@ -549,8 +555,11 @@ class RobustRow(Brief):
     draws: Annotated[int, Fact("random deviations, at the samples of least room")]
     error: Annotated[Share, Fact("of their frequencies")]
     nominal: Floats
-    objective_nominal: float
-    objective: float
+    measured: Annotated[str, Fact("the objective")]
+    objective_nominal: Annotated[float, Fact("without masses and prices, not deviating")]
+    objective: Annotated[
+        float, Fact("the same at the worst deviation; of least_squares not deviating")
+    ]
     mass_nominal: Kilograms
     mass: Kilograms
     price_nominal: float | None
@@ -560,10 +569,20 @@ class RobustRow(Brief):
     @property
     def words(self) -> str:
         """What it costs to be robust, in words."""
-        pairs = [(f"objective {self.objective_nominal:.4g}", f"{self.objective:.4g}")]
-        pairs += [(f"mass {self.mass_nominal:.6g}", f"{self.mass:.6g} kg")]
+        both, at_worst = (self.objective_nominal, self.objective), " at the worst deviation"
+        has_goals = any(one.is_goal for one in self.targets)
+        pairs = []
+        if self.measured == "widest":
+            pairs = [(f"least room {percent(-both[0])}", percent(-both[1]) + at_worst)]
+        elif self.measured == "highest":
+            pairs = [(f"least frequency {-both[0]:.4g}", f"{-both[1]:.4g} Hz{at_worst}")]
+        elif self.measured == "worst_case" and has_goals:
+            pairs = [(f"largest error {percent(both[0])}", percent(both[1]) + at_worst)]
+        elif has_goals:
+            pairs = [(f"rms error {percent(both[0] ** 0.5)}", percent(both[1] ** 0.5))]
+        pairs += [(f"mass {number(self.mass_nominal)}", f"{number(self.mass)} kg")]
         if self.price is not None and self.price_nominal is not None:
-            pairs += [(f"price {self.price_nominal:.6g}", f"{self.price:.6g}")]
+            pairs += [(f"price {number(self.price_nominal)}", number(self.price))]
         return ", ".join(" → ".join(pair) for pair in pairs)
 
 

@@ -206,3 +206,11 @@ def test_tolerances_are_told_of_bands_above_the_modes_that_are_shown() -> None:
     assert said(result)[0] == "reached"
     assert result.results.meaning is not None
     assert result.results.meaning.tolerance is not None
+
+
+def test_a_price_that_lowers_what_is_to_be_high_is_named() -> None:
+    priced = {**K1, "price": 1e-4}
+    aim = {"objective": {"highest": 1}, "starts": 1}
+    result = solve_case(case_of({"k1": priced, "k2": K2}, [], assignment=aim))
+    _, reason = said(result)
+    assert f"; its price, {result.results.price:.4g}, counts against it, 1 as 1 Hz" in reason

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, Self
 
@@ -20,7 +20,7 @@ from eigassign.assignment.requirements.requirement import (
     Solved,
 )
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import handy
+from eigassign.case.units import handy, limit_unit
 from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -141,7 +141,13 @@ class LimitedQuantity(Requirement):
         return (-1.0, low), (1.0, high)
 
     def _said(self, amount: float) -> str:
-        return f"{amount:.4g} {self.unit}".rstrip()
+        return said(amount, self.unit)
+
+
+def said(amount: float, unit: str) -> str:
+    """An amount in SI ``unit`` to four digits."""
+    name, size = limit_unit(unit, amount)
+    return f"{amount / size:.4g} {name}".rstrip()
 
 
 class MassLimit(LimitedQuantity):
@@ -279,10 +285,15 @@ class DriveLimit(LimitedQuantity):
         return f"{handy(share * self.allowed[1], self.unit)} more {self.noun}"
 
 
+@dataclass(frozen=True, eq=False)
 class LinearLimit(LimitedQuantity):
-    """low ≤ Σ c_j y_j ≤ high: linear in the design, so that each step can keep it exactly."""
+    """low ≤ Σ c_j y_j ≤ high: linear in the design, so that each step can keep it exactly.
+
+    Its ``unit`` is that of all its parameters, if they have one.
+    """
 
     in_one_shot = True
+    unit: str = ""
 
     @classmethod
     def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
@@ -291,7 +302,9 @@ class LinearLimit(LimitedQuantity):
             factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])
             low, high = _ends(given.min, given.max)
             row = LinearConstraint(name, factors, low, high)
-            yield cls.between(low, high, row, name, f"design.constraints.{name}")
+            units = {unit for c, unit in zip(factors, file.design_units, strict=True) if c}
+            limit = cls.between(low, high, row, name, f"design.constraints.{name}")
+            yield replace(limit, unit=units.pop() if len(units) == 1 else "")
 
     @property
     def constraint(self) -> LinearConstraint | None:

@@ -12,11 +12,10 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from eigassign.assignment.requirements.quantity import LimitedQuantity
+from eigassign.assignment.requirements.quantity import LimitedQuantity, said
 from eigassign.assignment.requirements.requirement import EdgeRows, Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import PushedNode, StaticTarget
-from eigassign.case.units import handy_unit
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -148,19 +147,11 @@ class StaticLimit(LimitedQuantity):
             return w
         return np.where(w > RIGID, 1.0 / np.where(w > RIGID, w, 1.0), np.nan)
 
-    def _said(self, amount: float) -> str:
-        return _said(amount, self.unit)
-
 
 def _noun(target: StaticTarget) -> str:
     place = target.place
     towards = [f"{v:g}" for v in place.direction] if isinstance(place, PushedNode) else []
     return f"{target.kind} of {place.at}" + (f" along [{', '.join(towards)}]" if towards else "")
-
-
-def _said(amount: float, unit: str) -> str:
-    name, size = handy_unit(unit, amount)
-    return f"{amount / size:.4g} {name}"
 
 
 def static_limits(
@@ -185,7 +176,7 @@ def static_limits(
         if way(initial_design(file))[0].max() <= RIGID:
             message = f"nothing gives way at {place.at} in any pose: all is rigid and locked"
             raise MechanismError(way.place, message)
-        words = f"{target.limit.replace('_', ' ')} {_said(target.edge, UNITS[target.kind])}"
+        words = f"{target.limit.replace('_', ' ')} {said(target.edge, UNITS[target.kind])}"
         most = 1.0 / target.edge if target.limit == "at_least" else target.edge
         upper = np.full(rows.stop - rows.start, most)
         yield StaticLimit(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from eigassign.case.reader import Finding, Tree, dotted, items
 from eigassign.case.rules.files import NamedFile
-from eigassign.case.rules.properties import NoPropertyError, property_at
+from eigassign.case.rules.properties import NoPropertyError, known_property, property_at
 from eigassign.case.schema.design import PRICE
 from eigassign.case.table import CsvColumn, read_table, read_words
 from eigassign.case.units import PLAIN
@@ -40,7 +40,15 @@ def with_listed_choices(tree: Tree, named: Sequence[NamedFile]) -> tuple[Tree, l
 
 def _choices(tree: Tree, file: Path, key: str) -> Iterator[tuple[str, Mapping[str, float]]]:
     """Yield each choice by its name. Raises MechanismError at ``key``."""
-    name, *paths = (cell.partition("[")[0].strip() for cell in read_words(file, key)[0][1])
+    header = read_words(file, key)[0][1]
+    name, *paths = (cell.partition("[")[0].strip() for cell in header)
+    if name == PRICE or known_property(tree, name):
+        message = f"{file.name}: the first column names the choices: put one before {name}"
+        raise MechanismError(key, message)
+    for cell, path in zip(header[1:], paths, strict=True):
+        if path == PRICE != cell:
+            message = f"{file.name}: column {cell}: prices are plain numbers: call it {PRICE}"
+            raise MechanismError(key, message)
     columns = [CsvColumn(name)]
     for path in paths:
         try:

@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from eigassign.case.reader import Finding, KeyPath
-from eigassign.case.schema.design import Choices
+from eigassign.case.rules.properties import is_place
+from eigassign.case.schema.design import Choices, Parameter
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import (
@@ -421,6 +422,12 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
         if accepted is not None and accepted > LARGEST_ERROR:
             message = f"{100 * accepted:g} % accepts nearly anything: usual is 2 %, which is 0.02"
             yield (part, "max_error"), message
+    for name, entry in document.design.entries.items():
+        if isinstance(entry, Parameter) and entry.tolerance and entry.tolerance.relative:
+            least, most = entry.range
+            if is_place(next(iter(entry.factors))) and least <= 0.0 <= most:
+                message = "is a share of a value that may be 0, where nothing deviates: give an "
+                yield ("design", name, "tolerance"), f"{message}amount, such as 0.1 mm or 0.1 deg"
     if document.expansion.y != "auto":
         bounds = document.design.parameters.items()
         for k, (value, (name, p)) in enumerate(zip(document.expansion.y, bounds, strict=True)):

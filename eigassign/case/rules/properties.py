@@ -174,7 +174,7 @@ def _of_component(
     if len(inner) != 1 or inner[0] not in [str(k) for k in range(len(axes))]:
         forms = listed([f"{owner}.{k}" for k in range(len(axes))])
         raise NoPropertyError(f"{owner} varies by component ({', '.join(axes)}): {forms}")
-    if value is None and group != "joints":  # a joint is at its base and not turned, unless given
+    if value is None and group == "links":  # joints and bodies are at their node, and not turned
         raise NoPropertyError(f"{owner} has no value in this file: give it an initial value")
     return _VECTORS[group][key]
 
@@ -389,6 +389,9 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
     for k, column in enumerate(columns):
         if document.assignment.robust and column.tolerance is not None:
             low, high = (column.tolerance.deviation(end) for end in box[k])
+            prop = known_property(tree, column.parameter)
+            if prop and 0 in (prop.at_least, prop.above):  # as masses are never below 0
+                low = min(low, max(column.min, 0.0))
             box[k] = column.min - low, column.max + high
     for row, message in impossible(document.mechanism.sections, varied, box):
         k, factor = next(iter(row.items()))
@@ -412,8 +415,10 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
 
 def _bound(design: Design, name: str, lower: bool) -> KeyPath:
     """Where the file gives a bound of a parameter, or its values."""
-    values = getattr(design.entries[name], "values", None)
-    return ("design", name, "values" if values is not None else "min" if lower else "max")
+    entry = design.entries[name]
+    if isinstance(entry, Choices):
+        return "design", name, "choices"
+    return ("design", name, "values" if entry.values is not None else "min" if lower else "max")
 
 
 def load_cases_set_nothing_impossible(

@@ -166,10 +166,11 @@ def _of_design(tree: Tree, known: Mapping[str, Quantity | None]) -> Iterator[Und
             yield ("design", name, key), at(body, key), own
         for k, value in enumerate(entries(body, "values")):
             yield ("design", name, "values", k), value, own
-        amount = at(body, "tolerance")
-        if isinstance(amount, str) and not amount.rstrip().endswith("%"):
-            either = Quantity(own.dimension, above=0) if prop else ANY
-            yield ("design", name, "tolerance"), amount, either
+        of_choices = (((p,), known_property(tree, p), v) for p, v in items(body, "tolerance"))
+        for below, of, amount in (((), prop, at(body, "tolerance")), *of_choices):
+            if isinstance(amount, str) and not amount.rstrip().endswith("%"):
+                either = Quantity(of.dimension, above=0) if of else ANY
+                yield ("design", name, "tolerance", *below), amount, either
     drives = dict(zip(names(tree, "coordinates"), coordinate_quantities(tree), strict=True))
     for name, body in items(tree, "design", "torque"):
         kind = drives.get(name, ANY)
@@ -215,13 +216,14 @@ def _in_list(value: object, kinds: Sequence[Quantity], path: KeyPath) -> Iterato
 
 
 def _defaults(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
-    """Joints stand at their base, and nothing is turned, where the file is silent."""
+    """Joints and bodies are at their node, and nothing is turned, where the file is silent."""
     n = 3 if is_spatial(tree) else 2
-    for group in ("joints", "springs"):
+    for group in ("joints", "springs", "bodies"):
         for name, body in items(tree, "mechanism", group):
             if isinstance(body, Mapping):
                 path: KeyPath = ("mechanism", group, name)
-                if group == "joints" and "position" not in body:
-                    yield (*path, "position"), (0.0,) * n
-                if n == 3 and "orientation" not in body:
+                place = {"joints": "position", "bodies": "offset"}.get(group)
+                if place and place not in body:
+                    yield (*path, place), (0.0,) * n
+                if n == 3 and group != "bodies" and "orientation" not in body:
                     yield (*path, "orientation"), (0.0, 0.0, 0.0)

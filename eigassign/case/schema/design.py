@@ -194,6 +194,7 @@ class Choices(Part):
             same properties. Or `file`, a CSV file with a line for each: its name in the first
             column, the paths as the names of the others
         price: for one unit of a property, by its path
+        tolerance: how far a property may deviate from what is chosen either way, by its path
     """
 
     choices: Annotated[
@@ -203,6 +204,7 @@ class Choices(Part):
         _OrTable,
     ]
     price: Annotated[Mapping[str, Price], Frozen] = FrozenDict()
+    tolerance: Annotated[Mapping[str, Tolerance], Frozen] = FrozenDict()
 
     @model_validator(mode="after")
     def _are_alike_and_differ(self) -> Self:
@@ -224,10 +226,10 @@ class Choices(Part):
             if same := seen.get(self._row(choice)):
                 raise wrong(f"has the same values as {same!r}", "choices", name)
             seen[self._row(choice)] = name
-        for path in self.price:
+        for path in (*self.price, *self.tolerance):
             if path not in self.properties:
-                known = listed(self.properties)
-                raise wrong(f"the choices do not set it; they set {known}", "price", path)
+                known, key = listed(self.properties), "price" if path in self.price else "tolerance"
+                raise wrong(f"the choices do not set it; they set {known}", key, path)
         return self
 
     @property
@@ -399,9 +401,9 @@ class Design(Part):
                 columns = zip(*entry.rows, strict=True)
                 names = column_names(name, entry.properties)
                 for column, path, values in zip(names, entry.properties, columns, strict=True):
-                    price = entry.price.get(path)
+                    more = entry.price.get(path), entry.tolerance.get(path)
                     own = FrozenDict({path: 1.0})
-                    found[column] = DesignColumn(own, min(values), max(values), price)
+                    found[column] = DesignColumn(own, min(values), max(values), *more)
             else:
                 found[name] = DesignColumn(
                     entry.factors, *entry.range, entry.price, entry.tolerance

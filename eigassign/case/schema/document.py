@@ -213,6 +213,8 @@ def _mapping(error: Any) -> _Explained:
     what = "a mapping (key: value)"
     if error["loc"][-2:] == ("keep_out", "<one>"):
         what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
+    if error["loc"][-1] in ("price", "tolerance"):
+        what = "values by property (path: value)"
     found: _Explained = _expected(what, lambda e: unspaced(e["input"]))(error)
     return found
 
@@ -224,6 +226,8 @@ def _expected(what: str, hint: Callable[[Any], str] = lambda _: "") -> Any:
 
 def _in_quotes(error: Any) -> str:
     value = error["input"]
+    if "parameter" in error["loc"] and isinstance(value, Mapping):
+        return ": write a path, or several as [path, {path: factor}]"
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return f': write "{value}", in quotes, if that is its name' if number else ""
 
@@ -231,6 +235,13 @@ def _in_quotes(error: Any) -> str:
 def _of_one_entry(error: Any) -> str:
     given = error["input"]
     return f"; of one entry it is [{'{...}' if isinstance(given, Mapping) else shown(given)}]"
+
+
+def _too_short(error: Any) -> _Explained:
+    given, least = error["ctx"]["actual_length"], error["ctx"]["min_length"]
+    poses = {"time": ": one pose alone has no time", "points": ": one pose is q: [[...]], alone"}
+    hint = poses.get(error["loc"][-1], "") if error["loc"][0] == "trajectory" and given else ""
+    return (), f"needs at least {least} entries, got {given}{hint}"
 
 
 def _literal(error: Any) -> _Explained:
@@ -272,10 +283,7 @@ _EXPLAIN: dict[str, Any] = {
     "string_type": _expected("text (in quotes if need be)", _in_quotes),
     "string_too_short": _expected("some text"),
     "string_too_long": lambda e: ((), f"is longer than {e['ctx']['max_length']} characters"),
-    "too_short": lambda e: (
-        (),
-        f"needs at least {e['ctx']['min_length']} entries, got {e['ctx']['actual_length']}",
-    ),
+    "too_short": _too_short,
     "too_long": lambda e: (
         (),
         f"takes at most {e['ctx']['max_length']} entries, got {e['ctx']['actual_length']}",

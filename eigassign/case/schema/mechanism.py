@@ -63,7 +63,7 @@ class Body(Part):
         inertia: about its centre of mass, in the link's axes; one number in a plane, `[Ixx, Iyy,
             Izz]` or `[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]` in space: the entries of the tensor, Ixy =
             −∫xy dm
-        offset: from the node to the centre of mass, in the link's axes
+        offset: from the node to the centre of mass, in the link's axes; none unless given
     """
 
     at: str

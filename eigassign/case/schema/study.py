@@ -5,7 +5,8 @@ Measurements are frequencies that were measured, listed or in a CSV file.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self, TypeAlias
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import Field, model_validator
 
@@ -26,6 +27,7 @@ from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
 
 QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
 Auto: TypeAlias = Literal["auto"]
+Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
 MOST_MEASUREMENTS = 10_000  # of one case
 
 
@@ -50,6 +52,13 @@ class Highest(Part):
 
     highest: ValueOr[Mode, HighestMode]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_a_mode(cls, given: Any) -> Any:
+        for word in set(get_args(Word)).intersection(given if isinstance(given, Mapping) else ()):
+            raise wrong(f"stands alone: write objective: {word}", word)
+        return given
+
     @property
     def target(self) -> HighestTarget:
         """The same as a target."""
@@ -67,7 +76,7 @@ class AssignmentKeys(Part):
             linear limits
         objective: what is made small or large: `least_squares` the mean square error, `worst_case`
             the largest weighted error, `lightest` the mass, `{highest: 1}` the least frequency of a
-            mode, `widest` the least relative room of all bands and gaps
+            mode, `widest` the least relative room of all bands and gaps, of numbered modes
         starts: number of designs to start from; the first are the initial design and the one shot,
             the others by turns the most promising of a sample and spread ones. `auto` goes on
             while more than half an optimum is expected unseen, to 100 starts at most
@@ -80,9 +89,7 @@ class AssignmentKeys(Part):
     """
 
     method: Literal["sequential", "one_shot"] = "sequential"
-    objective: ValueOr[Literal["least_squares", "worst_case", "lightest", "widest"], Highest] = (
-        "least_squares"
-    )
+    objective: ValueOr[Word, Highest] = "least_squares"
     starts: NumberOr[Annotated[int, Field(ge=1, le=1000)], Auto] = "auto"
     steps: Annotated[int, Field(ge=1, le=1_000_000)] = 100
     seconds: Annotated[float, DURATION] | None = None

@@ -55,7 +55,8 @@ class DesignStiffness:
 
     def softer_shapes(self, ratio: Floats) -> tuple[Floats, Floats]:
         """α relative to each point (n_points, n, 1); Σ r_t e_t of its shapes (n_points, n, c)."""
-        relative = ratio.T / self.at_points[:, None, :]
+        of = self.at_points[:, None, :]  # 0 of a term that is nothing there, which none softens
+        relative = np.divide(ratio.T, of, out=np.ones((len(of), *ratio.T.shape)), where=of != 0.0)
         least = relative.min(axis=2, initial=1.0)[:, :, None]
         own = np.einsum("pnt,ptc->pnc", relative, self.energy)
         return np.maximum(least, LEAST), np.maximum(own, np.maximum(least, LEAST))

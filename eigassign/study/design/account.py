@@ -171,7 +171,7 @@ def _deviated(
     robust: RobustRow, targets: Sequence[TargetStudy], limits: Sequence[LimitRow], largest: float
 ) -> Iterator[str]:
     """Say what the design itself meets, and some deviation within the tolerances does not."""
-    met = {one.label for one in targets if one.satisfied} | {r.name for r in limits if r.satisfied}
+    met = {one.label for one in targets if one.satisfied} | {r.words for r in limits if r.satisfied}
     for one in robust.targets:
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
             yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"
@@ -255,7 +255,8 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
     if not contradiction.smallest:
         return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
-    return f"no design within the bounds {meets} {listed}{together}"
+    deviating = " for all deviations within the tolerances" if answer.robust is not None else ""
+    return f"no design within the bounds {meets} {listed}{together}{deviating}"
 
 
 def _too_coarse(

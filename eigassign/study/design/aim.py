@@ -16,6 +16,7 @@ from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
+from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.variants import lacking
 from eigassign.study.results import AimRow
@@ -41,6 +42,9 @@ def aim_row(
         before, after = map(scene.model.mass, designs)
         row = AimRow("as light as can be", before, after, "kg")
         return _in_words(row, f"lightest design found: {row.after}", kept)
+    if (paid := cost(scene, found.best.y)) is not None:
+        one = "1 Hz" if aim == "highest" else "1 % of room"
+        kept += f"; its price, {paid:.4g}, counts against it, 1 as {one}"
     if aim == "highest":
         (asked,) = (one for one in wanted if one.is_aim)
         before, after = (_least(found, asked, y) for y in designs)

@@ -94,7 +94,11 @@ def robust_optimum(
         progress(f"robust: the targets are to hold for {counted(len(scenarios), 'deviation')} too")
     if lost:
         raise AccuracyError(LOST.format(lost[0][1]))
-    (nominal, before), found = seen[0], replace(found, exact_solves=solves)
+    (nominal, first), found = seen[0], replace(found, exact_solves=solves)
+    alone, before = _Deviations(nominal, look.had), dict[str, float]()
+    for rows, one in zip(alone.edges, first, strict=bool(first)):  # none where some have no modes
+        name, missed = rows.of.name, alone.worst_at(rows, one.design)[0]
+        before[name] = max(before.get(name, 0.0), missed)
     progress(f"robust: {look.draws} random deviations")
     drawn, error = look.drawn(worst)
     row = RobustRow(
@@ -102,13 +106,14 @@ def robust_optimum(
         draws=look.draws,
         error=error,
         nominal=nominal.best.y,
-        objective_nominal=nominal.best.objective,
-        objective=found.best.objective,
+        measured=scene.file.assignment.named_objective,
+        objective_nominal=nominal.variant.problem.measure(nominal.best.seen.residual),
+        objective=look.had,
         mass_nominal=scene.model.mass(nominal.best.y),
         mass=scene.model.mass(found.best.y),
         price_nominal=cost(scene, nominal.best.y),
         price=cost(scene, found.best.y),
-        targets=tuple(look.rows(worst, _by_name(before), drawn, nominal.best.y)),
+        targets=tuple(look.rows(worst, before, drawn, nominal.best.y)),
     )
     return found, row
 
@@ -117,10 +122,10 @@ class _Deviations:
     """The deviations about an optimum, and what is missed there, relative.
 
     Of goals that is their error, of limits their violation, of what shall be high or wide what it
-    is short of what the optimum has in all its scenarios.
+    is short of what the optimum has in all its scenarios, or of what another one ``had``.
     """
 
-    def __init__(self, found: Found) -> None:
+    def __init__(self, found: Found, had: float | None = None) -> None:
         below = tuple(k for _, k in found.variant.below)
         self.found, self.task, self.y = found, found.task, found.best.y
         self.scene = found.task.scene
@@ -128,7 +133,8 @@ class _Deviations:
         self.asked = replace(variant.requirements, objective=Objective.WORST_CASE)
         self.response = variant.response
         self.edges = (*self.asked.residuals, *self.asked.excesses)
-        self.had = found.variant.problem.measure(found.best.seen.residual)
+        own = found.variant.problem.measure(found.best.seen.residual)
+        self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
         self.draws = ESTIMATED if self.task.followers else DRAWS
 
@@ -254,7 +260,7 @@ class _Deviations:
             if isinstance(of, LimitedQuantity):
                 amounts = [of.amount_of(value) for value in amounts]
             yield RobustTarget(
-                label=name,
+                label=of.asked_words if isinstance(of, LimitedQuantity) else name,
                 unit=of.unit if isinstance(of, LimitedQuantity) else "Hz",
                 is_goal=of.is_goal,
                 nominal=amounts[0],

@@ -76,12 +76,13 @@ def verdict(facts: Facts) -> Verdict:
 def _word(facts: Facts) -> tuple[str, str]:
     missed = [target for target in facts.targets if not target.satisfied]
     broken = [row.stated for row in facts.limits if not row.satisfied]
+    broken += facts.deviated
     if facts.conflict and not facts.of_frequencies:
         return "infeasible", _beside(facts.conflict, broken)
     if facts.doubts:
         return "do_not_use", "; ".join(facts.doubts)
     worst = max(missed, key=lambda target: target.error.exact.max_relative, default=None)
-    far = [*([] if worst is None else [_far(worst)]), *broken, *facts.deviated]
+    far = [*([] if worst is None else [_far(worst)]), *broken]
     if facts.unreachable:
         return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
     if facts.conflict:

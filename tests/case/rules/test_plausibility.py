@@ -53,6 +53,7 @@ SLIPS = {
     "one bound in mm": ("min: 20 mm, max: 40 mm", "min: 20 mm, ¦max: 40", "40 m is outside 1e-05 … 5"),
     "listed values in mm, the start among them": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "¦d: {parameter: sections.rod.diameter, values: [25, 35]}", "was [25, 35] mm meant?"),
     "listed stiffness in kN m/rad": ("  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "  ¦d: {parameter: coordinates.q2.drive.stiffness, values: [0.08, 0.12]}", "a bare number is in N m/rad: was [0.08, 0.12] kN m/rad meant?"),
+    "share of a place at 0": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm", "d: {parameter: joints.elbow.position.0, min: 0, max: 4 mm, ¦tolerance: 5 %", "may be 0, where nothing deviates: give an amount"),
     "choices in mm": ("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "{choices: {a: {¦sections.rod.diameter: 25}, b: {sections.rod.diameter: 30}}}", "25 m is outside"),
     "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
     "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),

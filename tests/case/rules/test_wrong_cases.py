@@ -170,6 +170,8 @@ SAMPLED = [
     Wrong("two clocks", "trajectory:\n" + MOTION, "¦trajectory:\n  q: [[0, 0], [1, 1]]\n  time: [0, 1]\n  duration: 1\n", "trajectory", "and not both"),
     Wrong("no sample", MOTION, "  ¦q: []\n  duration: 1\n", "trajectory.q", "needs at least 1 entries"),
     Wrong("time of a pose", MOTION, "  q: [[0, 0]]\n  ¦duration: 1\n", "trajectory.duration", "one sample is a pose at rest"),
+    Wrong("times of a pose", MOTION, "  q: [[0, 0]]\n  ¦time: [0]\n", "trajectory.time", "got 1: one pose alone has no time"),
+    Wrong("points of a pose", MOTION, "  ¦points: [[0, 0]]\n", "trajectory.points", "one pose is q: [[...]], alone"),
     Wrong("short row", MOTION, "  q: [[0, 0], ¦[1]]\n  duration: 1\n", "trajectory.q[1]", "needs 2 entries"),
     Wrong("text in a row", MOTION, "  q: [[0, 0], [1, ¦x]]\n  duration: 1\n", "trajectory.q[1][1]", "expected an angle"),
     Wrong("NaN in a row", MOTION, "  q: [[0, 0], [1, ¦.nan]]\n  duration: 1\n", "trajectory.q[1][1]", "must be a finite number"),

@@ -30,9 +30,10 @@ WRONG = [
     Wrong("angle in another unit", D, "parameter: joints.wrist.angle, ¦min: 1 mm, max: 1", "design.d.min", "which is length"),
     Wrong("angles in a plane", D, "¦parameter: joints.wrist.orientation.2, min: 0, max: 1", "design.d.parameter", "vary joints.wrist.angle"),
     Wrong("axis of a joint", D, "¦parameter: joints.wrist.axis.0, min: 0, max: 1", "design.d.parameter", ".inertia, joints.<name>.position.0 or .angle"),
-    Wrong("offset that is not there", D, "¦parameter: bodies.tool.offset.1, min: 0, max: 1", "design.d.parameter", "has no value in this file"),
+    Wrong("offset of no body", D, "¦parameter: bodies.tol.offset.1, min: 0, max: 1", "design.d.parameter", "did you mean 'tool'"),
     Wrong("node of a beam", D, "¦parameter: links.hand.nodes.end.0, min: 0, max: 1", "design.d.parameter", "can where it is rigid"),
     Wrong("angle of a spring", D, "¦parameter: springs.s.angle, min: 0, max: 1", "design.d.parameter", "unknown spring 's'"),
+    Wrong("factors alone", D, "¦parameter: {sections.rod.diameter: 1}, min: 20 mm, max: 40 mm", "design.d.parameter", "write a path, or several as [path, {path: factor}]"),
     Wrong("no path first", D, "parameter: [¦{sections.rod.diameter: 1}, sections.pipe.outer_diameter], min: 20 mm, max: 40 mm", "design.d.parameter[0]", "the first is a path alone"),
     Wrong("listed twice", D, "parameter: [sections.rod.diameter, ¦{sections.rod.diameter: 2}], min: 20 mm, max: 40 mm", "design.d.parameter[1]", "listed twice"),
     Wrong("factor of zero", D, "parameter: [sections.rod.diameter, {¦sections.pipe.outer_diameter: 0}], min: 20 mm, max: 40 mm", "design.d.parameter[1].sections.pipe.outer_diameter", "must not be 0"),
@@ -54,6 +55,15 @@ def test_a_wrong_place_or_amount_is_named(wrong: Wrong, tmp_path: Path) -> None:
     found = problems_of(text, tmp_path / "case.yaml")
     assert (wrong.path, place) in [(path, (line, column)) for line, column, path, _ in found]
     assert any(wrong.message in message for *_, message in found)
+
+
+def test_a_body_is_at_its_node_unless_the_file_says_otherwise() -> None:
+    case = parse(
+        edited(D, "parameter: bodies.tool.offset.1, min: 0, max: 1 mm").encode(), "case.yaml"
+    )
+    assert case.value_at("bodies.tool.offset.1") == 0.0
+    moved = case.with_design([0.1, 1e-3])
+    assert moved.value_at("bodies.tool.offset.1") == 1e-3
 
 
 def test_dimensions_that_vary_together_break_a_section_only_together() -> None:

@@ -229,6 +229,8 @@ def test_prices_of_choices_that_make_no_sense_are_refused(
         ("heavy", "light", "bars.csv:4: 'light' is listed already, in bars.csv:3"),
         ("20;6", "x;6", "bars.csv:4: column price: 'x' is not a finite number"),
         (TABLE, "name;price\na;3\n", "sets no property"),
+        ("price", "price [EUR]", "column price [EUR]: prices are plain numbers"),
+        (TABLE, "sections.bar.area;price\n3;4\n", "the first column names the choices: put one"),
         (TABLE, "", "is not a text file|a header and rows are expected"),
     ],
 )

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.assignment import Appraisal, Tolerances, with_scenarios
+from eigassign.assignment import Appraisal, Tolerances, design_limits, with_scenarios
 from eigassign.case import parse
-from eigassign.errors import CaseError
+from eigassign.errors import AccuracyError, CaseError
+from eigassign.output import run_tables
 from eigassign.pipeline import solve_case
 from eigassign.study import BuiltCase, RunResults
 
@@ -115,7 +116,7 @@ def test_limits_bands_and_the_mass_hold_for_every_deviation() -> None:
     assert robust.objective > robust.objective_nominal
     assert robust.mass == pytest.approx(model.mass(y), rel=1e-12)
     assert max(one.most for one in robust.targets) <= WITHIN
-    assert [one.label for one in robust.targets][-1] == "design.mass"
+    assert [one.label for one in robust.targets][-1] == "mass at most 2.8 kg"
 
 
 def test_what_only_deviations_miss_is_not_reached() -> None:
@@ -162,6 +163,20 @@ def test_combinations_of_catalogues_hold_for_every_deviation() -> None:
     assert row.robust.price > row.robust.price_nominal
 
 
+def test_choices_deviate_by_property() -> None:
+    path = "sections.rod.diameter"
+    listed = ", ".join(f"d{mm}: {{{path}: {mm} mm}}" for mm in (28, 29, 30, 31, 32, 33))
+    design = f"  rod: {{choices: {{{listed}}}, price: {{{path}: 1 / mm}}, tolerance: {{{path}: "
+    case, results = solved(design + "0.5 mm}}\n", "  - {mode: 1, at_least: 200 Hz}\n")
+    chosen = results.assignment.robust.nominal[0], results.design[0].optimal
+    hz = [
+        frequencies(case, np.array([[y - 5e-4]]))[..., 0].min() for y in (*chosen, chosen[1] - 1e-3)
+    ]
+    assert results.assignment.verdict == "reached"
+    assert hz[0] < 200.0 <= hz[1]
+    assert hz[2] < 200.0  # the next one down misses
+
+
 @pytest.mark.parametrize(
     ("design", "assignment", "expected"),
     [
@@ -175,6 +190,13 @@ def test_robust_where_it_cannot_be_is_refused(design: str, assignment: str, expe
     assert expected in str(error.value)
 
 
+def test_a_deviation_that_cannot_follow_the_path_is_named_with_what_to_do() -> None:
+    fore = "  fore: {parameter: links.forearm.length, min: 420 mm, max: 450 mm, tolerance: 10 mm}\n"
+    text = "assignment: {robust: true, objective: lightest, starts: 1}\n"
+    with pytest.raises(AccuracyError, match=r"has no answer: .* Narrow the bounds or the toler"):
+        solved(fore, "  - {mode: 1, at_least: 100 Hz}\n", text)
+
+
 def test_sections_exist_within_the_tolerances() -> None:
     tube = HEAD.replace("shape: circle, diameter: 30 mm", "shape: tube, outer_diameter: 30 mm, "
                         "inner_diameter: 26 mm")  # fmt: skip
@@ -185,3 +207,44 @@ def test_sections_exist_within_the_tolerances() -> None:
     assert parse(text.encode(), "case.yaml")
     with pytest.raises(CaseError, match="section 'rod' cannot exist"):
         parse((text + ROBUST).encode(), "case.yaml")
+
+
+def test_what_cannot_be_below_0_may_be_0_and_deviate() -> None:
+    masses = MASSES.replace("min: 20 g", "min: 0")
+    _, results = solved(masses, "  - {mode: 1, at_least: 190 Hz}\n")
+    assert results.assignment.verdict == "reached"
+
+
+def test_a_limit_that_only_deviations_miss_is_said_to_contradict_for_them() -> None:
+    same = "  constraints: {same: {terms: {m1: 1, m2: -1}, min: 0, max: 0}}\n"
+    _, results = solved(MASSES + same, "  - {mode: 1, at_least: 150 Hz}\n")
+    assert results.assignment.verdict == "infeasible"
+    expected = "meets same (line 51) for all deviations within the tolerances (same at least 0 kg "
+    assert expected in results.assignment.reason
+
+
+def test_the_table_says_what_it_costs_in_units_and_counts_the_same_for_both_designs() -> None:
+    design = (
+        "  mass: {parameter: bodies.elbow_mass.mass, values: [100 g], tolerance: 20 g}\n"
+        "  tip: {parameter: bodies.tool_mass.mass, values: [100 g], tolerance: 20 g}\n"
+        "  constraints: {thick: {terms: {rod: 1}, max: 45 mm}}\n"
+    )
+    text = "assignment: {robust: true, starts: 1, objective: {highest: 1}}\n"
+    _, results = solved(ROD + design, "  - {mode: 2, at_least: 300 Hz}\n", text)
+    robust = results.assignment.robust
+    assert "least frequency " in robust.words
+    assert " Hz at the worst deviation" in robust.words
+    highest = next(one for one in robust.targets if "high" in one.label)
+    assert highest.nominal_worst == pytest.approx(highest.worst, abs=1e-9)  # of the same design
+    tables = {one.title: one.rows for one in run_tables(results)}
+    assert ("thick at most 45 mm", "mm") in [row[:2] for row in tables["Robust"]]
+    assert "total mass" in [row[0] for row in tables["Design"]]
+
+
+def test_a_limit_between_angles_is_said_in_degrees() -> None:
+    text = HEAD.replace(", angle: absolute", "") + "design:\n"
+    text += "  a: {parameter: joints.elbow.angle, min: 0, max: 3 deg}\n"
+    text += "  constraints: {tilt: {terms: {a: 2}, max: 2 deg}}\n"
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
+    (limit,) = design_limits(case.file, case.model(), case.trajectory)
+    assert limit.asked_words == "tilt at most 2 deg"
