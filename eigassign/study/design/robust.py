@@ -25,7 +25,7 @@ from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.one_shot import cost
-from eigassign.study.design.search.optimum import Found, find_optimum
+from eigassign.study.design.search.optimum import FEW, Found, find_optimum
 from eigassign.study.design.search.response import reduced_about
 from eigassign.study.design.search.variants import variant_of
 from eigassign.study.monotone import box_corners
@@ -70,15 +70,15 @@ def robust_optimum(
     search = (scene, wanted, starts, progress)
     scenarios: list[Floats] = []
     seen: list[tuple[Found, tuple[WorstDeviation, ...]]] = []
-    last, solves = None, 0
+    near, solves = list[Floats](), 0
     for _ in range(ROUNDS):
         try:
-            found = find_optimum(*search, last, scenarios, deadline)
+            found = find_optimum(*search, near, scenarios, deadline)
         except EigassignError as why:
             if scenarios:
                 raise AccuracyError(LOST.format(why)) from why
             raise
-        last = found = least_changed(found, scene.initial)
+        found = least_changed(found, scene.initial)
         look = _Deviations(found)
         ended = found.best.end in (End.SECONDS, End.INTERRUPTED) or monotonic() > deadline
         lost = look.lost()
@@ -91,6 +91,9 @@ def robust_optimum(
         if not more or ended:
             break
         scenarios += more
+        # where a deviation has no modes, from so far away that it is the design that has some
+        back = [scene.tolerances.deviated(found.best.y, -sigma)[0] for sigma, _ in lost]
+        near = [np.clip(y, *scene.bounds) for y in back] or [y.y for y in found.optima[:FEW]]
         progress(f"robust: the targets are to hold for {counted(len(scenarios), 'deviation')} too")
     if lost:
         raise AccuracyError(LOST.format(lost[0][1]))

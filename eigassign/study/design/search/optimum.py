@@ -96,20 +96,19 @@ def find_optimum(
     wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
-    before: Found | None = None,
+    near: Sequence[Floats] = (),
     scenarios: Sequence[Floats] = (),
     deadline: float | None = None,
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
 
-    In these ``scenarios`` too: first from the optima found ``before`` without some of them.
+    In these ``scenarios`` too, and first from designs ``near`` it, such as optima without some.
     ``deadline`` is a time of `time.monotonic`, that of the case from now on unless given.
 
     No design is returned that is worse than the initial one. Where none meets all limits, it is the
     one that misses them least, relative to the limits.
     """
     deadline = deadline_of(scene.file) if deadline is None else deadline
-    near = () if before is None else [one.y for one in before.optima[:FEW]]
     designs = [*near, scene.initial, *starts][: most_starts(scene.file)]
     return _Tree(scene, wanted, designs, deadline, progress, scenarios).found()
 
