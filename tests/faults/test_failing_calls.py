@@ -189,7 +189,8 @@ def faults(scene: Scene, folder: Path, how: Ended) -> Iterator[str]:
     if scene.command[0] in ("optimize", "update"):
         if how.code != scene.code and made(folder) not in (scene.old, scene.expected):
             yield "neither the old run nor a new one"
-        if not [path for path in folder.glob("out*/notes.md") if path.read_text() == "precious"]:
+        seen = [path.parent for path in folder.rglob("notes.md") if path.read_text() == "precious"]
+        if not any(path.name.startswith("out") or str(path) in how.err for path in seen):
             yield "what was mine is nowhere"
     after = ended(scene.command, folder)
     if (after.code, made(folder)) != (scene.code, scene.expected):

@@ -160,7 +160,13 @@ def _settle(hidden: Path, target: Path) -> None:
                 return
             if published and not _is_replaced(hidden, target):
                 aside = _free_sibling(target)
-                os.rename(hidden, aside)
+                try:
+                    os.rename(hidden, aside)
+                except FileNotFoundError:
+                    raise
+                except OSError as error:
+                    kept = f"what was in {target} before is kept in {hidden}, until the next run"
+                    raise StorageError(f"{kept}: {error.strerror}") from error
                 _log.warning("kept what was in %s before as %s", target, aside)
                 return
             doomed = hidden.with_name(f"{hidden.name}.tmp")
