@@ -99,6 +99,19 @@ def model_errors(
     return found
 
 
+def raised_by(model: Model, share: float) -> str:
+    """By how much mesh and reduced links raise a frequency, in words."""
+    if not np.isfinite(share):
+        return "by an unknown amount"
+    return f"by up to {100 * share:.2g} %" + ("" if model.has_bounds else " (estimated)")
+
+
+def finer(model: Model) -> str:
+    """What makes that less."""
+    solids = "mesh solids finer, or else " * (model.solids is not None)
+    return f"{solids}give the links more elements, raise reduce_to, or write auto for them"
+
+
 def _rounding_note(scene: Scene, y: Floats) -> str:
     """`rounding_line` of some poses of design y, and of the first one of the initial design."""
     pencil, q = scene.model.pencil, scene.q0[None]
@@ -153,14 +166,13 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
-    about = "at most" if model.has_bounds else "about"
-    finer = ", and solids a finer mesh" * (model.solids is not None)
+    estimated = "" if model.has_bounds else " (estimated)"
     return [
-        f"mode {mode}: the mesh raises its frequency by {at_most(error, about)}, {where} of "
+        f"mode {mode}: the mesh raises its frequency by {at_most(error)}{estimated}, {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
         else f"mode {mode}: the mesh is too coarse for an error, {where} of the {found.design} "
-        f"design: give the links more elements, or auto{finer}"
+        f"design: {finer(model)}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -206,3 +208,14 @@ def test_tolerances_are_told_of_bands_above_the_modes_that_are_shown() -> None:
     assert said(result)[0] == "reached"
     assert result.results.meaning is not None
     assert result.results.meaning.tolerance is not None
+
+
+def test_a_mesh_that_is_too_coarse_is_to_be_made_finer(tmp_path: Path) -> None:
+    """Neither elements of beams nor reduce_to would help the casting."""
+    starters = Path(ea.__file__).parent / "starters"
+    shutil.copytree(starters / "casting", tmp_path / "casting")
+    text = (starters / "casting.yaml").read_text() + "assignment: {max_error: 1e-4}\n"
+    (tmp_path / "arm.yaml").write_text(text)
+    verdict, reason = said(solve_case(ea.load_case(tmp_path / "arm.yaml")))
+    assert verdict == "do_not_use"
+    assert re.search(r"by up to [\d.]+ % \(estimated\).*mesh solids finer", reason, re.IGNORECASE)
