@@ -44,8 +44,12 @@ def shown(value: object) -> str:
         return "a list"
     if isinstance(value, int) and abs(value) >= 10**_LONGEST:
         return "a number of more than 60 digits"
-    text = repr(value)
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+    return short(repr(value))
+
+
+def short(text: str, longest: int = _LONGEST) -> str:
+    """``text``, cut short."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -59,7 +63,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Names for a message, at most twenty of them."""
-    all_names = [printable(name) for name in names]
+    all_names = [short(printable(name)) for name in islice(names, _MOST_NAMES + 1)]
     more = ", …" if len(all_names) > _MOST_NAMES else ""
     return ", ".join(all_names[:_MOST_NAMES]) + more if all_names else "none"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
@@ -289,3 +290,33 @@ def test_a_joint_that_moves_no_mass_is_locked_and_said(
         "drive of flange: nothing beyond it has mass in the URDF; locked" in capsys.readouterr().out
     )
     assert ea.load_case(crane.parent / "crane.yaml").model().frequencies([*POSE, 0.0], [], 3).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<mass value="5"/>', '<mass value="-5"/>', "gives no case: .*mass: must be >= 0"),
+        ('name="pitch"', 'name="ground"', "rename ground$"),
+        ("inertial>", "other>", "no joint moves a mass"),
+        ("robot", 1000 * "x", "it begins with <xxx"),
+    ],
+)
+def test_init_writes_no_case_that_does_not_run(
+    crane: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    crane.write_text(ROBOT.replace(old, new), encoding="utf-8")
+    assert main(["init", "--urdf", str(crane), "--out", str(crane.parent)]) == 2
+    err = capsys.readouterr().err
+    assert re.search(said, err.strip())
+    assert len(err.replace(str(crane), "")) < 350
+    assert not (crane.parent / "crane.yaml").exists()
+
+
+def test_init_takes_robots_as_programs_write_them(crane: Path) -> None:
+    """Limits of 0 and 0, products of inertia that are round-off of zeros, a name of two lines."""
+    text = re.sub(r'(lower|upper)="[^"]*"', r'\1="0"', ROBOT)
+    text = re.sub(r"<inertia .*?/>", '<inertia ixx="0" ixz="1e-20"/>', text, count=1)
+    crane.write_text(text.replace('"crane"', '"a&#10;b: c"'), encoding="utf-8")
+    assert main(["init", "--urdf", str(crane), "--out", str(crane.parent)]) == 0
+    case = ea.load_case(crane.parent / "crane.yaml")
+    assert (np.ptp(case.trajectory.q, axis=0) > 0.02).all()

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.case.suggestions import listed, shown
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.imports.parts import UNITS
@@ -120,8 +121,8 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
     for name, node in link.nodes.items():
         own = mesh.sets.get(node.surface, known.get(node.surface.upper()))
         if own is None:
-            named = ", ".join(mesh.sets) or "none: name surfaces in the program that meshes"
-            message = f"the mesh has no surface {node.surface!r}; it has {named}"
+            named = listed(mesh.sets) if mesh.sets else "none: name them in the program that meshes"
+            message = f"the mesh has no surface {shown(node.surface)}; it has {named}"
             raise MechanismError(f"{path}.nodes.{name}.surface", message)
         place = centre(mesh, own)
         if node.position is not None:
