@@ -162,8 +162,8 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     try:
         parse(text.encode(), path.with_suffix(".yaml"))
     except CaseError as error:
-        first = error.problems[0]
-        raise UsageError(f"{path}: gives no case: {first.path}: {first.message}") from error
+        problem = error.problems[0]
+        raise UsageError(f"{path}: gives no case: {problem.path}: {problem.message}") from error
     return text, asked
 
 

@@ -19,10 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
 from eigassign.facts import at_most
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
+from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,
     Trajectories,
@@ -72,7 +74,7 @@ def study_accuracy(
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
-    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y)))
+    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y), *digits_lines(scene.file)))
 
 
 def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) -> WeightStudy:
@@ -123,6 +125,14 @@ def _rounding_note(scene: Scene, y: Floats) -> str:
     lost = max(rounding_error(pencil, each, max(scene.modes)) for each in x)
     line = rounding_line(lost)
     return f"{line}, at {len(x)} poses and designs" if len(x) > 1 and np.isfinite(lost) else line
+
+
+def digits_lines(file: CaseFile) -> tuple[str, ...]:
+    """Where it is said what the digits of imported matrices cost; they are nobody's round-off."""
+    kinds = {link_type(file, name) for name in file.mechanism.links}
+    if "superelement" not in kinds:
+        return ()
+    return ("not in that: the digits of imported matrices, which eigassign check judges",)
 
 
 def rounding_line(lost: float) -> str:

@@ -28,6 +28,7 @@ from eigassign.mechanism.kinematics.rotations import vector
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
+LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs
 _SPELT = {1.0: "m", 1e-3: "mm", 0.0254: "inches"}
 
 
@@ -99,7 +100,7 @@ def _check_rigid(
     K: sparse.csr_array, N: Floats, path: str, fits: Callable[[float], bool], length: float
 ) -> None:
     """K N = 0, or MechanismError; ``fits``: whether positions times a factor make it so."""
-    if rigid_strain(K, N) <= STRAIN_FREE:
+    if (strain := rigid_strain(K, N)) <= STRAIN_FREE:
         return
     message = (
         "strains under rigid motion: the node positions or dof numbers do not fit the "
@@ -112,6 +113,11 @@ def _check_rigid(
             raise MechanismError(path, message + f"write units: {names}")
     if fits(1e-3):
         message += "; it does not with positions a thousandth as large: write 1 mm where that is so"
+    if strain < LITTLE:
+        message += (
+            f"; by {strain:.1g} it may be for few digits alone, as in single precision: export "
+            "double"
+        )
     raise MechanismError(path, message)
 
 
@@ -147,6 +153,8 @@ def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
     A = sparse.csr_array(0.5 * (A + A.T))
     if not is_semidefinite(A, ROUNDED):
         raise MechanismError(
-            key, "is not positive semidefinite: some motion would have negative energy"
+            key,
+            "is not positive semidefinite: some motion would have negative energy; is its file "
+            "whole, and of a stiffness or mass?",
         )
     return A

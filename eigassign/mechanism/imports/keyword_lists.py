@@ -22,6 +22,7 @@ from eigassign.mechanism.imports import entries
 from eigassign.mechanism.imports.entries import LABEL, Contents, Floats, Ints, Matrix, UnfitError
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LONGEST = 1000  # bytes of a line of an entry
 _COMMENTS = rb"\A(?:[ \t]*(?:\*[^\n]*)?\r?\n)*"
 _NEXT = rb"[ \t]*[, \t][ \t]*"
 _ENTRY = re.compile(
@@ -44,7 +45,8 @@ def read_entries(data: bytes) -> Contents | None:
 
     def matrix() -> Matrix:
         kinds = [*((f"i{k}", np.int64) for k in range(places)), ("value", np.float64)]
-        lines = io.BytesIO(data.replace(b",", b" "))
+        # of lines that are too long a piece, which has too many columns or too few
+        lines = iter(partial(io.BytesIO(data.replace(b",", b" ")).readline, _LONGEST), b"")
         read = np.loadtxt(lines, dtype=kinds, comments="*", ndmin=1)
         at = [read[f"i{k}"] for k in range(places)]
         if places == 4:

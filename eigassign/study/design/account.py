@@ -112,7 +112,11 @@ def assignment_row(
             unproved=(
                 *_too_coarse(scene, targets, exact, of_model, largest, answer.robust is not None),
                 *_missed_between(scene, designs, targets, largest),
-                *(f"{each}: {finer(scene.model)}" for y in designs for each in _too_stiff(scene, y)),
+                *(
+                    f"{each}: {finer(scene.model)}"
+                    for y in designs
+                    for each in _too_stiff(scene, y)
+                ),
                 *((f"not clear, as far as is checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=beyond,
