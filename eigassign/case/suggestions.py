@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from itertools import islice
@@ -26,6 +27,14 @@ _SYNONYMS = {  # what others call it
     "rho": "density",
     **dict.fromkeys(("nu", "poisson", "poissons"), "poissons_ratio"),
 }
+_BESIDE = re.compile(
+    r"[lcuzt]|u[pn][pne]\d*|.*(\bangle|channel|\b[lcuzt][-_ ]?(profile|section)).*"
+)
+_TWISTED = (
+    ": no beam here has a section that bends out of the plane of its load or twists (its shear "
+    "centre is not its centroid); where it is held from both write shape: bare with area and "
+    "inertias, else the part as a link of type solid"
+)
 _MOST_NAMES = 20  # of those that are known: two lines of a message
 _MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
 
@@ -56,6 +65,8 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` when something known is close, else nothing."""
     candidates = list(islice(known, _MOST_CANDIDATES))
     close = get_close_matches(name[:_LONGEST], candidates, n=1, cutoff=0.6)
+    if "i_profile" in candidates and _BESIDE.fullmatch(name.lower()):
+        return _TWISTED
     if _SYNONYMS.get(name.lower()) in candidates:
         close = [_SYNONYMS[name.lower()]]
     return f"; did you mean {close[0]!r}?" if close else ""
