@@ -39,7 +39,7 @@ _NOISE = 1e-13  # of the mean of K over that of M: round-off of what does not be
 _MASSLESS = 1e-10  # of the largest μ: what moves no mass has μ = 0
 _NOWHERE = 1e-9  # of a part's size: a centre of mass as near to an axis is shown on it
 _THIN = 1e-5  # kg/m³ of a cube as large as the part: a wire of 10 g/m has that from 30 m on
-_HEAVY = 1e6  # kg: castings weigh up to 500 t
+_FAR = 10.0  # radii of gyration: the ends of a bar are 1.7 from its centre
 _FAST = 3e4  # m/s: of the lowest free frequency × size, half a wave at twice the speed in diamond
 _SEEN = 1e-6  # relative: uncertainty of a frequency that is worth a word
 _UNKNOWN = 0.1  # and from which on no frequency is known
@@ -85,7 +85,8 @@ def free_part_lines(
     inertia = turning - m * (c @ c - (0.0 if flat else c**2))
     X = np.array([p[: len(c)] for p in mesh.positions.values()], dtype=np.float64)
     far = float(np.linalg.norm(X - c, axis=1).max(initial=0.0))
-    size = far + float(np.sqrt(max(inertia.max(), 0.0) / m))
+    gyration = float(np.sqrt(max(inertia.max(), 0.0) / m))
+    size = far + gyration
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
     strain = rigid_strain(K, N)
@@ -95,7 +96,12 @@ def free_part_lines(
         f"{about} kg m2",
         f"{title}: {free}strain under rigid motion {strain:.1g} (accepted up to {STRAIN_FREE:g})",
     ]
-    if (size > 1.0 and m < _THIN * size**3) or m > _HEAVY or lowest * size > _FAST:
+    if far > _FAR * gyration:
+        lines.append(
+            f"{title}: its nodes are up to {far:.3g} m from its centre of mass, a part of about "
+            f"{2.0 * gyration:.2g} m: see the positions and their units"
+        )
+    if (size > 1.0 and m < _THIN * size**3) or lowest * size > _FAST:
         lines.append(
             f"{title}: no part has {m:.3g} kg, nodes up to {far:.3g} m from their centre and "
             f"frequencies from {lowest:.3g} Hz on: if its files are in mm, write units: mm-t-s or "

@@ -29,11 +29,7 @@ def read_bulk(data: bytes) -> Contents | None:
     for card in _DMIG.finditer(data):
         cards[card.group(1).decode("ascii", "replace").upper()].append(card.group())
     matrices = {name: partial(_matrix, group) for name, group in cards.items()}
-    places: dict[int, Floats] = {}
-    for card in _GRID.finditer(data):
-        node, place = _grid(card.group())
-        same = node not in places or (places[node] == place).all()
-        places[node] = place if same else np.full(3, np.nan)
+    places = entries.places_of(_grid(card.group()) for card in _GRID.finditer(data))
     return Contents(matrices, places) if matrices or places else None
 
 

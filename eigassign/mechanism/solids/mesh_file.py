@@ -7,6 +7,7 @@ their size is bounded before they are read, and messages quote names of formats 
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -26,6 +27,9 @@ Ints = NDArray[np.intp]
 MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
 
 _MESH_WITH = "; mesh with tetrahedra of 10 nodes (or of 4), or hexahedra of 20"
+_ALONE = (
+    ", which is not read: save the elements alone; couplings, masses and springs stand in the case"
+)
 _EDGES = {  # of each kind, where a format has another order than Abaqus
     ("gmsh", 10): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
     ("gmsh", 20): (
@@ -238,6 +242,7 @@ def _gmsh_4(
 # --- Abaqus and CalculiX
 
 _ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
+_JOINED = ("TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "KINEMATIC COUPLING", "CONTACT PAIR")
 _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
 
 
@@ -246,12 +251,17 @@ def _abaqus(text: str) -> _Raw:
     blocks = list(_keywords(text))
     if sum(word == "PART" for word, _, _ in blocks) > 1:
         raise _UnfitError("holds several parts: save the one part alone")
+    _require_one(
+        {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
+    )
     for word, options, lines in blocks:
         rows = [[entry.strip() for entry in line.split(",")] for line in lines]
         if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
             raise _UnfitError("includes other files: save the mesh in one")
-        if word == "INSTANCE" and lines:
+        if word == "INSTANCE" and any(float(entry or 0.0) for entry in itertools.chain(*rows)):
             raise _UnfitError("moves or turns its part as an instance: save the part alone")
+        if word in _JOINED:
+            raise _UnfitError(f"has *{word}{_ALONE}")
         if word == "NODE":
             for row in rows:
                 raw.nodes[int(row[0])] = (*(float(v or 0.0) for v in row[1:4]), 0.0, 0.0)[:3]
@@ -346,6 +356,7 @@ def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[s
 
 # --- Nastran bulk data
 
+_PASSED = ("CORD1R", "CORD2R", "CORD1C", "CORD2C", "CORD1S", "CORD2S")
 _NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
 _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
 
@@ -353,7 +364,7 @@ _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
 def _nastran(text: str) -> _Raw:
     start = re.search(r"^BEGIN\s+BULK.*$", text, re.MULTILINE | re.IGNORECASE)
     control, bulk = ("", text) if start is None else (text[: start.start()], text[start.end() :])
-    raw = _Raw()
+    raw, materials = _Raw(), set[str | None]()
     for number, members in re.findall(
         r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", control, re.MULTILINE | re.IGNORECASE
     ):
@@ -376,7 +387,19 @@ def _nastran(text: str) -> _Raw:
             raw.add(f"pid {int(values[1])}", (int(v) for v in values[2 : 2 + n] if v))
         elif name == "SET1":
             raw.add(values[0], _listed(values[1:]))
+        elif name == "PSOLID":
+            materials.add(values[1])
+        elif name not in _PASSED and re.match(r"C[A-Z]|RB[AE]|RROD|RTRPLT|MPC", name):
+            raise _UnfitError(f"has {name[:8]}{_ALONE}")
+    _require_one(materials)
     return raw
+
+
+def _require_one(materials: set[str | None]) -> None:
+    if len(materials) > 1:
+        raise _UnfitError(
+            f"is of {len(materials)} materials: save a mesh of each, a link of its own"
+        )
 
 
 def _listed(entries: Iterable[str]) -> set[int]:

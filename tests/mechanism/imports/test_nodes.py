@@ -13,6 +13,7 @@ from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from test_formats import (
     BY_ID,
+    CSV,
     IDS,
     PLACES,
     labels_of,
@@ -225,6 +226,25 @@ def test_a_node_without_a_place_is_told(tmp_path: Path) -> None:
     assert "no place of node 1000 is in the files: write its position" in refusal(tmp_path, link)
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("nodes.csv", f"{IDS[-1]},", f"{IDS[-1]}.5,", "column id: expected whole numbers"),
+        ("nodes.csv", "0\n", f"0\n{IDS[0]},7,0,0\n", f"node {IDS[0]} stands at several places"),
+        ("p.dof", f"{IDS[0]}.2\n", f"{IDS[0]}.1\n", "gives a freedom of a node to two rows"),
+        ("nodes.csv", CSV, "17.999\n18.1\n", "the first line must be a header, such as id"),
+    ],
+)  # fmt: skip
+def test_slips_in_files_about_nodes_are_told(
+    tmp_path: Path, file: str, old: str, new: str, said: str
+) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    text = (tmp_path / file).read_text()
+    assert old in text
+    (tmp_path / file).write_text(text.replace(old, new, 1))
+    assert said in refusal(tmp_path, link)
+
+
 @pytest.mark.parametrize("field", [1, 5])
 def test_a_grid_point_with_axes_of_its_own_is_told(tmp_path: Path, field: int) -> None:
     of_dmig(tmp_path, *exported("spatial"), labels_of("spatial"))
@@ -313,6 +333,15 @@ def test_an_asymmetric_matrix_is_told(tmp_path: Path, write: Any) -> None:
     with open(file, "a") as stream:
         stream.write(more[file.name])
     assert "is not symmetric: entries differ by" in refusal(tmp_path, link)
+
+
+def test_an_asymmetry_is_told_by_its_own_rows(tmp_path: Path) -> None:
+    """Of an entry that is ten thousand times as small as the largest, a fraction."""
+    K, M = exported("spatial")
+    link = of_calculix(tmp_path, K, M, labels_of("spatial"))
+    M[tuple(np.argwhere(np.triu(np.abs(M) > 0.0, 1) & (np.abs(M) < 1e-4 * M.max()))[0])] *= 1.00005
+    np.save(tmp_path / "M.npy", M)
+    assert "is not symmetric: entries differ by" in refusal(tmp_path, {**link, "mass": "M.npy"})
 
 
 @pytest.mark.parametrize(
