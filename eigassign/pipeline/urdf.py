@@ -98,8 +98,8 @@ def urdf_mapping(
 _RIGID = _Frame(np.eye(3))
 STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
 OUTLOOK = """
-# A link that gives is a beam in place of `type: rigid`, see "eigassign docs own-arm". What may
-# change, and what is wanted:
+# A link that gives is a beam or a solid part in place of `type: rigid`, see "eigassign docs own-arm"
+# and "eigassign docs solid-part". What may change, and what is wanted:
 # design:
 #   gear: {{parameter: coordinates.{joint}.drive.stiffness, min: {low}, max: {high}}}
 # targets:
@@ -110,8 +110,9 @@ OUTLOOK = """
 def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     """The text of a case file ``name`` for the robot, and what is to be filled in, by its line.
 
-    What URDF does not know has a value that stands for it, and a comment: stiffnesses of drives,
-    the trajectory. A joint that moves no mass is locked. Raises as `urdf_mapping`.
+    What URDF does not know has a value that stands for it, and a comment: flexibility of links that
+    carry a joint away from their own, stiffnesses of drives, the trajectory. A joint that moves no
+    mass is locked. Raises as `urdf_mapping`, and UsageError for what would be no case.
     """
     _, links, joints = _parsed(path)
     moving = {joint.name: joint for joint in joints if joint.type in _MOVING}
@@ -144,9 +145,16 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     first = f"# From {path.name}: masses, places and axes. What URDF does not know: # fill in\n"
     lines = (first + to_yaml(content)).splitlines()
     below, asked = lines.index("coordinates:"), []
+    rigid = [n for n in range(lines.index("  links:"), below) if "type: rigid" in lines[n]]
+    long = {joint.parent for joint in joints if np.linalg.norm(_place(joint)) > _LEVEL}
+    wanted = [
+        (n, f"flexibility of link {link}: URDF has none; rigid stands there")
+        for n, link in zip(rigid, links, strict=True)
+        if link in long
+    ]
     places = [n for n in range(below, len(lines)) if re.search(r"\bdrive: [{l]", lines[n])]
     motion = next(n for n, line in enumerate(lines) if line.startswith("trajectory:"))
-    wanted = [*zip(places, notes.values(), strict=True)]
+    wanted += zip(places, notes.values(), strict=True)
     wanted.append(
         (motion, "trajectory: poses between which the joints move; small steps stand there")
     )

@@ -262,8 +262,9 @@ def test_init_writes_a_case_that_runs_and_lists_what_is_to_be_filled_in(
     lines = (crane.parent / "crane.yaml").read_text(encoding="utf-8").splitlines()
     marked = [n for n, line in enumerate(lines, 1) if line.endswith("# fill in") and n > 1]
     assert [int(line.split(":")[1]) for line in asked] == marked
-    assert len(asked) == 4
-    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[2]
+    assert len(asked) == 8
+    assert "flexibility of link column: URDF has none; rigid stands there" in asked[1]
+    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[6]
     case = ea.load_case(crane.parent / "crane.yaml")
     drives = {"yaw": "20 kN m/rad", "pitch": "20 kN m/rad", "lift": "20 MN/m"}
     same = ea.load_case(ea.urdf_mapping(crane, drives))
