@@ -98,8 +98,8 @@ def urdf_mapping(
 _RIGID = _Frame(np.eye(3))
 STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
 OUTLOOK = """
-# A link that gives is a beam or a solid part in place of `type: rigid`, see "eigassign docs own-arm"
-# and "eigassign docs solid-part". What may change, and what is wanted:
+# A link that gives is a beam or a solid part in place of `type: rigid`: "eigassign docs own-arm",
+# "eigassign docs solid-part". What may change, and what is wanted:
 # design:
 #   gear: {{parameter: coordinates.{joint}.drive.stiffness, min: {low}, max: {high}}}
 # targets:
