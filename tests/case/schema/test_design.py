@@ -274,7 +274,8 @@ def test_profiles_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(CaseError) as error:
         with_profile(tmp_path, PROFILES.replace(old, new))
-    assert expected in str(error.value)
+    (problem,) = error.value.problems
+    assert expected in str(problem)
 
 
 @pytest.mark.parametrize("shape", ["angle", "channel", "l_profile", "UPN80", "u_profile", "T"])

@@ -259,6 +259,17 @@ def test_meshes_without_volume_or_of_any_size_are_refused_and_no_crash(tmp_path:
             assert why == "has (nodes|elements) |is a part"
 
 
+def test_names_of_surfaces_are_quoted_in_few_words(tmp_path: Path) -> None:
+    part = bar((2, 1, 1), 4)
+    long = {f"{k}{'x' * 5000}": part.sets["root"] for k in range(50)}
+    with pytest.raises(CaseError, match=r"has no surface 'tip'; it has 0xxx.*…, …$") as caught:
+        ea.load_case(
+            case(tmp_path, part._replace(sets={**long, "root": part.sets["root"]})),
+            allow_outside=True,
+        ).model()
+    assert len(str(caught.value)) < 2000
+
+
 def test_a_mesh_in_pieces_is_told(tmp_path: Path) -> None:
     one = bar((2, 1, 1), 10)
     n = len(one.x)

@@ -335,6 +335,13 @@ def test_an_asymmetric_matrix_is_told(tmp_path: Path, write: Any) -> None:
     assert "is not symmetric: entries differ by" in refusal(tmp_path, link)
 
 
+def test_a_list_that_was_cut_short_is_doubted(tmp_path: Path) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    rows = (tmp_path / "p.sti").read_text().splitlines(keepends=True)
+    (tmp_path / "p.sti").write_text("".join(rows[: 2 * len(rows) // 3]))
+    assert "is its file whole" in refusal(tmp_path, link)
+
+
 def test_an_asymmetry_is_told_by_its_own_rows(tmp_path: Path) -> None:
     """Of an entry that is ten thousand times as small as the largest, a fraction."""
     K, M = exported("spatial")
