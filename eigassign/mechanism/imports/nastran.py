@@ -38,7 +38,7 @@ def fields_of(card: bytes) -> Cells:
     """The fields of a card behind its name, those that the last line leaves out too."""
     lines = (card.expandtabs(8) if b"\t" in card else card).rstrip().split(b"\n")
     if b"," in card:
-        rows = [[cell.strip() for cell in line.split(b",")[1:9]] for line in lines]
+        rows = [[cell.strip() for cell in line.split(b",", 9)[1:9]] for line in lines]
         return np.array([cell for row in rows for cell in (row + [b""] * 8)[:8]], dtype="S72")
     width = 16 if b"*" in lines[0][:8] else 8
     whole = b"".join(line.rstrip().ljust(72)[8:72] for line in lines if len(line) > 8)

@@ -7,6 +7,7 @@ their size is bounded before they are read, and messages quote names of formats 
 
 from __future__ import annotations
 
+import io
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,6 +26,7 @@ from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+LONGEST = 10_000  # characters of a line: far more than a card or a name
 MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
 
 _MESH_WITH = "; mesh with tetrahedra of 10 nodes (or of 4), or hexahedra of 20"
@@ -94,6 +96,8 @@ def read_mesh(file: Path, key: str) -> SolidMesh:
 
 @lru_cache(maxsize=4)  # a case reads its meshes for each model anew
 def _read(data: bytes) -> SolidMesh:
+    if any(len(line) > LONGEST for line in io.BytesIO(data)):
+        raise UnfitError(f"has a line of more than {LONGEST} characters, which no mesh has")
     head = data[:100_000].upper()
     if data.lstrip().startswith(b"$MeshFormat"):
         if b" 1 " in data.split(b"\n", 2)[1]:

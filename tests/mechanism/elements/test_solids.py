@@ -191,6 +191,7 @@ WRONG = {
     ),
     "wedges of Nastran": ("BEGIN BULK\nCPENTA,1,1,1,2,3,4,5,6\n", "CPENTA of 6 nodes"),
     "own axes": ("BEGIN BULK\nGRID,1,5,0.,0.,0.\n", "coordinate system of their own"),
+    "one line": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n" + 9999 * "1,", "a line of more than"),
     "tied": ("*NODE\n1,0,0,0\n*TIE, NAME=a\nb,c\n", r"has \*TIE, which is not read"),
     "moved": ("*INSTANCE, NAME=a, PART=b\n0.,1.,0.\n*NODE\n1,0,0,0\n", "moves or turns its part"),
     "left where it is": ("*INSTANCE, NAME=a, PART=b\n0.,0.,0.\n*NODE\n1,0,0,0\n", "no solid elem"),
