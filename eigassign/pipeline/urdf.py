@@ -162,10 +162,8 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
         lines[n] += "  # fill in"
         asked.append(f"{name}:{n + 1}: {note}")
     name, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
-    low, high = (
-        ("5 MN/m", "50 MN/m") if joint.type == "prismatic" else ("5 kN m/rad", "50 kN m/rad")
-    )
-    outlook = OUTLOOK.format(joint=name, low=low, high=high)
+    unit = STANDING[joint.type].partition(" ")[2]
+    outlook = OUTLOOK.format(joint=name, low=f"5 {unit}", high=f"50 {unit}")
     text = "\n".join(lines) + "\n" + outlook
     try:
         parse(text.encode(), path.with_suffix(".yaml"))

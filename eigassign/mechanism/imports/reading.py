@@ -54,7 +54,6 @@ _KNOWN = (
     "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market, Harwell-Boeing), MATLAB or "
     "NumPy, nor a square table of numbers"
 )
-_KINDS = {"K": "STIF", "M": "MASS"}  # how names of matrices begin
 
 
 def read_contents(file: Path, key: str) -> Contents | None:
@@ -115,7 +114,8 @@ def matrix_of(
 
 def kind_of(name: str) -> str:
     """K or M by the name of a matrix: KAAX, stiffness, MAAX, mass; nothing of others."""
-    return next((k for k, word in _KINDS.items() if name.upper().startswith((k, word))), "")
+    own = name.upper()
+    return "K" if own.startswith(("K", "STIF")) else "M" if own.startswith("M") else ""
 
 
 def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
@@ -131,8 +131,7 @@ def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
     twin = next((f" ({kind}{n[1:]})" for n in found if re.fullmatch("[KM]AAX?", n)), "")
     return (
         f"holds {have[0] if have else f'matrices, {names}'}, no {words[kind]}: export the "
-        f"{words[kind]}{twin} too, or name stiffness and mass, a file each (parts.mat:K is one of "
-        "several)"
+        f"{words[kind]}{twin} too, or name stiffness and mass, a file each"
     )
 
 
