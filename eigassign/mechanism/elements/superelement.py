@@ -144,7 +144,7 @@ def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
     size = np.sqrt(np.maximum(A.diagonal(), 0.0))
     # |A_ij| ≤ √(A_ii A_jj), and of that an asymmetry of 1e-8 is taken for round-off, as is what is
     # lost in sums with the largest entry
-    room = 1e-8 * size[lost.row] * size[lost.col] + 1e-14 * abs(A).max()
+    room = 1e-8 * size[lost.row] * size[lost.col] + 1e-12 * abs(A).max()
     if (lost.data > room).any():
         only = sparse.tril(A, -1).nnz == 0 or sparse.triu(A, 1).nnz == 0
         hint = (
