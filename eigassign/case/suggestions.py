@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from itertools import islice
@@ -26,6 +27,14 @@ _SYNONYMS = {  # what others call it
     "rho": "density",
     **dict.fromkeys(("nu", "poisson", "poissons"), "poissons_ratio"),
 }
+_BESIDE = re.compile(
+    r"[lcuzt]|u[pn][pne]\d*|.*(\bangle|channel|\b[lcuzt][-_ ]?(profile|section)).*"
+)
+_TWISTED = (
+    ": no beam here has a section that bends out of the plane of its load or twists (its shear "
+    "centre is not its centroid); where it is held from both write shape: bare with area and "
+    "inertias, else the part as a link of type solid"
+)
 _MOST_NAMES = 20  # of those that are known: two lines of a message
 _MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
 
@@ -44,14 +53,20 @@ def shown(value: object) -> str:
         return "a list"
     if isinstance(value, int) and abs(value) >= 10**_LONGEST:
         return "a number of more than 60 digits"
-    text = repr(value)
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+    return short(repr(value))
+
+
+def short(text: str, longest: int = _LONGEST) -> str:
+    """``text``, cut short."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` when something known is close, else nothing."""
     candidates = list(islice(known, _MOST_CANDIDATES))
     close = get_close_matches(name[:_LONGEST], candidates, n=1, cutoff=0.6)
+    if "i_profile" in candidates and _BESIDE.fullmatch(name.lower()):
+        return _TWISTED
     if _SYNONYMS.get(name.lower()) in candidates:
         close = [_SYNONYMS[name.lower()]]
     return f"; did you mean {close[0]!r}?" if close else ""
@@ -59,7 +74,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Names for a message, at most twenty of them."""
-    all_names = [printable(name) for name in names]
+    all_names = [short(printable(name)) for name in islice(names, _MOST_NAMES + 1)]
     more = ", …" if len(all_names) > _MOST_NAMES else ""
     return ", ".join(all_names[:_MOST_NAMES]) + more if all_names else "none"
 

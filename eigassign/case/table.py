@@ -247,7 +247,8 @@ def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
         return f"column {name} appears {known.count(name)} times"
     message = f"no column {name}; the columns are {listed(known)}"
     if all(NUMBER.fullmatch(other) for other in known):
-        return f"{message}; the first line must be a header, such as time [s],q1 [deg]"
+        such = "time [s],q1 [deg]" if name == "time" else name
+        return f"{message}; the first line must be a header, such as {such}"
     if len(known) == 1 and " " in known[0]:
         return f"{message}; columns are separated by commas, semicolons or tabs"
     begins = re.compile(rf"{re.escape(name)}(?![^\W_])", re.IGNORECASE)  # time (s), time_s, TIME

@@ -183,6 +183,7 @@ UNITS: dict[str, Unit] = {
     "deg": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
     "°": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
     "arcmin": Unit(Fraction(1, 10_800), (0, 0, 0, 1, 0), pi=1),
+    "in": Unit(Fraction(254, 10**4), (0, 1, 0, 0, 0)),
     "kgf": Unit(Fraction(980_665, 10**5), (1, 1, -2, 0, 0)),
     "%": Unit(Fraction(1, 100), _PLAIN),
 }

@@ -515,7 +515,7 @@ def modes_table(
         "frequency [Hz]": [f"{hz:#.6g}".rstrip(".") for hz in frequencies_hz],
     }
     weighed = weight is not None and weight.gravity is not None
-    of_mesh = ("mesh", discretisation, "about" if weighed or estimated else "at most")
+    of_mesh = ("mesh", discretisation, "at most (estimated)" if weighed or estimated else "at most")
     for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
         if errors is not None:
             columns[f"{cause}: too high by {about}"] = [

@@ -31,7 +31,7 @@ from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.output.reports import page as report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import new_run_folder
-from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.accuracy import digits_lines, judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
@@ -189,7 +189,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
         not model.has_bounds,
-        *(weight.row, found, weight.notes, weight.warnings),
+        *(weight.row, found, (*digits_lines(file), *weight.notes), weight.warnings),
     )
 
 

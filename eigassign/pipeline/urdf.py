@@ -19,14 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from eigassign.brief import LONGEST
 from eigassign.case.canonical import to_yaml
-from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, read_bytes
+from eigassign.case.loading import parse
+from eigassign.case.suggestions import listed, short
+from eigassign.errors import CaseError, StorageError, UsageError
+from eigassign.files import CASE, printable, read_bytes
 
 Floats = NDArray[np.float64]
 Number = float | str
 _MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 _TAKEN = {"ground", "start", "end"}
+_NOTHING = 1e-15  # kg m²: zeros of icub.urdf have products of up to 4e-18, which turns no body
 _LEVEL = 1e-9  # m: a joint this near to another one is at its place
 
 
@@ -94,8 +98,8 @@ def urdf_mapping(
 _RIGID = _Frame(np.eye(3))
 STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
 OUTLOOK = """
-# A link that gives is a beam in place of `type: rigid`, see "eigassign docs own-arm". What may
-# change, and what is wanted:
+# A link that gives is a beam or a solid part in place of `type: rigid`: "eigassign docs own-arm",
+# "eigassign docs solid-part". What may change, and what is wanted:
 # design:
 #   gear: {{parameter: coordinates.{joint}.drive.stiffness, min: {low}, max: {high}}}
 # targets:
@@ -106,8 +110,9 @@ OUTLOOK = """
 def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     """The text of a case file ``name`` for the robot, and what is to be filled in, by its line.
 
-    What URDF does not know has a value that stands for it, and a comment: stiffnesses of drives,
-    the trajectory. A joint that moves no mass is locked. Raises as `urdf_mapping`.
+    What URDF does not know has a value that stands for it, and a comment: flexibility of links that
+    carry a joint away from their own, stiffnesses of drives, the trajectory. A joint that moves no
+    mass is locked. Raises as `urdf_mapping`, and UsageError for what would be no case.
     """
     _, links, joints = _parsed(path)
     moving = {joint.name: joint for joint in joints if joint.type in _MOVING}
@@ -130,6 +135,8 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
         step = 0.1 if joint.type == "prismatic" else 0.5
         room = upper - start if upper - start >= start - lower else lower - start
         steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
+    if not np.any(steps):
+        raise UsageError(f"{path}: no joint moves a mass: give its links <inertial>")
     for joint in content["mechanism"]["joints"].values():
         if not any(joint["orientation"]):
             del joint["orientation"]
@@ -138,9 +145,16 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     first = f"# From {path.name}: masses, places and axes. What URDF does not know: # fill in\n"
     lines = (first + to_yaml(content)).splitlines()
     below, asked = lines.index("coordinates:"), []
+    rigid = [n for n in range(lines.index("  links:"), below) if "type: rigid" in lines[n]]
+    long = {joint.parent for joint in joints if np.linalg.norm(_place(joint)) > _LEVEL}
+    wanted = [
+        (n, f"flexibility of link {link}: URDF has none; rigid stands there")
+        for n, link in zip(rigid, links, strict=True)
+        if link in long
+    ]
     places = [n for n in range(below, len(lines)) if re.search(r"\bdrive: [{l]", lines[n])]
     motion = next(n for n, line in enumerate(lines) if line.startswith("trajectory:"))
-    wanted = [*zip(places, notes.values(), strict=True)]
+    wanted += zip(places, notes.values(), strict=True)
     wanted.append(
         (motion, "trajectory: poses between which the joints move; small steps stand there")
     )
@@ -148,11 +162,15 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
         lines[n] += "  # fill in"
         asked.append(f"{name}:{n + 1}: {note}")
     name, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
-    low, high = (
-        ("5 MN/m", "50 MN/m") if joint.type == "prismatic" else ("5 kN m/rad", "50 kN m/rad")
-    )
-    outlook = OUTLOOK.format(joint=name, low=low, high=high)
-    return "\n".join(lines) + "\n" + outlook, asked
+    unit = STANDING[joint.type].partition(" ")[2]
+    outlook = OUTLOOK.format(joint=name, low=f"5 {unit}", high=f"50 {unit}")
+    text = "\n".join(lines) + "\n" + outlook
+    try:
+        parse(text.encode(), path.with_suffix(".yaml"))
+    except CaseError as error:
+        problem = error.problems[0]
+        raise UsageError(f"{path}: gives no case: {problem.path}: {problem.message}") from error
+    return text, asked
 
 
 class _Joint(NamedTuple):
@@ -195,15 +213,15 @@ def _parsed(path: Path) -> tuple[str, dict[str, _Link], list[_Joint]]:
         raise UsageError(f"{path}: not a URDF file: {error}{hint}") from error
     if any("xacro}" in e.tag or "${" in str(e.attrib) for e in robot.iter()):
         raise UsageError(f"{path}: not a URDF file: {expand}")
-    if robot.tag != "robot":
-        raise UsageError(f"{path}: not a URDF file: it begins with <{robot.tag}>, not <robot>")
     try:
+        if robot.tag != "robot":
+            raise ValueError(f"not a URDF file: it begins with <{robot.tag}>, not <robot>")
         links = {_text(e, "name"): _link(e) for e in robot.findall("link")}
         joints = [_read_joint(e) for e in robot.findall("joint")]
         _require_tree(links, joints, len(robot.findall("link")))
     except ValueError as error:
-        raise UsageError(f"{path}: {error}") from error
-    return str(robot.get("name") or path.stem), links, joints
+        raise UsageError(f"{path}: {short(printable(str(error)), LONGEST)}") from error
+    return short(printable(robot.get("name") or path.stem)), links, joints
 
 
 def _text(element: ElementTree.Element, *keys: str) -> str:
@@ -248,6 +266,7 @@ def _link(element: ElementTree.Element) -> _Link:
         for key in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    own *= np.abs(own).max() > _NOTHING
     T = _origin(inertial)
     of_link = T[:3, :3] @ own @ T[:3, :3].T
     return _Link((float(_numbers(mass, "value", [0.0])[0]), T[:3, 3], of_link))
@@ -272,6 +291,8 @@ def _read_joint(element: ElementTree.Element) -> _Joint:
     lower, upper = (
         _numbers(limit, key, [far])[0] for key, far in (("lower", -np.inf), ("upper", np.inf))
     )
+    if not lower < upper:  # as it is written where there are no limits: 0 and 0
+        lower, upper = -np.inf, np.inf
     parent, child = (_text(element, key, "link") for key in ("parent", "child"))
     return _Joint(name, kind, parent, child, _origin(element), axis, np.array([lower, upper]))
 
@@ -300,9 +321,11 @@ def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:
 def _identifiers(names: Iterable[str], path: str | Path) -> dict[str, str]:
     """Names without what key paths cannot hold; those of nodes and of the ground are taken."""
     found = {name: re.sub(r"^(?=\d)", "_", re.sub(r"\W", "_", name)) for name in names}
-    if len(set(found.values())) != len(found) or _TAKEN & set(found.values()):
+    own = [*found.values(), *_TAKEN]
+    if twice := [name for name, each in found.items() if own.count(each) > 1]:
         raise UsageError(
-            f"{path}: two names of links or joints are alike, or one is ground, start or end"
+            f"{path}: two names of links or joints are alike, or one is ground, start or end: "
+            f"rename {listed(twice)}"
         )
     return found
 

@@ -19,10 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
 from eigassign.facts import at_most
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
+from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,
     Trajectories,
@@ -72,7 +74,7 @@ def study_accuracy(
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
-    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y)))
+    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y), *digits_lines(scene.file)))
 
 
 def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) -> WeightStudy:
@@ -99,6 +101,19 @@ def model_errors(
     return found
 
 
+def raised_by(model: Model, share: float) -> str:
+    """By how much mesh and reduced links raise a frequency, in words."""
+    if not np.isfinite(share):
+        return "by an unknown amount"
+    return f"by up to {100 * share:.2g} %" + ("" if model.has_bounds else " (estimated)")
+
+
+def finer(model: Model) -> str:
+    """What makes that less."""
+    solids = "mesh solids finer, or else " * (model.solids is not None)
+    return f"{solids}give the links more elements, raise reduce_to, or write auto for them"
+
+
 def _rounding_note(scene: Scene, y: Floats) -> str:
     """`rounding_line` of some poses of design y, and of the first one of the initial design."""
     pencil, q = scene.model.pencil, scene.q0[None]
@@ -110,6 +125,14 @@ def _rounding_note(scene: Scene, y: Floats) -> str:
     lost = max(rounding_error(pencil, each, max(scene.modes)) for each in x)
     line = rounding_line(lost)
     return f"{line}, at {len(x)} poses and designs" if len(x) > 1 and np.isfinite(lost) else line
+
+
+def digits_lines(file: CaseFile) -> tuple[str, ...]:
+    """Where it is said what the digits of imported matrices cost; they are nobody's round-off."""
+    kinds = {link_type(file, name) for name in file.mechanism.links}
+    if "superelement" not in kinds:
+        return ()
+    return ("not in that: the digits of imported matrices, which eigassign check judges",)
 
 
 def rounding_line(lost: float) -> str:
@@ -153,14 +176,13 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
-    about = "at most" if model.has_bounds else "about"
-    finer = ", and solids a finer mesh" * (model.solids is not None)
+    estimated = "" if model.has_bounds else " (estimated)"
     return [
-        f"mode {mode}: the mesh raises its frequency by {at_most(error, about)}, {where} of "
+        f"mode {mode}: the mesh raises its frequency by {at_most(error)}{estimated}, {where} of "
         f"the {found.design} design"
         if np.isfinite(error)
         else f"mode {mode}: the mesh is too coarse for an error, {where} of the {found.design} "
-        f"design: give the links more elements, or auto{finer}"
+        f"design: {finer(model)}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
 

@@ -63,6 +63,12 @@ def test_modes_state_what_round_off_leaves(tmp_path: Path) -> None:
     assert 1e-10 < (np.ptp(hz, axis=0) / hz[0]).max() < answers[0].round_off < 1e-2
 
 
+def test_modes_of_imported_parts_say_where_the_digits_of_their_files_are_judged() -> None:
+    (starter,) = (p for p in SHIPPED_CASES if p.stem == "imported_part")
+    notes = modes(starter, q=[0.1, 0.2], count=1).notes
+    assert "digits of imported matrices, which eigassign check judges" in notes[0]
+
+
 def test_check_says_what_the_case_amounts_to() -> None:
     answer = check(SHIPPED)
     assert (answer.n_dof, answer.n_rigid, answer.samples, answer.duration_s) == (23, 2, 152, 1.0)

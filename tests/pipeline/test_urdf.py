@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
@@ -261,8 +262,9 @@ def test_init_writes_a_case_that_runs_and_lists_what_is_to_be_filled_in(
     lines = (crane.parent / "crane.yaml").read_text(encoding="utf-8").splitlines()
     marked = [n for n, line in enumerate(lines, 1) if line.endswith("# fill in") and n > 1]
     assert [int(line.split(":")[1]) for line in asked] == marked
-    assert len(asked) == 4
-    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[2]
+    assert len(asked) == 8
+    assert "flexibility of link column: URDF has none; rigid stands there" in asked[1]
+    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[6]
     case = ea.load_case(crane.parent / "crane.yaml")
     drives = {"yaw": "20 kN m/rad", "pitch": "20 kN m/rad", "lift": "20 MN/m"}
     same = ea.load_case(ea.urdf_mapping(crane, drives))
@@ -289,3 +291,33 @@ def test_a_joint_that_moves_no_mass_is_locked_and_said(
         "drive of flange: nothing beyond it has mass in the URDF; locked" in capsys.readouterr().out
     )
     assert ea.load_case(crane.parent / "crane.yaml").model().frequencies([*POSE, 0.0], [], 3).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<mass value="5"/>', '<mass value="-5"/>', "gives no case: .*mass: must be >= 0"),
+        ('name="pitch"', 'name="ground"', "rename ground$"),
+        ("inertial>", "other>", "no joint moves a mass"),
+        ("robot", 1000 * "x", "it begins with <xxx"),
+    ],
+)
+def test_init_writes_no_case_that_does_not_run(
+    crane: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    crane.write_text(ROBOT.replace(old, new), encoding="utf-8")
+    assert main(["init", "--urdf", str(crane), "--out", str(crane.parent)]) == 2
+    err = capsys.readouterr().err
+    assert re.search(said, err.strip())
+    assert len(err.replace(str(crane), "")) < 350
+    assert not (crane.parent / "crane.yaml").exists()
+
+
+def test_init_takes_robots_as_programs_write_them(crane: Path) -> None:
+    """Limits of 0 and 0, products of inertia that are round-off of zeros, a name of two lines."""
+    text = re.sub(r'(lower|upper)="[^"]*"', r'\1="0"', ROBOT)
+    text = re.sub(r"<inertia .*?/>", '<inertia ixx="0" ixz="1e-20"/>', text, count=1)
+    crane.write_text(text.replace('"crane"', '"a&#10;b: c"'), encoding="utf-8")
+    assert main(["init", "--urdf", str(crane), "--out", str(crane.parent)]) == 0
+    case = ea.load_case(crane.parent / "crane.yaml")
+    assert (np.ptp(case.trajectory.q, axis=0) > 0.02).all()

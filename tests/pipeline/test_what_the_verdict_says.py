@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -214,3 +216,14 @@ def test_a_price_that_lowers_what_is_to_be_high_is_named() -> None:
     result = solve_case(case_of({"k1": priced, "k2": K2}, [], assignment=aim))
     _, reason = said(result)
     assert f"; its price, {result.results.price:.4g}, counts against it, 1 as 1 Hz" in reason
+
+
+def test_a_mesh_that_is_too_coarse_is_to_be_made_finer(tmp_path: Path) -> None:
+    """Neither elements of beams nor reduce_to would help the casting."""
+    starters = Path(ea.__file__).parent / "starters"
+    shutil.copytree(starters / "casting", tmp_path / "casting")
+    text = (starters / "casting.yaml").read_text() + "assignment: {max_error: 1e-4}\n"
+    (tmp_path / "arm.yaml").write_text(text)
+    verdict, reason = said(solve_case(ea.load_case(tmp_path / "arm.yaml")))
+    assert verdict == "do_not_use"
+    assert re.search(r"by up to [\d.]+ % \(estimated\).*mesh solids finer", reason, re.IGNORECASE)

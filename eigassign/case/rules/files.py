@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, entries
+from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items
 from eigassign.case.rules.lookups import curves, design_entries, links, trajectories
 from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
@@ -48,6 +48,8 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     tables += [((key,), at(tree, key), "file") for key in _SPARE]
     lists = ((name, at(body, "choices")) for name, body in design_entries(tree))
     tables += [(("design", name, "choices"), body, "file") for name, body in lists]
+    sections = items(tree, "mechanism", "sections")
+    tables += [(("mechanism", "sections", name), body, "file") for name, body in sections]
     matrices = [
         (path, body, key)
         for _, path, body in links(tree, "superelement")

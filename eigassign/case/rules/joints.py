@@ -118,6 +118,8 @@ def _base_problem(tree: Tree, base: str, kind: str | None) -> str | None:
     if base in beams or (base in known and type_of(known[base]) is None):
         return None
     hint = suggestion(base.partition(".")[0], beams)
+    if not beams:
+        return f"rides along a link of type beam, and there is none; got {shown(base)}"
     return f"rides along a beam: expected one of {listed(beams)}, got {shown(base)}{hint}"
 
 

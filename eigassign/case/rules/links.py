@@ -198,7 +198,8 @@ def links_that_a_joint_travels_along_are_not_reduced(tree: Tree) -> Iterator[Fin
     for joint, body in items(tree, "mechanism", "joints"):
         base = text(body, "base")
         path = ("mechanism", "links", base or "", "reduce_to")
-        if text(body, "type") in RIDING and at(tree, *path) is not None:
+        beams = [name for name, *_ in links(tree, "beam")]
+        if text(body, "type") in RIDING and base in beams and at(tree, *path) is not None:
             message = f"{joint!r} travels along this link, so that it cannot be reduced: "
             yield path, message + "leave reduce_to out"
 

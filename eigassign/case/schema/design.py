@@ -21,6 +21,7 @@ from eigassign.case.schema.parts import (
     FrozenDict,
     Named,
     OneOrList,
+    OrFile,
     Part,
     Quantity,
     must,
@@ -175,15 +176,6 @@ class Parameter(Part):
         return bounds[0], bounds[-1]
 
 
-class _OrTable:
-    """The JSON Schema of choices: by name, or in a CSV file, which is read before the schema."""
-
-    @staticmethod
-    def __get_pydantic_json_schema__(core: Any, handler: Any) -> dict[str, Any]:
-        file = {"type": "object", "additionalProperties": {"type": "string"}}
-        return {"anyOf": [handler(core), {**file, "required": ["file"], "maxProperties": 1}]}
-
-
 class Choices(Part):
     """Properties that are set together: a list of sections, of motors.
 
@@ -201,7 +193,7 @@ class Choices(Part):
         Mapping[str, Annotated[Mapping[str, YValue], Field(min_length=1), Frozen]],
         Field(min_length=1, max_length=MOST_CHOICES),
         Frozen,
-        _OrTable,
+        OrFile(1),
     ]
     price: Annotated[Mapping[str, Price], Frozen] = FrozenDict()
     tolerance: Annotated[Mapping[str, Tolerance], Frozen] = FrozenDict()

@@ -26,7 +26,7 @@ class Material(Part):
     Keys:
         youngs_modulus: E
         density: ρ
-        poissons_ratio: ν, for spatial beams and for `shear: true`
+        poissons_ratio: ν, for spatial beams, `shear: true` and solids
         shear_modulus: G, instead of Poisson's ratio, G = E / (2 (1 + ν))
     """
 

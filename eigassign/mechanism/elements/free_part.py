@@ -39,7 +39,10 @@ _NOISE = 1e-13  # of the mean of K over that of M: round-off of what does not be
 _MASSLESS = 1e-10  # of the largest μ: what moves no mass has μ = 0
 _NOWHERE = 1e-9  # of a part's size: a centre of mass as near to an axis is shown on it
 _THIN = 1e-5  # kg/m³ of a cube as large as the part: a wire of 10 g/m has that from 30 m on
+_FAR = 10.0  # radii of gyration: the ends of a bar are 1.7 from its centre
+_FAST = 3e4  # m/s: of the lowest free frequency × size, half a wave at twice the speed in diamond
 _SEEN = 1e-6  # relative: uncertainty of a frequency that is worth a word
+_UNKNOWN = 0.1  # and from which on no frequency is known
 
 
 def part_lines(case: CaseFile) -> tuple[str, ...]:
@@ -81,35 +84,47 @@ def free_part_lines(
     turning = J.diagonal()[2:] if flat else J.diagonal()[3:]
     inertia = turning - m * (c @ c - (0.0 if flat else c**2))
     X = np.array([p[: len(c)] for p in mesh.positions.values()], dtype=np.float64)
-    size = float(np.abs(X - c).max(initial=0.0) + np.sqrt(max(inertia.max(), 0.0) / m))
+    far = float(np.linalg.norm(X - c, axis=1).max(initial=0.0))
+    gyration = float(np.sqrt(max(inertia.max(), 0.0) / m))
+    size = far + gyration
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
     strain = rigid_strain(K, N)
+    free, lowest = _free_modes(K, M, mesh, strain, len(J))
     lines = [
         f"{title}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m, about it "
         f"{about} kg m2",
-        f"{title}: {_free_modes(K, M, mesh, strain, len(J))}strain under rigid motion "
-        f"{strain:.1g} (accepted up to {STRAIN_FREE:g})",
+        f"{title}: {free}strain under rigid motion {strain:.1g} (accepted up to {STRAIN_FREE:g})",
     ]
-    if size > 1.0 and m < _THIN * size**3:
+    if far > _FAR * gyration:
         lines.append(
-            f"{title}: is {size:.3g} m large and has {m:.3g} kg: if its files are in mm, write "
-            "units: mm-t-s or mm-kg-ms"
+            f"{title}: its nodes are up to {far:.3g} m from its centre of mass, a part of about "
+            f"{2.0 * gyration:.2g} m: see the positions and their units"
+        )
+    if (size > 1.0 and m < _THIN * size**3) or lowest * size > _FAST:
+        lines.append(
+            f"{title}: no part has {m:.3g} kg, nodes up to {far:.3g} m from their centre and "
+            f"frequencies from {lowest:.3g} Hz on: if its files are in mm, write units: mm-t-s or "
+            "mm-kg-ms"
         )
     return lines
 
 
 def _free_modes(
     K: sparse.csr_array, M: sparse.csr_array, mesh: LinkMesh, strain: float, expected: int
-) -> str:
-    """The number of rigid modes and the lowest elastic frequencies; nothing where they fail."""
+) -> tuple[str, float]:
+    """The number of rigid modes and the lowest elastic frequencies, in words, and the first in Hz.
+
+    Nothing and 0 where they fail.
+    """
     try:
         lam, phi = _lowest(K, M, mesh, expected + 2 * _ELASTIC)
     except (LinAlgError, ArithmeticError, AccuracyError, IndexError):
-        return ""
+        return "", 0.0
     least = max(_RIGID * lam[-1], _NOISE * K.trace() / M.trace())
     rigid = int((lam < least).sum())
-    loose = "" if rigid == expected else f" ({expected} expected: is it in pieces?)"
+    why = "is it in pieces?" if rigid > expected else "is it supported, or has it too few digits?"
+    loose = "" if rigid == expected else f" ({expected} expected: {why})"
     hz = np.sqrt(lam[rigid:][:_ELASTIC]) / (2.0 * np.pi)
     text = f"free: {rigid} rigid modes{loose}"
     if len(hz):
@@ -117,8 +132,9 @@ def _free_modes(
         # entries that are wrong by ε √(K_ii K_jj), each by itself, change λ by ε φᵀ diag(K) φ
         shape = phi[:, rigid]
         unsure = 0.5 * strain * (K.diagonal() @ shape**2) / (shape @ (K @ shape))
-        text += f" (uncertain by {100 * unsure:.1g} %: few digits)" if unsure > _SEEN else ""
-    return f"{text}; "
+        how = f"by {100 * unsure:.1g} %" if unsure < _UNKNOWN else "beyond any use"
+        text += f" (uncertain {how}: few digits)" if unsure > _SEEN else ""
+    return f"{text}; ", float(hz[0]) if len(hz) else 0.0
 
 
 def _lowest(

@@ -28,6 +28,7 @@ from eigassign.mechanism.kinematics.rotations import vector
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
+LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs
 _SPELT = {1.0: "m", 1e-3: "mm", 0.0254: "inches"}
 
 
@@ -99,7 +100,7 @@ def _check_rigid(
     K: sparse.csr_array, N: Floats, path: str, fits: Callable[[float], bool], length: float
 ) -> None:
     """K N = 0, or MechanismError; ``fits``: whether positions times a factor make it so."""
-    if rigid_strain(K, N) <= STRAIN_FREE:
+    if (strain := rigid_strain(K, N)) <= STRAIN_FREE:
         return
     message = (
         "strains under rigid motion: the node positions or dof numbers do not fit the "
@@ -112,6 +113,11 @@ def _check_rigid(
             raise MechanismError(path, message + f"write units: {names}")
     if fits(1e-3):
         message += "; it does not with positions a thousandth as large: write 1 mm where that is so"
+    if strain < LITTLE:
+        message += (
+            f"; by {strain:.1g} it may be for few digits alone, as in single precision: export "
+            "double"
+        )
     raise MechanismError(path, message)
 
 
@@ -134,19 +140,24 @@ ROUNDED = 1e-6  # of the diagonal: files of six digits make eigenvalues that sma
 
 
 def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
-    lost = abs(A - A.T).max() if A.nnz else 0.0
-    # an asymmetry of 1e-8 is taken for round-off
-    if lost > 1e-8 * abs(A).max():
+    lost = abs(A - A.T).tocoo()
+    size = np.sqrt(np.maximum(A.diagonal(), 0.0))
+    # |A_ij| ≤ √(A_ii A_jj), and of that an asymmetry of 1e-8 is taken for round-off, as is what is
+    # lost in sums with the largest entry
+    room = 1e-8 * size[lost.row] * size[lost.col] + 1e-12 * abs(A).max()
+    if (lost.data > room).any():
         only = sparse.tril(A, -1).nnz == 0 or sparse.triu(A, 1).nnz == 0
         hint = (
             f"{name} holds one triangle only: say 'symmetric' in its header, or write both"
             if only
-            else f"entries differ by {lost:.3g}"
+            else f"entries differ by {lost.data.max():.3g}"
         )
         raise MechanismError(key, f"is not symmetric: {hint}")
     A = sparse.csr_array(0.5 * (A + A.T))
     if not is_semidefinite(A, ROUNDED):
         raise MechanismError(
-            key, "is not positive semidefinite: some motion would have negative energy"
+            key,
+            "is not positive semidefinite: some motion would have negative energy; is its file "
+            "whole, and of a stiffness or mass?",
         )
     return A

@@ -8,7 +8,7 @@ and ValueError or whatever its parser raises for what is damaged. Neither quotes
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -52,6 +52,15 @@ class Contents:
     matrices: Mapping[str, Callable[[], Matrix]] = field(default_factory=dict)
     places: Mapping[int, Floats] = field(default_factory=dict)  # (3,), NaN: in axes of its own
     labels: Ints | None = None  # of the rows of matrices that stand elsewhere
+
+
+def places_of(rows: Iterable[tuple[int, Floats]]) -> dict[int, Floats]:
+    """Places of nodes by number, NaN of one that stands at several."""
+    places: dict[int, Floats] = {}
+    for node, place in rows:
+        same = node not in places or (places[node] == place).all()
+        places[node] = place if same else np.full(3, np.nan)
+    return places
 
 
 def require_few(rows: int, entries: int) -> None:

@@ -19,9 +19,10 @@ from functools import partial
 import numpy as np
 
 from eigassign.mechanism.imports import entries
-from eigassign.mechanism.imports.entries import LABEL, Contents, Floats, Ints, Matrix, UnfitError
+from eigassign.mechanism.imports.entries import LABEL, Contents, Ints, Matrix, UnfitError
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LONGEST = 1000  # bytes of a line of an entry
 _COMMENTS = rb"\A(?:[ \t]*(?:\*[^\n]*)?\r?\n)*"
 _NEXT = rb"[ \t]*[, \t][ \t]*"
 _ENTRY = re.compile(
@@ -44,7 +45,8 @@ def read_entries(data: bytes) -> Contents | None:
 
     def matrix() -> Matrix:
         kinds = [*((f"i{k}", np.int64) for k in range(places)), ("value", np.float64)]
-        lines = io.BytesIO(data.replace(b",", b" "))
+        # of lines that are too long a piece, which has too many columns or too few
+        lines = iter(partial(io.BytesIO(data.replace(b",", b" ")).readline, _LONGEST), b"")
         read = np.loadtxt(lines, dtype=kinds, comments="*", ndmin=1)
         at = [read[f"i{k}"] for k in range(places)]
         if places == 4:
@@ -100,12 +102,18 @@ def read_labels(data: bytes) -> Contents | None:
     """The labels of the rows of a matrix, in their order; None of other files."""
     if _DOFS.match(data):
         pairs = [word.split(b".") for word in data.split()]
-        return Contents(labels=np.array([LABEL * int(n) + int(k) for n, k in pairs]))
+        return Contents(labels=_distinct([LABEL * int(n) + int(k) for n, k in pairs]))
     found = [(int(r), int(n), _FREEDOMS.index(k) + 1) for r, n, k in _MAPPED.findall(data)]
     if [row for row, *_ in found] != list(range(1, len(found) + 1)):
         raise ValueError("rows that are missing")
-    labels = np.array([LABEL * node + freedom for _, node, freedom in found])
+    labels = _distinct([LABEL * node + freedom for _, node, freedom in found])
     return Contents(labels=labels) if found else None
+
+
+def _distinct(labels: list[int]) -> Ints:
+    if len(set(labels)) < len(labels):
+        raise UnfitError("gives a freedom of a node to two rows")
+    return np.array(labels)
 
 
 def read_nodes(data: bytes) -> Contents | None:
@@ -113,10 +121,10 @@ def read_nodes(data: bytes) -> Contents | None:
     blocks = list(_NODES.finditer(data))
     if blocks and re.search(rb"^\*INSTANCE\b", data, re.M | re.I):
         raise UnfitError("moves parts (*INSTANCE): write an input file without parts, or a CSV")
-    places: dict[int, Floats] = {}
-    for block in blocks:
-        for line in block.group(1).split(b"\n"):
-            if words := line.replace(b",", b" ").split():
-                place = np.array([*map(float, words[1:4]), *[0.0] * (4 - len(words))])
-                places[int(words[0])] = place
+    lines = (line.replace(b",", b" ").split() for b in blocks for line in b.group(1).split(b"\n"))
+    places = entries.places_of(
+        (int(words[0]), np.array([*map(float, words[1:4]), *[0.0] * (4 - len(words))]))
+        for words in lines
+        if words
+    )
     return Contents(places=places) if blocks else None

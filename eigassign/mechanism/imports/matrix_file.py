@@ -1,4 +1,4 @@
-"""Matrix Market and NumPy's .npy and .npz: what SciPy and NumPy read, checked beforehand.
+"""Matrix Market, NumPy's .npy and .npz, tables: what SciPy and NumPy read, checked beforehand.
 
 Such files come from anywhere. Their size is bounded before they are read, what they say of their
 own size before it is believed, and the indices of sparse ones before anything is computed with
@@ -10,23 +10,53 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from math import prod
+from functools import partial
+from math import isqrt, prod
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from eigassign.files import MATRIX, how_to_raise, raised
-from eigassign.mechanism.imports.entries import COMPLEX, Contents, Matrix, UnfitError, require_few
+from eigassign.mechanism.imports.entries import (
+    COMPLEX,
+    ENTRIES,
+    Contents,
+    Matrix,
+    UnfitError,
+    require_few,
+)
 
 _NUMPY, _ZIP, _MARKET = b"\x93NUMPY", b"PK\x03\x04", b"%%matrixmarket"
+_BLANKS = bytes.maketrans(b",;", b"  ")
+_WIDEST = 26 * isqrt(ENTRIES)  # bytes of a line of as many numbers as rows can have
 _INDICES = {f"{name}.npy" for name in ("indices", "indptr", "row", "col", "offsets")}
 
 
 def read_numpy(data: bytes) -> Contents | None:
-    """The array of .npy, or the sparse matrix of ``scipy.sparse.save_npz``; None of other files."""
-    known = data.startswith((_NUMPY, _ZIP))
-    return Contents({"": lambda: Matrix(_of_numpy(data))}) if known else None
+    """The array of .npy, the sparse matrix of ``scipy.sparse.save_npz``, the arrays of ``savez``.
+
+    None of other files.
+    """
+    if not data.startswith((_NUMPY, _ZIP)):
+        return None
+    names = [""]
+    if data.startswith(_ZIP):
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = [name.removesuffix(".npy") for name in archive.namelist()]
+        names = [""] if "format" in names else names
+    return Contents({name: partial(_of_numpy, data, name) for name in names})
+
+
+def read_table(data: bytes) -> Contents | None:
+    """A full matrix in text, a row a line; None of what is no square of numbers."""
+    first = data[:_WIDEST].partition(b"\n")[0].translate(_BLANKS).split()
+    if not first or not all(map(_WORD.fullmatch, first)):
+        return None
+    if len(first) != sum(not line.isspace() for line in io.BytesIO(data)):
+        return None
+    lines = iter(partial(io.BytesIO(data.translate(_BLANKS)).readline, _WIDEST), b"")
+    return Contents({"": lambda: Matrix(np.loadtxt(lines, ndmin=2))})
 
 
 def read_matrix_market(data: bytes) -> Contents | None:
@@ -35,11 +65,11 @@ def read_matrix_market(data: bytes) -> Contents | None:
     return Contents({"": lambda: Matrix(_matrix_market(data))}) if known else None
 
 
-def _of_numpy(data: bytes) -> Any:
+def _of_numpy(data: bytes, name: str) -> Matrix:
     """The array, dense or sparse."""
     if data.startswith(_NUMPY):
         _require_room(io.BytesIO(data), len(data))
-        return np.load(io.BytesIO(data), allow_pickle=False)
+        return Matrix(np.load(io.BytesIO(data), allow_pickle=False))
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()
         if (size := sum(member.file_size for member in members)) > raised(MATRIX):
@@ -49,10 +79,12 @@ def _of_numpy(data: bytes) -> Any:
                 dtype = _require_room(stream, member.file_size)
             if member.filename in _INDICES and dtype.kind not in "iu":
                 raise ValueError("its indices are no whole numbers")
-    matrix = sparse.load_npz(io.BytesIO(data))
+    if name:
+        return Matrix(np.load(io.BytesIO(data), allow_pickle=False)[name])
+    matrix: Any = sparse.load_npz(io.BytesIO(data))
     if hasattr(matrix, "check_format"):
         matrix.check_format(full_check=True)
-    return matrix
+    return Matrix(matrix)
 
 
 def _require_room(stream: Any, size: int) -> np.dtype[Any]:
@@ -69,6 +101,8 @@ def _require_room(stream: Any, size: int) -> np.dtype[Any]:
     return dtype
 
 
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?"
+_WORD = re.compile(_NUMBER)
 # What SciPy's reader, which runs past the end of a number that breaks off, is shown of a file
 _BANNER = re.compile(
     rb"%%MatrixMarket[ \t]+matrix[ \t]+(coordinate|array)"
@@ -77,7 +111,6 @@ _BANNER = re.compile(
     rb"(?:[ \t]*(?:%[^\n]*)?\n)*[ \t]*(\d{1,9})[ \t]+(\d{1,9})(?:[ \t]+(\d{1,15}))?[ \t]*\r?\n",
     re.IGNORECASE,
 )
-_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?"
 _LINES = {
     layout: re.compile(rb"^(?!%s[ \t]*\r?$|%%|[ \t]*\r?$)" % line, re.MULTILINE)
     for layout, line in (

@@ -19,6 +19,7 @@ from eigassign.mechanism.imports import entries
 from eigassign.mechanism.imports.entries import LABEL, Cells, Contents, Floats, Matrix, UnfitError
 
 _LONGER = rb"[^\n]*\n?(?:(?:[*+,]|[ \t]+\S)[^\n]*\n?)*"  # a card goes on in lines without a name
+CARD = re.compile(rb"^([A-Z]\w*)" + _LONGER, re.MULTILINE | re.IGNORECASE)
 _DMIG = re.compile(rb"^DMIG\*?[ ,\t]*(\w+)" + _LONGER, re.MULTILINE | re.IGNORECASE)
 _GRID = re.compile(rb"^GRID(?:\*[^\n]*\n?(?:\*[^\n]*)?|[ ,\t][^\n]*)", re.MULTILINE | re.IGNORECASE)
 
@@ -29,19 +30,15 @@ def read_bulk(data: bytes) -> Contents | None:
     for card in _DMIG.finditer(data):
         cards[card.group(1).decode("ascii", "replace").upper()].append(card.group())
     matrices = {name: partial(_matrix, group) for name, group in cards.items()}
-    places: dict[int, Floats] = {}
-    for card in _GRID.finditer(data):
-        node, place = _grid(card.group())
-        same = node not in places or (places[node] == place).all()
-        places[node] = place if same else np.full(3, np.nan)
+    places = entries.places_of(_grid(card.group()) for card in _GRID.finditer(data))
     return Contents(matrices, places) if matrices or places else None
 
 
-def _fields(card: bytes) -> Cells:
+def fields_of(card: bytes) -> Cells:
     """The fields of a card behind its name, those that the last line leaves out too."""
     lines = (card.expandtabs(8) if b"\t" in card else card).rstrip().split(b"\n")
     if b"," in card:
-        rows = [[cell.strip() for cell in line.split(b",")[1:9]] for line in lines]
+        rows = [[cell.strip() for cell in line.split(b",", 9)[1:9]] for line in lines]
         return np.array([cell for row in rows for cell in (row + [b""] * 8)[:8]], dtype="S72")
     width = 16 if b"*" in lines[0][:8] else 8
     whole = b"".join(line.rstrip().ljust(72)[8:72] for line in lines if len(line) > 8)
@@ -50,10 +47,10 @@ def _fields(card: bytes) -> Cells:
 
 def _matrix(cards: list[bytes]) -> Matrix:
     """The cards of one matrix: a header, and a card for each column."""
-    headers = [card for card in cards if entries.wholes(_fields(card)[1:2])[0] == 0]
+    headers = [card for card in cards if entries.wholes(fields_of(card)[1:2])[0] == 0]
     if len(headers) != 1:
         raise UnfitError(f"has {len(headers)} headers of the matrix, expected one")
-    form, kind = entries.wholes(_fields(headers[0])[2:4]).tolist()
+    form, kind = entries.wholes(fields_of(headers[0])[2:4]).tolist()
     if kind in (3, 4):
         raise UnfitError(entries.COMPLEX)
     if form not in (1, 6):
@@ -63,7 +60,7 @@ def _matrix(cards: list[bytes]) -> Matrix:
     for card in cards:
         if card is headers[0]:
             continue
-        fields = _fields(card)
+        fields = fields_of(card)
         node, freedom = entries.wholes(fields[1:3]).tolist()
         groups = fields[4 : 4 + (len(fields) - 4) // 4 * 4].reshape(-1, 4)
         groups = groups[np.char.strip(groups[:, 0]) != b""]
@@ -80,7 +77,7 @@ def _matrix(cards: list[bytes]) -> Matrix:
 
 def _grid(card: bytes) -> tuple[int, Floats]:
     """Number and place; NaN where the place or the freedoms are in a system of their own."""
-    fields = _fields(card)
+    fields = fields_of(card)
     node, system, *_ = entries.wholes(fields[:2]).tolist()
     own = system or (entries.wholes(fields[5:6])[0] if len(fields) > 5 else 0)
     place = entries.reals(np.where(np.char.strip(fields[2:5]) == b"", b"0.", fields[2:5]))

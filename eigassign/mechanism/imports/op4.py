@@ -23,6 +23,7 @@ _HEAD = re.compile(
     re.MULTILINE,
 )
 _BIG = 65536  # what the length of a string is multiplied by
+_LINE = 80  # characters of a line of whole numbers, of which there are three at most
 _MARK = 24  # bytes of the first binary record: four whole numbers and a name
 
 
@@ -47,7 +48,7 @@ def _of_text(head: re.Match[bytes], body: bytes) -> Matrix:
         if b"." in line:
             lines.append(line)
             strings[-1][3] += -(-len(line.rstrip()) // width)
-        elif numbers := [int(word) for word in line.split()]:
+        elif numbers := [int(word) for word in line[:_LINE].split()]:
             match numbers:
                 case [column, _, _] if column > n:
                     break

@@ -22,7 +22,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError
 from eigassign.files import seen_from
-from eigassign.mechanism.imports.entries import LABEL, Contents, Floats, Ints, Matrix
+from eigassign.mechanism.imports.entries import LABEL, Contents, Floats, Ints, Matrix, places_of
 from eigassign.mechanism.imports.reading import matrix_of, read_contents
 
 IN_PLANE, ALL = (1, 2, 6), (1, 2, 3, 4, 5, 6)  # freedoms: u_x, u_y, u_z, θ_x, θ_y, θ_z
@@ -135,7 +135,9 @@ def _table(file: Path, key: str, length: float) -> Contents:
     own = [1.0 if table.dimensions.get(axis) == metre else length for axis in "xyz"]
     ids, x, y = (table.numbers[name] for name in ("id", "x", "y"))
     points = np.array([x, y, table.numbers.get("z", np.zeros(len(x)))]).T * own / length
-    return Contents(places={int(node): point for node, point in zip(ids, points, strict=True)})
+    if any(node % 1 for node in ids):
+        raise MechanismError(key, f"{file.name}: column id: expected whole numbers")
+    return Contents(places=places_of((int(n), x) for n, x in zip(ids, points, strict=True)))
 
 
 def _matrices(

@@ -6,7 +6,7 @@ Messages quote nothing of a file, which may be of another kind altogether.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from eigassign.case.rules.files import split_variable
+from eigassign.case.suggestions import listed, shown
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports import (
@@ -47,10 +48,11 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     keyword_lists.read_nodes,
     keyword_lists.read_entries,
     keyword_lists.read_labels,
+    matrix_file.read_table,
 )
 _KNOWN = (
     "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market, Harwell-Boeing), MATLAB or "
-    "NumPy"
+    "NumPy, nor a square table of numbers"
 )
 
 
@@ -86,7 +88,7 @@ def matrix_of(
     kind: str = "",
     alone: bool = True,
 ) -> Matrix:
-    """The matrix of that ``name``, or else of a ``kind``, K or M, by its first letter.
+    """The matrix of that ``name``, or else of a ``kind``: called K or M, or else beginning so.
 
     ``alone``: one that is alone in its file may have any name but one of the other kind.
 
@@ -96,10 +98,10 @@ def matrix_of(
     if contents is None:
         raise MechanismError(key, f"cannot read {file.name}: it is damaged, or no file of {_KNOWN}")
     found = contents.matrices
-    named = [n for n in found if (n == name if name else n.upper().startswith(kind))]
-    other = "KM".replace(kind, "") if kind else " "
+    named = [n for n in found if (n == name if name else kind in ("", kind_of(n)))]
+    named = [n for n in named if n.upper() == kind] or named
     if not name and not named and alone and len(found) == 1:
-        named = [n for n in found if not n.upper().startswith(other)]
+        named = [n for n in found if not kind_of(n)]
     if len(named) != 1:
         raise MechanismError(key, f"{file.name} {_missing(found, name, kind, len(named))}")
 
@@ -110,19 +112,26 @@ def matrix_of(
     return guarded(matrix, file, key)
 
 
-def _missing(found: Any, name: str, kind: str, count: int) -> str:
+def kind_of(name: str) -> str:
+    """K or M by the name of a matrix: KAAX, stiffness, MAAX, mass; nothing of others."""
+    own = name.upper()
+    return "K" if own.startswith(("K", "STIF")) else "M" if own.startswith("M") else ""
+
+
+def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
     if not found:
         return "holds no matrix"
+    names = listed(each or "one without a name" for each in found)
     if name:
-        return f"has no matrix {name!r}; there are {len(found)} others"
+        return f"has no matrix {shown(name)}; it has {names}"
     if count > 1 or kind == "":
-        return f"holds {len(found)} matrices: name one, as parts.mat:K does"
+        return f"holds {len(found)} matrices, {names}: name one, as parts.mat:K does"
     words = {"K": "stiffness", "M": "mass"}
-    have = [words[k] for k in "KM" if any(n.upper().startswith(k) for n in found)]
-    export = {"K": "KAAX", "M": "MAAX"}[kind]
+    have = [words[k] for k in map(kind_of, found) if k]
+    twin = next((f" ({kind}{n[1:]})" for n in found if re.fullmatch("[KM]AAX?", n)), "")
     return (
-        f"holds {have[0] if have else 'a matrix'}, no {words[kind]}: export {export} too, or name "
-        "stiffness and mass, a file each"
+        f"holds {have[0] if have else f'matrices, {names}'}, no {words[kind]}: export the "
+        f"{words[kind]}{twin} too, or name stiffness and mass, a file each"
     )
 
 

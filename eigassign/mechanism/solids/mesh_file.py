@@ -7,6 +7,8 @@ their size is bounded before they are read, and messages quote names of formats 
 
 from __future__ import annotations
 
+import io
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -18,14 +20,19 @@ from numpy.typing import NDArray
 
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
-from eigassign.mechanism.imports.entries import LARGEST
+from eigassign.mechanism.imports.entries import LARGEST, UnfitError
+from eigassign.mechanism.imports.nastran import CARD, fields_of
 from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+LONGEST = 10_000  # characters of a line: far more than a card or a name
 MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
 
 _MESH_WITH = "; mesh with tetrahedra of 10 nodes (or of 4), or hexahedra of 20"
+_ALONE = (
+    ", which is not read: save the elements alone; couplings, masses and springs stand in the case"
+)
 _EDGES = {  # of each kind, where a format has another order than Abaqus
     ("gmsh", 10): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
     ("gmsh", 20): (
@@ -57,10 +64,6 @@ class SolidMesh:
                 yield count, rows[k : k + max(most, 1)]
 
 
-class _UnfitError(Exception):
-    """The file is readable but its content is not what is wanted; begins with a verb."""
-
-
 @dataclass
 class _Raw:
     """What is collected while a file is read: nodes and elements by id, sets of node ids."""
@@ -81,7 +84,7 @@ def read_mesh(file: Path, key: str) -> SolidMesh:
     """
     try:
         return _read(read_bytes(file, MESH))
-    except (_UnfitError, UsageError) as error:
+    except (UnfitError, UsageError) as error:
         raise MechanismError(key, f"{file.name} {error}") from error
     except (OSError, MemoryError) as error:
         reason = getattr(error, "strerror", None) or "too large for this memory"
@@ -93,17 +96,19 @@ def read_mesh(file: Path, key: str) -> SolidMesh:
 
 @lru_cache(maxsize=4)  # a case reads its meshes for each model anew
 def _read(data: bytes) -> SolidMesh:
+    if any(len(line) > LONGEST for line in io.BytesIO(data)):
+        raise UnfitError(f"has a line of more than {LONGEST} characters, which no mesh has")
     head = data[:100_000].upper()
     if data.lstrip().startswith(b"$MeshFormat"):
         if b" 1 " in data.split(b"\n", 2)[1]:
-            raise _UnfitError("is binary: save it as ASCII (Mesh.Binary = 0)")
+            raise UnfitError("is binary: save it as ASCII (Mesh.Binary = 0)")
         raw, program = _gmsh(data.decode("utf-8", "replace")), "gmsh"
     elif re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
         raw, program = _abaqus(data.decode("utf-8", "replace")), "Abaqus"
     elif re.search(rb"^(BEGIN\s+BULK|GRID[ *,])", head, re.MULTILINE):
         raw, program = _nastran(data.decode("utf-8", "replace")), "Nastran"
     else:
-        raise _UnfitError(
+        raise UnfitError(
             "is no mesh that is known: expected gmsh's .msh (ASCII, 2.2 or 4.1), Abaqus' or "
             "CalculiX's .inp, or Nastran bulk data (.bdf)"
         )
@@ -113,17 +118,17 @@ def _read(data: bytes) -> SolidMesh:
 def _numbered(raw: _Raw, program: str) -> SolidMesh:
     """Nodes by place instead of id, and those within elements in one order."""
     if not raw.elements:
-        raise _UnfitError("has no solid elements" + _MESH_WITH)
+        raise UnfitError("has no solid elements" + _MESH_WITH)
     used = sorted({node for nodes in raw.elements.values() for node in nodes})
     if len(used) > raised(MOST):
         most = f"more than {raised(MOST):g} are not read; {how_to_raise(len(used), MOST)}"
-        raise _UnfitError(f"has {len(used)} nodes: {most}")
+        raise UnfitError(f"has {len(used)} nodes: {most}")
     place = {node: k for k, node in enumerate(used)}
     if missing := place.keys() - raw.nodes.keys():
-        raise _UnfitError(f"has elements with nodes that it does not define, as {min(missing)}")
+        raise UnfitError(f"has elements with nodes that it does not define, as {min(missing)}")
     x = np.array([raw.nodes[node] for node in used], dtype=np.float64)
     if not (np.abs(x) < LARGEST).all():
-        raise _UnfitError("has nodes at infinite places")
+        raise UnfitError("has nodes at infinite places")
     found = {}
     for count, kind in KINDS.items():
         own = {key: nodes for key, nodes in raw.elements.items() if len(nodes) == count}
@@ -150,7 +155,7 @@ def _checked(x: Floats, elements: Ints, count: int, ids: Sequence[int]) -> Ints:
         # an arc of a half circle bulges by half its chord; in a wrong order it is far more
         far = off > 0.6 * np.linalg.norm(ends[1] - ends[0], axis=1)
         if far.any():
-            raise _UnfitError(
+            raise UnfitError(
                 f"has an element, {ids[int(far.argmax())]}, whose middle nodes are not between "
                 "its corners: they are missing, or in another order than its format has"
             )
@@ -180,7 +185,7 @@ def _gmsh(text: str) -> _Raw:
     sections = dict(re.findall(r"^\$(\w+)\s*\n(.*?)^\$End\1", text, re.MULTILINE | re.DOTALL))
     version = sections["MeshFormat"].split()[0]
     if version not in ("2.2", "4.1"):
-        raise _UnfitError("is of a version of gmsh's format that is not read: save as 4.1 or 2.2")
+        raise UnfitError("is of a version of gmsh's format that is not read: save as 4.1 or 2.2")
     named = re.findall(r'^\s*(\d+)\s+(\d+)\s+"(.*)"', sections.get("PhysicalNames", ""), re.M)
     names = {(int(dim), int(tag)): name for dim, tag, name in named}
     raw = _Raw()
@@ -189,7 +194,7 @@ def _gmsh(text: str) -> _Raw:
         if kind in _GMSH:
             raw.elements[key] = nodes
         elif kind not in _GMSH_NODES:
-            raise _UnfitError(f"has {_GMSH_OTHER.get(kind, 'elements of high order')}{_MESH_WITH}")
+            raise UnfitError(f"has {_GMSH_OTHER.get(kind, 'elements of high order')}{_MESH_WITH}")
         for tag in tags:
             raw.add(names.get((dim, tag), str(tag)) if dim < 3 else "", nodes)
 
@@ -238,6 +243,7 @@ def _gmsh_4(
 # --- Abaqus and CalculiX
 
 _ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
+_JOINED = ("TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "KINEMATIC COUPLING", "CONTACT PAIR")
 _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
 
 
@@ -245,13 +251,18 @@ def _abaqus(text: str) -> _Raw:
     raw, groups = _Raw(), _Raw()
     blocks = list(_keywords(text))
     if sum(word == "PART" for word, _, _ in blocks) > 1:
-        raise _UnfitError("holds several parts: save the one part alone")
+        raise UnfitError("holds several parts: save the one part alone")
+    _require_one(
+        {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
+    )
     for word, options, lines in blocks:
         rows = [[entry.strip() for entry in line.split(",")] for line in lines]
         if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
-            raise _UnfitError("includes other files: save the mesh in one")
-        if word == "INSTANCE" and lines:
-            raise _UnfitError("moves or turns its part as an instance: save the part alone")
+            raise UnfitError("includes other files: save the mesh in one")
+        if word == "INSTANCE" and any(float(entry or 0.0) for entry in itertools.chain(*rows)):
+            raise UnfitError("moves or turns its part as an instance: save the part alone")
+        if word in _JOINED:
+            raise UnfitError(f"has *{word}{_ALONE}")
         if word == "NODE":
             for row in rows:
                 raw.nodes[int(row[0])] = (*(float(v or 0.0) for v in row[1:4]), 0.0, 0.0)[:3]
@@ -293,7 +304,7 @@ def _abaqus_elements(
     count = next((n for name, n in _ABAQUS.items() if re.fullmatch(f"{name}[A-Z]*", kind)), 0)
     if not count and not _FLAT.match(kind):
         named = "wedges" if kind.startswith(("C3D6", "C3D15")) else "elements"
-        raise _UnfitError(f"has {named} of type {kind[:12]!r}{_MESH_WITH}")
+        raise UnfitError(f"has {named} of type {kind[:12]!r}{_MESH_WITH}")
     entries = [[int(entry) for entry in row if entry] for row in rows]
     if count:
         flat = np.array([n for row in entries for n in row])  # an element may take several lines
@@ -324,7 +335,7 @@ def _members(groups: _Raw, rows: list[list[str]], generate: bool) -> set[int]:
 
 def _require_few(count: int) -> None:
     if count > 10 * raised(MOST):
-        raise _UnfitError(f"has a set of {count} members, more than it can have nodes")
+        raise UnfitError(f"has a set of {count} members, more than it can have nodes")
 
 
 def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[str]]) -> set[int]:
@@ -346,6 +357,7 @@ def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[s
 
 # --- Nastran bulk data
 
+_PASSED = ("CORD1R", "CORD2R", "CORD1C", "CORD2C", "CORD1S", "CORD2S")
 _NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
 _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
 
@@ -353,30 +365,42 @@ _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
 def _nastran(text: str) -> _Raw:
     start = re.search(r"^BEGIN\s+BULK.*$", text, re.MULTILINE | re.IGNORECASE)
     control, bulk = ("", text) if start is None else (text[: start.start()], text[start.end() :])
-    raw = _Raw()
+    raw, materials = _Raw(), set[str | None]()
     for number, members in re.findall(
         r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", control, re.MULTILINE | re.IGNORECASE
     ):
         raw.add(number, _listed(re.split(r"[,\s]+", members.strip())))
     for name, values in _cards(bulk):
         if name == "INCLUDE":
-            raise _UnfitError("includes other files: save the mesh in one")
+            raise UnfitError("includes other files: save the mesh in one")
         if name == "GRID":
             if values[1] not in ("", "0"):
-                raise _UnfitError("has nodes in a coordinate system of their own (CP): save in 0")
+                raise UnfitError("has nodes in a coordinate system of their own (CP): save in 0")
             x = [_real(value) for value in (*values[2:5], "", "", "")[:3]]
             raw.nodes[int(values[0])] = tuple(x)
         elif name in _NASTRAN:
             nodes = [int(value) for value in values[2:] if value]
             if (name, len(nodes)) not in (("CTETRA", 4), ("CTETRA", 10), ("CHEXA", 20)):
-                raise _UnfitError(f"has {name} of {len(nodes)} nodes{_MESH_WITH}")
+                raise UnfitError(f"has {name} of {len(nodes)} nodes{_MESH_WITH}")
             raw.elements[int(values[0])] = nodes
         elif name in _SURFACES:
             n = (4 if "QUAD" in name else 3) * (2 if name in ("CTRIA6", "CQUAD8") else 1)
             raw.add(f"pid {int(values[1])}", (int(v) for v in values[2 : 2 + n] if v))
         elif name == "SET1":
             raw.add(values[0], _listed(values[1:]))
+        elif name == "PSOLID":
+            materials.add(values[1])
+        elif name not in _PASSED and re.match(r"C[A-Z]|RB[AE]|RROD|RTRPLT|MPC", name):
+            raise UnfitError(f"has {name[:8]}{_ALONE}")
+    _require_one(materials)
     return raw
+
+
+def _require_one(materials: set[str | None]) -> None:
+    if len(materials) > 1:
+        raise UnfitError(
+            f"is of {len(materials)} materials: save a mesh of each, a link of its own"
+        )
 
 
 def _listed(entries: Iterable[str]) -> set[int]:
@@ -395,28 +419,11 @@ def _listed(entries: Iterable[str]) -> set[int]:
 
 
 def _cards(bulk: str) -> Iterator[tuple[str, list[str]]]:
-    """Name and fields of each card, continuations joined; small, large and free fields."""
-    name, fields, wide = "", list[str](), False
-    for line in bulk.splitlines():
-        line = line.split("$", 1)[0].expandtabs(8).rstrip()
-        if not line or line.upper().startswith("ENDDATA"):
-            continue
-        if "," in line:
-            parts = [part.strip() for part in line.split(",")]
-            head, own = parts[0], parts[1:9]
-            own += [""] * (8 - len(own))
-        else:
-            head, wide = line[:8].strip(), "*" in line[:8]
-            width = 16 if wide else 8
-            own = [line[k : k + width].strip() for k in range(8, 72, width)]
-        if head and head[0] not in "+*":
-            if name:
-                yield name, fields
-            name, fields = head.rstrip("*").upper(), own
-        else:
-            fields += own
-    if name:
-        yield name, fields
+    """Name and fields of each card, without comments."""
+    lines = (line.split("$", 1)[0].rstrip() for line in bulk.splitlines())
+    for card in CARD.finditer("\n".join(filter(None, lines)).encode("ascii", "replace")):
+        own = (cell.decode().strip() for cell in fields_of(card.group()).tolist())
+        yield card.group(1).decode().upper(), list(own)
 
 
 def _real(value: str) -> float:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.case.suggestions import listed, shown
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.imports.parts import UNITS
@@ -38,6 +39,7 @@ from eigassign.mechanism.solids.surfaces import (
     centre,
     free_directions,
     joined,
+    pieces,
     rigid_rows,
 )
 
@@ -48,6 +50,7 @@ SEVERAL = 50_000  # unknowns above which a factor may take half a minute and a G
 AT_ONCE = 2_000_000  # numbers that are held at a time: strains, entries of elements' matrices
 # Volume of an element at a point, of the box of its edges, that is none: files have few digits
 FLAT = 1e-9
+HUGE = 1e4  # m³, a cube of 21 m; a part of 10 cm³ has that in mm that are read as m
 FOLDED = (
     "has elements that are folded, or have no volume (their Jacobian is not positive at a point of "
     "integration): make the mesh finer where its surface is curved, or its elements straight (in "
@@ -120,8 +123,8 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
     for name, node in link.nodes.items():
         own = mesh.sets.get(node.surface, known.get(node.surface.upper()))
         if own is None:
-            named = ", ".join(mesh.sets) or "none: name surfaces in the program that meshes"
-            message = f"the mesh has no surface {node.surface!r}; it has {named}"
+            named = listed(mesh.sets) if mesh.sets else "none: name them in the program that meshes"
+            message = f"the mesh has no surface {shown(node.surface)}; it has {named}"
             raise MechanismError(f"{path}.nodes.{name}.surface", message)
         place = centre(mesh, own)
         if node.position is not None:
@@ -137,12 +140,23 @@ def _sound(mesh: SolidMesh, factor: float, path: str) -> SolidMesh:
     if not length.smallest < far < length.largest:
         message = f"has nodes {far:.3g} m from its origin: is it damaged, or in other units?"
         raise MechanismError(f"{path}.mesh", message)
-    found = mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x)
+    found, volume = mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x), 0.0
     for count, rows in found.elements.items():
-        for xi in (KINDS[count].points, KINDS[count].heavy[0]):
+        for xi, weights in ((KINDS[count].points, 0.0), KINDS[count].heavy):
             J = jacobians(found.x[rows], count, xi)
-            if (np.linalg.det(J) <= FLAT * np.linalg.norm(J, axis=3).prod(axis=2)).any():
+            det = np.linalg.det(J)
+            if (det <= FLAT * np.linalg.norm(J, axis=3).prod(axis=2)).any():
                 raise MechanismError(f"{path}.mesh", FOLDED)
+            volume += float((det * weights).sum())
+    if (count := pieces(found)) > 1:
+        message = (
+            f"is in {count} pieces that share no nodes: join its volumes where it is meshed (in "
+            "gmsh BooleanFragments), or make a link of each"
+        )
+        raise MechanismError(f"{path}.mesh", message)
+    if volume > HUGE:
+        message = f"is a part of {volume:.3g} m3: if it is in mm, write units: mm-t-s or mm-kg-ms"
+        raise MechanismError(f"{path}.mesh", message)
     return found
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import qr
+from scipy.sparse.csgraph import connected_components
 
 from eigassign.mechanism.solids.elements import KINDS, jacobians, shapes
 from eigassign.mechanism.solids.mesh_file import SolidMesh
@@ -182,6 +183,17 @@ def _followers(mesh: SolidMesh, name: str, each: Coupling) -> _Followers:
     six, rest = np.sort(order[:6]), np.sort(order[6:])
     inverse = np.linalg.inv(B[:, six])
     return _Followers(dofs[six], dofs[rest], np.hstack([inverse, -inverse @ B[:, rest]]))
+
+
+def pieces(mesh: SolidMesh) -> int:
+    """How many parts of a mesh share no node."""
+    pairs = [
+        (np.repeat(e[:, :1], e.shape[1] - 1), e[:, 1:].ravel()) for e in mesh.elements.values()
+    ]
+    rows, columns = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    n = len(mesh.x)
+    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+    return int(connected_components(graph, directed=False)[0])
 
 
 def rigid_rows(arms: Floats) -> Floats:

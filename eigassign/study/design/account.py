@@ -17,7 +17,7 @@ from eigassign.assignment.exact.sequential import OPTIMAL, End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
-from eigassign.study.accuracy import model_errors
+from eigassign.study.accuracy import finer, model_errors, raised_by
 from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
@@ -49,7 +49,6 @@ EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
 CROSSED = 0.9  # of a gap, missed where both modes go through each other
 UNTRUSTED = "the error of the expansion is above validation.max_error"
-FINER = "give the links more elements, raise reduce_to, or write auto for them"
 
 
 def assignment_row(
@@ -93,7 +92,7 @@ def assignment_row(
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
     aim = None if found is None else aim_row(scene, found, wanted, of_model)
-    undecided = dict(_undecided(targets, exact, of_model, largest))
+    undecided = dict(_undecided(scene, targets, exact, of_model, largest))
     beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
     doubts = [] if trusted else [UNTRUSTED]
     judged = judged_modes(scene.file, targets)
@@ -111,9 +110,13 @@ def assignment_row(
             robust=answer.robust is not None,
             doubts=doubts,
             unproved=(
-                *_too_coarse(targets, exact, of_model, largest, answer.robust is not None),
+                *_too_coarse(scene, targets, exact, of_model, largest, answer.robust is not None),
                 *_missed_between(scene, designs, targets, largest),
-                *(f"{each}: {FINER}" for y in designs for each in _too_stiff(scene, y)),
+                *(
+                    f"{each}: {finer(scene.model)}"
+                    for y in designs
+                    for each in _too_stiff(scene, y)
+                ),
                 *((f"not clear, as far as is checked: {'; '.join(unproved)}",) * bool(unproved)),
             ),
             unreachable=beyond,
@@ -260,6 +263,7 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
 
 
 def _too_coarse(
+    scene: Scene,
     targets: Sequence[TargetStudy],
     exact: Solved,
     of_model: Mapping[int, float],
@@ -279,16 +283,20 @@ def _too_coarse(
             worst, label, raised = max((worst, label, raised), (stake, target.label, too_high))
     if worst <= accepted:
         return
-    how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by an unknown amount"
     missed = f", so that it may be missed by {100 * worst:.3g} %" if np.isfinite(raised) else ""
     yield (
-        f"{label}: mesh and reduced links raise the frequencies {how}{missed}; accepted are "
-        f"{100 * accepted:.3g} %. {capital(FINER)}"
+        f"{label}: mesh and reduced links raise the frequencies "
+        f"{raised_by(scene.model, raised)}{missed}; accepted are {100 * accepted:.3g} %. "
+        f"{capital(finer(scene.model))}"
     )
 
 
 def _undecided(
-    targets: Sequence[TargetStudy], exact: Solved, of_model: Mapping[int, float], accepted: float
+    scene: Scene,
+    targets: Sequence[TargetStudy],
+    exact: Solved,
+    of_model: Mapping[int, float],
+    accepted: float,
 ) -> Iterator[tuple[str, str]]:
     """Yield the targets that are missed by less than mesh and reduced links may raise their modes.
 
@@ -303,11 +311,10 @@ def _undecided(
         if least > (accepted if target.asked.is_goal else MET):
             continue
         missed = target.error.exact.max_relative
-        how = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "an unknown amount"
         yield (
             target.label,
             f"{target.label}: missed by {100 * missed:.3g} %, and mesh and reduced links raise the "
-            f"frequencies by {how}. {capital(FINER)}",
+            f"frequencies {raised_by(scene.model, too_high)}. {capital(finer(scene.model))}",
         )
 
 
@@ -321,10 +328,10 @@ def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
         if not of_model.clear:
             yield row.label
             continue
-        how = "an unknown amount" if row.raised is None else f"up to {_percent(row.raised)}"
+        how = raised_by(scene.model, np.inf if row.raised is None else row.raised)
         yield (
             f"{row.label} (the model is clear by {_percent(of_model.room)}, but mesh and reduced "
-            f"links raise the mode above the band by {how}: {FINER})"
+            f"links raise the mode above the band {how}: {finer(scene.model)})"
         )
 
 

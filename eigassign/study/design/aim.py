@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.study.accuracy import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found
@@ -52,8 +53,7 @@ def aim_row(
         if asked.trajectory:
             where = f" along {asked.trajectory!r}"
         if (too_high := of_model[asked.mode]) > WITHIN:
-            said = f"up to {100 * too_high:.2g} %" if np.isfinite(too_high) else "an unknown amount"
-            kept += f"; mesh and reduced links raise it by {said}"
+            kept += f"; mesh and reduced links raise it {raised_by(scene.model, too_high)}"
         return _in_words(row, f"mode {asked.mode} is at least {row.after}{where}", kept)
     if aim == "widest":
         before, after = (min(_rooms(found, wanted, y)) for y in designs)

@@ -49,7 +49,8 @@ def anatomies(
             for key in dict.fromkeys((*strain, *kinetic))
         )
         rows = [EffectRow(name, path, *row(values)) for path, values in effects.items()]
-        rows.sort(key=lambda one: -abs(one.percent_per_percent))
+        # to six digits, so that round-off does not decide which of two alike stands first
+        rows.sort(key=lambda one: -float(f"{abs(one.percent_per_percent):.5e}"))
         yield ModeAnatomy(name, parts, tuple(rows))
 
 

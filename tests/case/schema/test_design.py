@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -242,6 +243,48 @@ def test_tables_of_choices_that_make_no_sense_are_refused_with_their_line(
     with pytest.raises(CaseError) as error:
         parse(text.encode(), tmp_path / "case.yaml")
     assert any(one in str(error.value) for one in expected.split("|"))
+
+
+PROFILES = "profile, area [cm2], bending_inertia [cm4], price\nflat, 4, 2, 5\nI80, 7.6, 80, 9\n"
+
+
+def with_profile(folder: Path, table: str, name: str = "I80") -> CaseFile:
+    (folder / "own.csv").write_text(table)
+    text = re.sub(r"bar: \{.*\}", f"bar: {{file: own.csv, name: {name}}}", edited(D, D))
+    assert accepts(SCHEMA, read_yaml(text.encode(), "case.yaml").tree)
+    return parse(text.encode(), folder / "case.yaml")
+
+
+def test_a_section_is_a_line_of_a_table_of_profiles(tmp_path: Path) -> None:
+    case = with_profile(tmp_path, PROFILES)
+    bar = case.mechanism.sections["bar"]
+    assert (bar.area, bar.bending_inertia) == pytest.approx((7.6e-4, 8e-7))
+    assert list(case.files) == ["own.csv"]
+    assert read(case.resolved()) == case
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("I80", "I90", "sections.bar.name: unknown profile 'I80'; did you mean 'I90'?; known"),
+        ("[cm4]", "[mm]", "sections.bar.file: own.csv:1: column bending_inertia: [mm] is no unit"),
+        ("price", "weight", "sections.bar has no property 'weight'"),
+    ],
+)
+def test_profiles_that_make_no_sense_are_refused(
+    tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    with pytest.raises(CaseError) as error:
+        with_profile(tmp_path, PROFILES.replace(old, new))
+    (problem,) = error.value.problems
+    assert expected in str(problem)
+
+
+@pytest.mark.parametrize("shape", ["angle", "channel", "l_profile", "UPN80", "u_profile", "T"])
+def test_sections_that_twist_under_their_load_are_refused_with_the_reason(shape: str) -> None:
+    text = re.sub(r"bar: \{.*\}", f"bar: {{shape: {shape}, height: 60 mm}}", edited(D, D))
+    with pytest.raises(CaseError, match=r"shear centre is not its centroid\).*type solid"):
+        read(text)
 
 
 def test_a_table_of_choices_lies_in_the_folder_of_the_case(tmp_path: Path) -> None:

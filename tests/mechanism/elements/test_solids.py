@@ -16,7 +16,7 @@ from solid_parts import METAL, Bar, bar, bdf, case, inp, msh
 import eigassign
 import eigassign as ea
 from eigassign.errors import CaseError, MechanismError, MissingMassError
-from eigassign.mechanism import Coupling, joined, read_mesh, solid_part
+from eigassign.mechanism import Coupling, joined, part_lines, read_mesh, solid_part
 from eigassign.study import load_case
 
 # Hz, of the bar with rigid ends, one of them fixed: bending in its flat and its upright plane
@@ -191,6 +191,17 @@ WRONG = {
     ),
     "wedges of Nastran": ("BEGIN BULK\nCPENTA,1,1,1,2,3,4,5,6\n", "CPENTA of 6 nodes"),
     "own axes": ("BEGIN BULK\nGRID,1,5,0.,0.,0.\n", "coordinate system of their own"),
+    "one line": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n" + 9999 * "1,", "a line of more than"),
+    "tied": ("*NODE\n1,0,0,0\n*TIE, NAME=a\nb,c\n", r"has \*TIE, which is not read"),
+    "moved": ("*INSTANCE, NAME=a, PART=b\n0.,1.,0.\n*NODE\n1,0,0,0\n", "moves or turns its part"),
+    "left where it is": ("*INSTANCE, NAME=a, PART=b\n0.,0.,0.\n*NODE\n1,0,0,0\n", "no solid elem"),
+    "two metals": (
+        "*SOLID SECTION, MATERIAL=a\n*SOLID SECTION, MATERIAL=b\n*NODE\n1,0,0,0\n",
+        "is of 2 materials",
+    ),
+    "two metals of Nastran": ("BEGIN BULK\nPSOLID,1,1\nPSOLID,2,7\n", "is of 2 materials"),
+    "heavy point": ("BEGIN BULK\nCONM2,1,1,0,5.0\n", "has CONM2, which is not read"),
+    "coupled": ("BEGIN BULK\nRBE2,1,1,123,2\n", "has RBE2, which is not read"),
     "huge set": ("*NODE\n1,0,0,0\n*NSET, NSET=a, GENERATE\n1,99999999999\n", "more than it can"),
 }
 
@@ -234,25 +245,66 @@ def test_meshes_without_volume_or_of_any_size_are_refused_and_no_crash(tmp_path:
     x, corners = part.x.copy(), part.elements[3, :2]
     x[corners[1]] = x[corners[0]]
     spoiled = [(x, "have no volume"), (1e-12 * part.x, "from its origin: is it damaged")]
+    spoiled += [(1e3 * part.x, "is a part of 2.4e.05 m3: .* units: mm-t-s")]
     spoiled += [(np.where(part.x > 0.39, far, part.x), "has nodes") for far in (1e300, 1e7)]
     for _ in range(16):
         x = part.x.copy()
         x[rng.integers(len(x), size=4), rng.integers(3, size=4)] *= 10.0 ** rng.uniform(-300, 300)
-        spoiled.append((x, "has (nodes|elements) "))
+        spoiled.append((x, "has (nodes|elements) |is a part"))
     for places, why in spoiled:
         try:
             ea.load_case(case(tmp_path, part._replace(x=places)), allow_outside=True).model()
         except CaseError as error:
             assert re.search(why, str(error))  # noqa: PT017
         else:
-            assert why == "has (nodes|elements) "
+            assert why == "has (nodes|elements) |is a part"
+
+
+def test_names_of_surfaces_are_quoted_in_few_words(tmp_path: Path) -> None:
+    part = bar((2, 1, 1), 4)
+    long = {f"{k}{'x' * 5000}": part.sets["root"] for k in range(50)}
+    with pytest.raises(CaseError, match=r"has no surface 'tip'; it has 0xxx.*…, …$") as caught:
+        ea.load_case(
+            case(tmp_path, part._replace(sets={**long, "root": part.sets["root"]})),
+            allow_outside=True,
+        ).model()
+    assert len(str(caught.value)) < 2000
+
+
+def test_a_mesh_in_pieces_is_told(tmp_path: Path) -> None:
+    one = bar((2, 1, 1), 10)
+    n = len(one.x)
+    x = np.vstack([one.x, one.x + np.array([0.4, 0.0, 0.0])])  # they touch, and share no node
+    elements = np.vstack([one.elements, one.elements + n])
+    with pytest.raises(CaseError, match="mesh: is in 2 pieces that share no nodes"):
+        ea.load_case(case(tmp_path, Bar(x, elements, one.sets)), allow_outside=True).model()
+
+
+def test_a_carriage_on_a_solid_is_told_that_it_rides_on_beams(tmp_path: Path) -> None:
+    given = case(tmp_path, bar((2, 1, 1), 10), reduce_to="5 kHz")
+    given["mechanism"]["links"]["cart"] = {"type": "rigid", "mass": 1.0}
+    ride = {"type": "carriage", "base": "bar", "follower": "cart.start"}
+    given["mechanism"]["joints"]["ride"] = ride
+    given["coordinates"]["s"] = {"joint": "ride", "drive": "locked"}
+    with pytest.raises(CaseError, match="rides along a link of type beam") as caught:
+        ea.load_case(given, allow_outside=True)
+    assert "cannot be reduced" not in str(caught.value)
+
+
+def test_a_node_far_from_its_part_is_doubted(tmp_path: Path) -> None:
+    given = case(tmp_path, bar((2, 1, 1), 10))
+    (solid,) = (own for own in given["mechanism"]["links"].values() if own["type"] == "solid")
+    for place, said in (([0.4, 5.0, 0.0], True), ([0.4, 0.5, 0.0], False)):
+        solid["nodes"]["end"]["position"] = place
+        lines = part_lines(ea.load_case(given, allow_outside=True).file)
+        assert ("see the positions and their units" in "".join(lines)) == said
 
 
 @pytest.mark.parametrize("reduce_to", [4e3, "auto", 1e9])
 def test_a_solid_without_mass_is_told(tmp_path: Path, reduce_to: Any) -> None:
     given = case(tmp_path, bar((8, 1, 1), 10), reduce_to=reduce_to)
     given["mechanism"]["materials"]["metal"] = METAL | {"density": 0.0}
-    with pytest.raises(MissingMassError, match="only 0 modes whose mass is more"):
+    with pytest.raises(MissingMassError, match="only 0 modes whose mass"):
         ea.load_case(given, allow_outside=True).model().frequencies([0.0], [], 1)
 
 

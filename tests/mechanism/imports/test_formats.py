@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported
 from scipy import sparse
-from scipy.io import mmwrite
+from scipy.io import hb_write, mmwrite
 from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from writers import (
@@ -118,9 +118,25 @@ def of_matlab73(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> T
     return {"file": "part.mat", "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
 
 
+def of_numpy(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
+    """As ``np.savez`` has them, with another matrix whose name begins like that of the mass."""
+    np.savez(folder / "part.npz", K=K, M=M, modes=np.ones((3, 3)))
+    texts(folder, p_dof=dofs(labels), nodes_csv=CSV)
+    return {"file": "part.npz", "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
+
+
+def of_tables(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
+    """Full, as spreadsheets write them, and with blanks."""
+    np.savetxt(folder / "K.csv", K, delimiter=",")
+    np.savetxt(folder / "M.txt", M)
+    texts(folder, p_dof=dofs(labels), nodes_csv=CSV)
+    files = {"stiffness": "K.csv", "mass": "M.txt"}
+    return {**files, "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
+
+
 WRITERS: tuple[Writer, ...] = (
     of_dmig, of_op4, of_op4_binary, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
-    of_matlab73,
+    of_matlab73, of_numpy, of_tables,
 )  # fmt: skip
 
 
@@ -195,6 +211,23 @@ def test_dmig_between_commas(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("rhs", "e"), [(False, "E"), (True, "D")])
 def test_harwell_boeing(tmp_path: Path, K: np.ndarray, rhs: bool, e: str) -> None:
     same(tmp_path / "K.hb", K, harwell_boeing(K, rhs, e))
+
+
+def test_harwell_boeing_of_scipy_has_narrower_columns_than_it_says(
+    tmp_path: Path, K: np.ndarray
+) -> None:
+    hb_write(tmp_path / "K.hb", sparse.csc_array(K))
+    found = read_matrix(tmp_path / "K.hb", "key").toarray()
+    np.testing.assert_allclose(found, K, rtol=1e-15)
+
+
+def test_a_line_without_end_is_refused_in_little_memory(tmp_path: Path) -> None:
+    (tmp_path / "K.mtx").write_text(5_000_000 * "\t1" + "\n")
+    tracemalloc.start()
+    with pytest.raises(MechanismError, match="cannot read"):
+        read_matrix(tmp_path / "K.mtx", "key")
+    assert tracemalloc.get_traced_memory()[1] < 60_000_000
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from test_formats import (
     BY_ID,
+    CSV,
     IDS,
     PLACES,
     labels_of,
@@ -112,6 +113,27 @@ def test_a_part_of_half_a_kilometre_and_grams_is_doubted(tmp_path: Path, units: 
     assert "write units" not in "".join(lines(tmp_path, {**link, "units": units}, "planar"))
 
 
+def test_a_part_that_rings_faster_than_any_metal_is_doubted(tmp_path: Path) -> None:
+    """In kg, ms and kN what is in t, s and N: a thousand times as fast, and nothing strains."""
+    link = of_dmig(tmp_path, *in_units("spatial", *SYSTEMS["mm-t-s"]), labels_of("spatial"))
+    rows = "".join(f"{n},{1e3 * x!r},0,0\n" for n, (x, *_) in PLACES.items())
+    texts(tmp_path, nodes_csv=f"id,x,y,z\n{rows}")
+    link |= {"nodes_file": "nodes.csv"}
+    assert "write units: mm-t-s" in lines(tmp_path, {**link, "units": "mm-kg-ms"})[-1]
+    assert "write units" not in "".join(lines(tmp_path, {**link, "units": "mm-t-s"}))
+
+
+def test_few_digits_and_weak_supports_are_told(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    for share, said in ((5e-6, "for few digits alone"), (3.5e-6, "3 expected: is it supported")):
+        held = K.copy()
+        held[0, 0] *= 1.0 + share
+        link = of_calculix(tmp_path, held, M, labels_of("planar"))
+        strains = share > 4e-6
+        found = refusal if strains else lambda *given: lines(*given)[1]
+        assert said in found(tmp_path, link, "planar")
+
+
 # What check says
 
 
@@ -204,6 +226,25 @@ def test_a_node_without_a_place_is_told(tmp_path: Path) -> None:
     assert "no place of node 1000 is in the files: write its position" in refusal(tmp_path, link)
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("nodes.csv", f"{IDS[-1]},", f"{IDS[-1]}.5,", "column id: expected whole numbers"),
+        ("nodes.csv", "0\n", f"0\n{IDS[0]},7,0,0\n", f"node {IDS[0]} stands at several places"),
+        ("p.dof", f"{IDS[0]}.2\n", f"{IDS[0]}.1\n", "gives a freedom of a node to two rows"),
+        ("nodes.csv", CSV, "17.999\n18.1\n", "the first line must be a header, such as id"),
+    ],
+)  # fmt: skip
+def test_slips_in_files_about_nodes_are_told(
+    tmp_path: Path, file: str, old: str, new: str, said: str
+) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    text = (tmp_path / file).read_text()
+    assert old in text
+    (tmp_path / file).write_text(text.replace(old, new, 1))
+    assert said in refusal(tmp_path, link)
+
+
 @pytest.mark.parametrize("field", [1, 5])
 def test_a_grid_point_with_axes_of_its_own_is_told(tmp_path: Path, field: int) -> None:
     of_dmig(tmp_path, *exported("spatial"), labels_of("spatial"))
@@ -223,8 +264,11 @@ def test_rows_that_nobody_names_are_told(tmp_path: Path) -> None:
     assert "names 53 rows; the matrices have 54" in refusal(tmp_path, link)
 
 
-@pytest.mark.parametrize("named", ["part.pch", "part.op4", "part.bin", "part.mtx"])
-def test_a_missing_mass_is_told(tmp_path: Path, named: str) -> None:
+@pytest.mark.parametrize(
+    ("named", "twin"),
+    [("part.pch", " (MAAX)"), ("part.op4", " (MAA)"), ("part.bin", " (MAA)"), ("part.mtx", "")],
+)
+def test_a_missing_mass_is_told(tmp_path: Path, named: str, twin: str) -> None:
     K, M = exported("spatial")
     of_substructure(tmp_path, K, M, labels_of("spatial"))
     half = (tmp_path / "part.mtx").read_text().partition("*MATRIX,TYPE=MASS")[0]
@@ -232,7 +276,7 @@ def test_a_missing_mass_is_told(tmp_path: Path, named: str) -> None:
           part_op4=op4_text("KAA", K, "sparse"), part_mtx=half)  # fmt: skip
     (tmp_path / "part.bin").write_bytes(op4_binary("KAA", K, "dense"))
     message = refusal(tmp_path, {"file": named, "nodes": BY_ID})
-    assert f"{named} holds stiffness, no mass: export MAAX too" in message
+    assert f"{named} holds stiffness, no mass: export the mass{twin} too" in message
 
 
 def test_two_files_that_are_exchanged_are_told(tmp_path: Path) -> None:
@@ -247,9 +291,15 @@ def test_one_of_several_matrices_is_named(tmp_path: Path) -> None:
     K, M = exported("spatial")
     matlab(tmp_path / "part.mat", {"K1": K, "K2": K, "M": M}, "5")
     link = {"file": "part.mat", "nodes": BY_ID}
-    assert "holds 3 matrices: name one, as parts.mat:K does" in refusal(tmp_path, link)
+    said = "holds 3 matrices, K1, K2, M: name one, as parts.mat:K does"
+    assert said in refusal(tmp_path, link)
     link = {"stiffness": "part.mat:K3", "mass": "part.mat:M", "nodes": BY_ID}
-    assert "has no matrix 'K3'" in refusal(tmp_path, link)
+    assert "has no matrix 'K3'; it has K1, K2, M" in refusal(tmp_path, link)
+    matlab(tmp_path / "part.mat", {"stiffness": K, "mass_1": M, "mass_2": M}, "5")
+    assert "K1" not in refusal(tmp_path, {"file": "part.mat", "nodes": BY_ID})
+    assert "3 matrices, stiffness, mass_1" in refusal(
+        tmp_path, {"file": "part.mat", "nodes": BY_ID}
+    )
 
 
 def test_labels_of_one_of_both_are_told(tmp_path: Path) -> None:
@@ -283,6 +333,22 @@ def test_an_asymmetric_matrix_is_told(tmp_path: Path, write: Any) -> None:
     with open(file, "a") as stream:
         stream.write(more[file.name])
     assert "is not symmetric: entries differ by" in refusal(tmp_path, link)
+
+
+def test_a_list_that_was_cut_short_is_doubted(tmp_path: Path) -> None:
+    link = of_calculix(tmp_path, *exported("spatial"), labels_of("spatial"))
+    rows = (tmp_path / "p.sti").read_text().splitlines(keepends=True)
+    (tmp_path / "p.sti").write_text("".join(rows[: 2 * len(rows) // 3]))
+    assert "is its file whole" in refusal(tmp_path, link)
+
+
+def test_an_asymmetry_is_told_by_its_own_rows(tmp_path: Path) -> None:
+    """Of an entry that is ten thousand times as small as the largest, a fraction."""
+    K, M = exported("spatial")
+    link = of_calculix(tmp_path, K, M, labels_of("spatial"))
+    M[tuple(np.argwhere(np.triu(np.abs(M) > 0.0, 1) & (np.abs(M) < 1e-4 * M.max()))[0])] *= 1.00005
+    np.save(tmp_path / "M.npy", M)
+    assert "is not symmetric: entries differ by" in refusal(tmp_path, {**link, "mass": "M.npy"})
 
 
 @pytest.mark.parametrize(
