@@ -221,7 +221,7 @@ class _State:
 
 def polish(scaled: ScaledProgram, x: Floats) -> Polished:
     """Refine a nearly feasible x to the optimum (nearest to 0, if there are several)."""
-    values, rows = np.linalg.svd(scaled.A)[1:]
+    values, rows = np.linalg.svd(scaled.A, full_matrices=False)[1:]
     rank = int(np.sum(values > RANK * np.max(values, initial=0.0)))
     x, mu = solve_active_set(scaled, x)
     if rank < x.size:

@@ -13,7 +13,7 @@ from typing import Any
 from eigassign.batch.limits import OutOfTimeError, limited
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
 from eigassign.case.loading import Unchecked, checked, read
-from eigassign.errors import CaseError, EigassignError, Problem, UsageError
+from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
 from eigassign.output.batch.outcome import (
     OUTCOME,
     CaseOutcome,
@@ -55,13 +55,18 @@ class CaseOptions:
 def check_cases(
     variants: Sequence[Variant], options: CaseOptions
 ) -> list[tuple[int, tuple[Problem, ...]]]:
-    """The index of every variant that is no valid case, and what is wrong with it."""
+    """The index of every variant that is no valid case, and what is wrong with it.
+
+    Raises StorageError where a file of one cannot be read.
+    """
     found = []
     for variant in variants:
         try:
             load(variant, options)
         except CaseError as error:
             found.append((variant.index, error.problems))
+        except StorageError:
+            raise
         except EigassignError as error:
             found.append((variant.index, (Problem(variant.path, 0, 0, "", str(error)),)))
     return found

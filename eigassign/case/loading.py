@@ -38,7 +38,7 @@ from eigassign.case.schema.parts import FrozenDict
 from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.case.values import with_values
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
-from eigassign.files import CASE, file_digest, read_bytes, seen_from
+from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
 
 NO_VALUES: Mapping[str, object] = FrozenDict()
 MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
@@ -202,6 +202,14 @@ def _in_degrees(source: Source, data: bytes) -> bool:
 
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
-    """SHA-256 of each file, by its name as seen from ``folder``; of none that cannot be read."""
-    digests = {each.file: file_digest(each.file, each.limit) for each in named}
-    return {seen_from(folder, file): sha for file, sha in digests.items() if sha is not None}
+    """SHA-256 of each file that is there, by its name as seen from ``folder``.
+
+    Raises StorageError for one that is needed, is there, and cannot be read.
+    """
+    digests = {}
+    for each in named:
+        if (sha := file_digest(each.file, each.limit)) is not None:
+            digests[seen_from(folder, each.file)] = sha
+        elif not each.spare and objection(each.file, each.limit) is None:
+            raise StorageError(f"{each.file}: cannot be read: no permission, or the disk fails")
+    return digests

@@ -29,8 +29,8 @@ from eigassign.case.units import (
     parse_unit,
     require_size,
 )
-from eigassign.errors import MechanismError
-from eigassign.files import TABLE, read_bytes
+from eigassign.errors import MechanismError, StorageError
+from eigassign.files import TABLE, objection, read_bytes
 
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
@@ -162,7 +162,10 @@ def _text(file: Path, key: str) -> str:
     try:
         text = read_bytes(file, TABLE).decode("utf-8-sig")
     except OSError as error:
-        raise MechanismError(key, f"{file}: cannot be read: {error.strerror}") from error
+        why = f"{file}: cannot be read: {error.strerror}"
+        if objection(file, TABLE) is None:  # another name would not help
+            raise StorageError(why) from error
+        raise MechanismError(key, why) from error
     except UnicodeDecodeError as error:
         raise MechanismError(key, f"{file.name}: is not a text file in UTF-8") from error
     if "\0" in text:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from small_case import TEXT, unmarked
+from small_case import TEXT, edited, unmarked
 
 from eigassign.case import load, parse
 from eigassign.errors import CaseError, StorageError, UsageError
@@ -175,3 +175,29 @@ def test_a_file_that_may_not_be_read_is_a_storage_error(
     monkeypatch.setattr("os.open", denied)  # root may read anything, so chmod is no test
     with pytest.raises(StorageError, match="cannot be read: Permission denied"):
         load(path)
+
+
+MOTION = """\
+  tip: hand.end
+  waypoints: [[0.3, 0.1], [0.2, 0.2]]
+  branch: {elbow: [10 deg, 170 deg]}
+"""
+PROFILES = edited("{shape: circle, diameter: 30 mm}", "{file: table.csv, name: a}")
+
+
+@pytest.mark.parametrize("text", [PROFILES, edited(MOTION, "  file: table.csv\n")])
+def test_so_is_a_table_that_a_case_names(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "case.yaml").write_text(text)
+    (tmp_path / "table.csv").write_text("a\n")
+    really = os.open
+
+    def denied(path: Path, *how: int) -> int:
+        if Path(path).name == "table.csv":
+            raise PermissionError(13, "Permission denied")
+        return really(path, *how)
+
+    monkeypatch.setattr("os.open", denied)
+    with pytest.raises(StorageError, match=r"table\.csv: cannot be read"):
+        load(tmp_path / "case.yaml")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from beam import TEXT
-from fuzz_worker import Worker
+from fuzz_worker import CASES, Worker
 
 from eigassign.batch import limited
 from eigassign.cli import main
@@ -95,7 +95,18 @@ def test_a_lattice_of_three_thousand_members_is_checked_within_memory(
     assert Path("boom.yaml").read_text().count('"from"') == 2995
     with limited(None, 1000.0):
         assert main(["check", "boom.yaml"]) == 0
-    assert "optimize: some" in capsys.readouterr().out
+    assert "optimize: about" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_bands_at_thousands_of_samples_take_memory_as_their_samples(worker: Worker) -> None:
+    text = (CASES / "milling_column.yaml").read_text()
+    assert "samples: 41\n" in text
+    limits = "assignment: {starts: 1, steps: 2, seconds: 1}\n"
+    outcome = worker.run("optimize", text.replace("samples: 41\n", "samples: 4100\n") + limits)
+    assert (outcome.code, "limits: every mode clear" in outcome.err) == (1, True), outcome.err
+    # 170 MB; a square matrix of all residuals would take more than 800
+    assert outcome.megabytes < 400, outcome.megabytes
 
 
 @pytest.mark.skipif(os.name != "posix", reason="other systems have no such names")

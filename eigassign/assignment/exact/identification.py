@@ -266,7 +266,7 @@ def _covariance(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> 
 
 def _directions(slopes: Floats) -> tuple[Floats, Floats]:
     """Return all n singular values, 0 where there are fewer rows, and Vᵀ (n, n)."""
-    _, sizes, V = np.linalg.svd(slopes)
+    _, sizes, V = np.linalg.svd(slopes, full_matrices=len(slopes) < slopes.shape[1])
     s = np.zeros(slopes.shape[1])
     s[: len(sizes)] = sizes
     return s, V

@@ -270,7 +270,7 @@ def _null_space(J: Floats) -> Floats:
     """Orthonormal directions (n, k) that change nothing."""
     if not J.size:
         return np.zeros((J.shape[1], 0))
-    _, s, V = np.linalg.svd(J, full_matrices=True)
+    _, s, V = np.linalg.svd(J, full_matrices=len(J) < J.shape[1])
     rank = int((s > WITHOUT * s[0]).sum())
     return np.asarray(V[rank:].T)
 
