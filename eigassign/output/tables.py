@@ -193,7 +193,7 @@ def errors(results: RunResults) -> Table:
     columns = ("target", "error", *kinds)
     wanted = [target for target in results.targets if target.asked.is_goal]
     summaries = [pair for target in wanted for pair in _of_target(target)]
-    if len(wanted) > 1 and len(results.trajectories) > 1:
+    if 1 < len(results.trajectories) < len(wanted):
         along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
         summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
     if len(wanted) > 1 and results.error is not None:
@@ -205,7 +205,8 @@ def errors(results: RunResults) -> Table:
             cells = ("" if error is None else percent(getattr(error, of)) for error in errors)
             rows.append((label, what, *cells))
     caption = "Frequency against its target in Hz, relative to the target, along "
-    caption += f"{results.along}."
+    caption += f"{results.along}; one shot: after the first step of the search; predicted: by the "
+    caption += "expansion; exact: solved again at every sample."
     if len({target.asked.weight for target in wanted}) > 1:
         caption += " All: all targets, with equal weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
@@ -233,11 +234,11 @@ def drives(results: RunResults) -> Table:
     rows = results.drives
     of = rows[0].of if rows else ""
     caption = f"Of {of}, along {results.along}, by rigid links; springs carry nothing."
-    names = "name handy initial.peak initial.at initial.rms optimal.peak optimal.at optimal.rms"
+    names = "name handy initial.peak initial.rms optimal.peak optimal.at optimal.rms"
     headings = {
         f"{design}.{fact}": f"{fact} {when}"
         for design, when in (("initial", "before"), ("optimal", "after"))
-        for fact in ("peak", "at", "rms")
+        for fact in ("peak", "rms")
     }
     return facts_table(
         "What the drives carry", rows, f"{names} limit", caption, name="coordinate", **headings
@@ -248,7 +249,7 @@ def anatomy(results: RunResults) -> Table:
     """The parts that modes of missed targets have their energies in."""
     each = (row for one in results.meaning.anatomies for row in one.parts)
     rows = [row for row in each if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
-    names = "mode part strain strain_largest strain_at kinetic kinetic_largest kinetic_at"
+    names = "mode part strain strain_largest kinetic kinetic_largest"
     caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
     caption += "the largest. The weight has a negative share of strain where it softens."
     return facts_table("What the missed modes are", rows, names, caption)
@@ -257,7 +258,7 @@ def anatomy(results: RunResults) -> Table:
 def helps(results: RunResults) -> Table:
     """What properties that are no parameters do to the modes of missed targets."""
     rows = [row for one in results.meaning.anatomies for row in one.properties[:MOST_HELPS]]
-    names = "mode property percent_per_percent percent_per_percent_largest at"
+    names = "mode property percent_per_percent percent_per_percent_largest"
     caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
     caption += "the coordinates unchanged. The most effective ones, by exact slopes."
     return facts_table("What would help", rows, names, caption)
@@ -373,7 +374,7 @@ def sensitivity(results: RunResults) -> Table:
 
 def limits(results: RunResults) -> Table:
     """Gains from a little more room at each limit that the answer lies on, to first order."""
-    return facts_table("Limits", results.meaning.relaxed, "name side words")
+    return facts_table("Limits", results.meaning.relaxed, "words")
 
 
 def reach(results: RunResults) -> Table:

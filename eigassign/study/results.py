@@ -43,7 +43,7 @@ SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 EnergyShare = Annotated[
-    float, Fact(unit="fraction", digits=lambda s: f"{100 * s + 0.0:.1f} %", says_unit=True)
+    float, Fact(unit="fraction", digits=lambda s: f"{round(100 * s, 1) + 0.0:g} %", says_unit=True)
 ]
 PerCent = Annotated[float, Fact(unit="% per %", digits=".3g")]
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
