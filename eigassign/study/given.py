@@ -104,9 +104,9 @@ def _motion(file: CaseFile, path: Trajectories | None) -> Iterator[str]:
         if body.mass:
             yield f"{name} {handy(body.mass, 'kg')} at {body.at}"
     for load in file.loads.values():
-        _, name, *what = load.path.replace("_", " ").split(".")
+        _, name, *what = load.path.split(".")
         amounts = dict.fromkeys(handy(amount, load.unit) for amount in load.along)
-        yield f"{' '.join(what)} of {name} {' or '.join(amounts)}"
+        yield f"{' '.join(what).replace('_', ' ')} of {name} {' or '.join(amounts)}"
     gravity = file.mechanism.gravity
     if isinstance(gravity, tuple):
         yield "under its weight"

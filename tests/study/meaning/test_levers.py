@@ -138,6 +138,7 @@ def test_a_missed_target_is_told_what_it_is_and_what_would_help() -> None:
     card = verdict_of(result.results)
     assert card is not None
     assert any("1 % more of what is no parameter" in line for line in card.helps)
+    assert card.helps[0].startswith("Strain energy of mode 1: drive of q2 ")
     assert b'"anatomies"' in to_json(result.results)
 
 
