@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import is_bare
-from eigassign.facts import OF_ROW, Fact, at_most, capital, fact, number, percent, seconds
+from eigassign.facts import (
+    OF_ROW,
+    Fact,
+    at_most,
+    capital,
+    fact,
+    number,
+    percent,
+    positive_percent,
+    seconds,
+)
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     SEEN,
@@ -113,7 +123,7 @@ def headline(results: RunResults) -> str | None:
     limits = [target.error for target in results.targets if not target.asked.is_goal]
     alone = len(limits) == len(results.targets)  # no frequency is wanted
     what = "Worst violation of a limit" if alone else "Worst distance to the target"
-    said = _violation if alone else percent
+    said = positive_percent if alone else percent
     beside = ""
     if "one shot" in _stages(results) and error.one_shot is not None:
         beside = f" (one shot: {said(error.one_shot.max_relative)})"
@@ -121,7 +131,7 @@ def headline(results: RunResults) -> str | None:
     distance = f"{what}: {before} before, {after} after{beside}, solved exactly."
     worst = max((each.initial.max_relative for each in limits), default=0.0)
     if not alone and worst > MET:
-        left = _violation(max(each.exact.max_relative for each in limits))
+        left = positive_percent(max(each.exact.max_relative for each in limits))
         distance += f" Worst violation of a limit: {percent(worst)} before, {left} after."
     if row is None:
         return distance
@@ -205,8 +215,7 @@ def errors(results: RunResults) -> Table:
             cells = ("" if error is None else percent(getattr(error, of)) for error in errors)
             rows.append((label, what, *cells))
     caption = "Frequency against its target in Hz, relative to the target, along "
-    caption += f"{results.along}; one shot: after the first step of the search; predicted: by the "
-    caption += "expansion; exact: solved again at every sample."
+    caption += f"{results.along}; predicted by the expansion, exact by solving every sample again."
     if len({target.asked.weight for target in wanted}) > 1:
         caption += " All: all targets, with equal weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
@@ -273,10 +282,6 @@ def violated(worst: float) -> str:
     return f"violated by {percent(worst)}" if worst > MET else "met"
 
 
-def _violation(worst: float) -> str:
-    return percent(worst if worst > MET else 0.0)
-
-
 def clearances(results: RunResults) -> Table:
     """Bands to keep out of: how many modes are below each, and whether that was checked."""
     rows = results.assignment.clearances if results.assignment else ()
@@ -328,7 +333,7 @@ def optima(results: RunResults) -> Table:
     if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
-        (str(k), number(each.objective), _violation(each.violation),
+        (str(k), number(each.objective), positive_percent(each.violation),
          *_by_name(results, each.design))
         for k, each in enumerate(row.local_optima, 1)
     )  # fmt: skip
@@ -390,7 +395,7 @@ def tolerance(results: RunResults) -> Table:
     """The range of each target's curve while parameters deviate within their tolerances."""
     found = results.meaning.tolerance
     rows, names = () if found is None else found.targets, "label lowest_hz highest_hz error"
-    caption = "" if found is None else f"{found.words}."
+    caption = "" if found is None else f"{capital(found.words)}."
     return facts_table("Tolerance", rows, names, caption, error="worst error")
 
 

@@ -29,6 +29,7 @@ from eigassign.facts import (
     Key,
     Residual,
     Share,
+    at_most,
     number,
     percent,
     positive_percent,
@@ -454,7 +455,10 @@ class ClearanceRow:
     clear: Annotated[bool, Fact(digits=lambda clear: "checked" if clear else "NO")]
     room: Annotated[Share, Fact("relative to the edge", "room at least", digits=positive_percent)]
     counted: Annotated[bool, Fact("inertia confirmed the modes below at every sample")]
-    raised: Annotated[Share | None, Fact(heading="model too high by", absent="not bounded")]
+    raised: Annotated[
+        Share | None,
+        Fact(heading="model too high by", absent="not bounded", digits=partial(at_most, how="")),
+    ]
 
 
 @dataclass(frozen=True)
@@ -530,7 +534,7 @@ class RobustTarget:
         Share | None,
         Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
     ]
-    worst: Annotated[Share, Fact("found by a search", "deviated")]
+    worst: Annotated[Share, Fact("found by a search", "deviated", digits=positive_percent)]
     drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
 
     @property
@@ -729,7 +733,7 @@ class RangeRow:
     lowest_hz: Annotated[Curve, Fact(digits=_lowest)]
     highest_hz: Annotated[Curve, Fact(digits=_highest)]
     how: str
-    error: Share
+    error: Annotated[Share, Fact(digits=positive_percent)]
 
 
 @dataclass(frozen=True)

@@ -191,7 +191,7 @@ def _trust(results: RunResults) -> Iterator[str]:
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
         yield f"{capital(clear.label)}: {proof}, {below} below."
     if row.robust is not None:
-        yield f"Robust instead of alone: {row.robust.words}."
+        yield f"What robustness costs: {row.robust.words}."
     found = results.meaning.tolerance
     if found is not None:
         yield f"{capital(found.words)}."
