@@ -650,18 +650,16 @@ class SensitivityRow:
 class PartRow:
     """The share of a mode's energies that a part has, by its key path: means over the samples.
 
-    ``_largest`` are the ones of largest magnitude, at the samples ``_at``. That of the weight in
-    what strains is negative where it softens.
+    ``_largest`` are the ones of largest magnitude. That of the weight in what strains is negative
+    where it softens.
     """
 
     mode: Key
     part: str
     strain: Annotated[EnergyShare, Fact("of what drives, springs, links and the weight hold")]
     strain_largest: EnergyShare
-    strain_at: str
     kinetic: Annotated[EnergyShare, Fact("of what links, bodies and drives move with")]
     kinetic_largest: EnergyShare
-    kinetic_at: str
 
 
 @dataclass(frozen=True)
@@ -672,7 +670,6 @@ class EffectRow:
     property: str
     percent_per_percent: Annotated[PerCent, Fact(heading="mean")]
     percent_per_percent_largest: Annotated[PerCent, Fact(heading="largest")]
-    at: Annotated[str, Fact("the sample of the largest")]
 
 
 @dataclass(frozen=True)

@@ -160,7 +160,7 @@ def _finding(target: TargetStudy, accepted: float) -> Finding:
 
 def _kept(limit: LimitRow) -> Finding:
     """A limit of a quantity that the answer breaks, or of statics, with its amounts."""
-    before, after = (limit.said(_rounded(a)) for a in (limit.initial, limit.optimal))
+    before, after = limit.said(limit.initial), limit.said(limit.optimal)
     tone = "good" if limit.satisfied else "bad"
     return Finding(capital(limit.words), before, f"is {after}", tone)
 
@@ -225,7 +225,3 @@ def _cost(results: RunResults) -> Iterator[str]:
         listed = any(row.choice_price is not None for row in results.design)
         what = "Price" if listed else "Price of the change"
         yield f"{what} {number(results.price)}".replace("-", "−")
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}") + 0.0
