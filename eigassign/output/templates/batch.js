@@ -404,7 +404,7 @@
   }
   const least = swept.length ? order.filter((row) => rows[row][worst] > 0).sort((a, b) => rows[a][worst] - rows[b][worst])[0] : undefined;
   if (least !== undefined && rows.every((row) => row[worst] !== 0))
-    document.getElementById("nearest").textContent = `Nearest to its target is variant ${rows[least][0]}, ${text(worst, least)} off at worst: ${swept.map((k) => `${columns[k].name} ${few(rows[least][k], k)}`).join(", ")}.`;
+    document.getElementById("nearest").textContent = `Nearest to its target is case ${rows[least][0]}, ${text(worst, least)} off at worst: ${swept.map((k) => `${columns[k].name} ${few(rows[least][k], k)}`).join(", ")}.`;
 
   if (keys.length && numbers.length) draws.push(drawOver);
   if (all.length > 1 && rows.length > 1) {
