@@ -162,8 +162,8 @@ def duration(value: float) -> str:
 
 
 def positive_percent(fraction: float) -> str:
-    """The same of what counts above zero only."""
-    return percent(max(fraction, 0.0))
+    """The same of what counts above round-off, 1e-8, only: a violation, or room."""
+    return percent(fraction if fraction > 1e-8 else 0.0)
 
 
 # --- Kinds of facts, each with its unit and digits

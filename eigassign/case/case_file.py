@@ -191,12 +191,14 @@ class CaseFile:
     def variant_units(self) -> Mapping[str, str]:
         """SI unit of each value of its `variant`, by key; empty where the schema knows of none."""
         tree, found = self._tree, dict[str, Quantity]()
+        designed = dict(zip(self.design.parameters, self.design_quantities, strict=True))
         for key in self.variant:
             *owners, last = key.split(".")
             owner = reduce(below, owners, self)
             own = quantities(type(owner)).get(last) if isinstance(owner, Part) else None
             known = known_property(tree, key.removeprefix("mechanism.")) or own
-            found[key] = known or Quantity()
+            bound = last in ("min", "max") and owners[:1] == ["design"]
+            found[key] = known or (designed.get(owners[-1]) if bound else None) or Quantity()
         return dict(zip(found, _units(found.values()), strict=True))
 
     @property

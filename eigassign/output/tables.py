@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import is_bare
-from eigassign.facts import OF_ROW, Fact, at_most, capital, fact, number, percent, seconds
+from eigassign.facts import (
+    OF_ROW,
+    Fact,
+    at_most,
+    capital,
+    fact,
+    number,
+    percent,
+    positive_percent,
+    seconds,
+)
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     SEEN,
@@ -113,7 +123,7 @@ def headline(results: RunResults) -> str | None:
     limits = [target.error for target in results.targets if not target.asked.is_goal]
     alone = len(limits) == len(results.targets)  # no frequency is wanted
     what = "Worst violation of a limit" if alone else "Worst distance to the target"
-    said = _violation if alone else percent
+    said = positive_percent if alone else percent
     beside = ""
     if "one shot" in _stages(results) and error.one_shot is not None:
         beside = f" (one shot: {said(error.one_shot.max_relative)})"
@@ -121,7 +131,7 @@ def headline(results: RunResults) -> str | None:
     distance = f"{what}: {before} before, {after} after{beside}, solved exactly."
     worst = max((each.initial.max_relative for each in limits), default=0.0)
     if not alone and worst > MET:
-        left = _violation(max(each.exact.max_relative for each in limits))
+        left = positive_percent(max(each.exact.max_relative for each in limits))
         distance += f" Worst violation of a limit: {percent(worst)} before, {left} after."
     if row is None:
         return distance
@@ -193,7 +203,7 @@ def errors(results: RunResults) -> Table:
     columns = ("target", "error", *kinds)
     wanted = [target for target in results.targets if target.asked.is_goal]
     summaries = [pair for target in wanted for pair in _of_target(target)]
-    if len(wanted) > 1 and len(results.trajectories) > 1:
+    if 1 < len(results.trajectories) < len(wanted):
         along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
         summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
     if len(wanted) > 1 and results.error is not None:
@@ -205,7 +215,7 @@ def errors(results: RunResults) -> Table:
             cells = ("" if error is None else percent(getattr(error, of)) for error in errors)
             rows.append((label, what, *cells))
     caption = "Frequency against its target in Hz, relative to the target, along "
-    caption += f"{results.along}."
+    caption += f"{results.along}; predicted by the expansion, exact by solving every sample again."
     if len({target.asked.weight for target in wanted}) > 1:
         caption += " All: all targets, with equal weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
@@ -233,11 +243,11 @@ def drives(results: RunResults) -> Table:
     rows = results.drives
     of = rows[0].of if rows else ""
     caption = f"Of {of}, along {results.along}, by rigid links; springs carry nothing."
-    names = "name handy initial.peak initial.at initial.rms optimal.peak optimal.at optimal.rms"
+    names = "name handy initial.peak initial.rms optimal.peak optimal.at optimal.rms"
     headings = {
         f"{design}.{fact}": f"{fact} {when}"
         for design, when in (("initial", "before"), ("optimal", "after"))
-        for fact in ("peak", "at", "rms")
+        for fact in ("peak", "rms")
     }
     return facts_table(
         "What the drives carry", rows, f"{names} limit", caption, name="coordinate", **headings
@@ -248,7 +258,7 @@ def anatomy(results: RunResults) -> Table:
     """The parts that modes of missed targets have their energies in."""
     each = (row for one in results.meaning.anatomies for row in one.parts)
     rows = [row for row in each if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
-    names = "mode part strain strain_largest strain_at kinetic kinetic_largest kinetic_at"
+    names = "mode part strain strain_largest kinetic kinetic_largest"
     caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
     caption += "the largest. The weight has a negative share of strain where it softens."
     return facts_table("What the missed modes are", rows, names, caption)
@@ -257,7 +267,7 @@ def anatomy(results: RunResults) -> Table:
 def helps(results: RunResults) -> Table:
     """What properties that are no parameters do to the modes of missed targets."""
     rows = [row for one in results.meaning.anatomies for row in one.properties[:MOST_HELPS]]
-    names = "mode property percent_per_percent percent_per_percent_largest at"
+    names = "mode property percent_per_percent percent_per_percent_largest"
     caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
     caption += "the coordinates unchanged. The most effective ones, by exact slopes."
     return facts_table("What would help", rows, names, caption)
@@ -270,10 +280,6 @@ def _met(satisfied: bool) -> str:
 def violated(worst: float) -> str:
     """``violated by 1.55 %``; ``met`` where no more than round-off is left."""
     return f"violated by {percent(worst)}" if worst > MET else "met"
-
-
-def _violation(worst: float) -> str:
-    return percent(worst if worst > MET else 0.0)
 
 
 def clearances(results: RunResults) -> Table:
@@ -327,7 +333,7 @@ def optima(results: RunResults) -> Table:
     if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
-        (str(k), number(each.objective), _violation(each.violation),
+        (str(k), number(each.objective), positive_percent(each.violation),
          *_by_name(results, each.design))
         for k, each in enumerate(row.local_optima, 1)
     )  # fmt: skip
@@ -373,7 +379,7 @@ def sensitivity(results: RunResults) -> Table:
 
 def limits(results: RunResults) -> Table:
     """Gains from a little more room at each limit that the answer lies on, to first order."""
-    return facts_table("Limits", results.meaning.relaxed, "name side words")
+    return facts_table("Limits", results.meaning.relaxed, "words")
 
 
 def reach(results: RunResults) -> Table:
@@ -389,7 +395,7 @@ def tolerance(results: RunResults) -> Table:
     """The range of each target's curve while parameters deviate within their tolerances."""
     found = results.meaning.tolerance
     rows, names = () if found is None else found.targets, "label lowest_hz highest_hz error"
-    caption = "" if found is None else f"{found.words}."
+    caption = "" if found is None else f"{capital(found.words)}."
     return facts_table("Tolerance", rows, names, caption, error="worst error")
 
 

@@ -178,7 +178,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     numbers = {f"mode {mode}": np.array([mode]) for mode in every}
     found: tuple[ModeAnatomy, ...] = ()
     with suppress(EigassignError):  # the frequencies stand without
-        found = tuple(anatomies(model, q[None], y, numbers, lambda _: ""))
+        found = tuple(anatomies(model, q[None], y, numbers))
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),

@@ -23,7 +23,12 @@ def given(file: CaseFile, path: Trajectories | None) -> tuple[str, ...]:
         f"Drives: {', '.join(_drives(file)) or 'none, nothing moves'}",
         f"Motion: {', '.join(_motion(file, path))}",
     )
-    return tuple(line if len(line) <= LONG else f"{line[: LONG - 1]}…" for line in found)
+    return tuple(line if len(line) <= LONG else _cut(line) for line in found)
+
+
+def _cut(line: str) -> str:
+    """The line to the last whole part that there is room for."""
+    return f"{line[:LONG].rpartition('; ' if '; ' in line[:LONG] else ', ')[0]}; …"
 
 
 def _links(file: CaseFile) -> Iterator[str]:
@@ -62,7 +67,8 @@ def _section(name: str, section: Any) -> str:
     for key, field in type(section).model_fields.items():
         value, quantity = getattr(section, key), _quantity((field.annotation, *field.metadata))
         if value is not None and quantity is not None and quantity.dimension is not None:
-            said.append(f"{key.replace('_', ' ')} {handy(value, quantity.dimension.si)}")
+            amount = handy(value, quantity.dimension.si).replace("m2", "m²").replace("m4", "m⁴")
+            said.append(f"{key.replace('_', ' ')} {amount}")
     return f"{name} ({', '.join(said)})"
 
 
@@ -75,12 +81,15 @@ def _quantity(kind: Any) -> Quantity | None:
 
 
 def _drives(file: CaseFile) -> Iterator[str]:
-    for (name, coordinate), unit in zip(
-        file.coordinates.items(), file.coordinate_units, strict=True
-    ):
+    """Yield drives that are alike together."""
+    alike: dict[str, list[str]] = {}
+    for name, unit in zip(file.coordinates, file.coordinate_units, strict=True):
+        coordinate = file.coordinates[name]
         stiffness = getattr(coordinate.drive, "stiffness", None)
         per = "N m/rad" if unit == "rad" else "N/m"
-        yield f"{name} {coordinate.moves if stiffness is None else handy(stiffness, per)}"
+        said = coordinate.moves if stiffness is None else handy(stiffness, per)
+        alike.setdefault(said, []).append(name)
+    return (f"{', '.join(names)} {said}" for said, names in alike.items())
 
 
 def _motion(file: CaseFile, path: Trajectories | None) -> Iterator[str]:
@@ -94,6 +103,10 @@ def _motion(file: CaseFile, path: Trajectories | None) -> Iterator[str]:
     for name, body in file.mechanism.bodies.items():
         if body.mass:
             yield f"{name} {handy(body.mass, 'kg')} at {body.at}"
+    for load in file.loads.values():
+        _, name, *what = load.path.split(".")
+        amounts = dict.fromkeys(handy(amount, load.unit) for amount in load.along)
+        yield f"{' '.join(what).replace('_', ' ')} of {name} {' or '.join(amounts)}"
     gravity = file.mechanism.gravity
     if isinstance(gravity, tuple):
         yield "under its weight"

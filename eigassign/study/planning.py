@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import angle_unit
+from eigassign.case.units import angle_unit, handy_unit
 from eigassign.errors import (
     AccuracyError,
     CaseError,
@@ -221,9 +221,10 @@ def shown_point(
     names: Sequence[str], values: Floats, units: Iterable[str] = (), in_degrees: bool = False
 ) -> str:
     """``"q1 = 1.817 rad, q2 = 5.312 rad"``, with units where they are given; of many the first."""
-    said = (angle_unit(unit, in_degrees) for unit in chain(units, repeat("")))
-    own = zip(names, values, said, strict=False)  # as many as names
-    shown = [f"{name} = {value / size:.6g} {unit}".rstrip() for name, value, (unit, size) in own]
+    shown = []
+    for name, value, si in zip(names, values, chain(units, repeat("")), strict=False):
+        unit, size = angle_unit(si, in_degrees) if si == "rad" else handy_unit(si, value)
+        shown.append(f"{name} = {value / size:.6g} {unit}".rstrip())
     rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
     return (", ".join(shown[:SHOWN]) or "none") + rest
 

@@ -29,6 +29,7 @@ from eigassign.facts import (
     Key,
     Residual,
     Share,
+    at_most,
     number,
     percent,
     positive_percent,
@@ -43,7 +44,7 @@ SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 EnergyShare = Annotated[
-    float, Fact(unit="fraction", digits=lambda s: f"{100 * s + 0.0:.1f} %", says_unit=True)
+    float, Fact(unit="fraction", digits=lambda s: f"{round(100 * s, 1) + 0.0:g} %", says_unit=True)
 ]
 PerCent = Annotated[float, Fact(unit="% per %", digits=".3g")]
 Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
@@ -454,7 +455,10 @@ class ClearanceRow:
     clear: Annotated[bool, Fact(digits=lambda clear: "checked" if clear else "NO")]
     room: Annotated[Share, Fact("relative to the edge", "room at least", digits=positive_percent)]
     counted: Annotated[bool, Fact("inertia confirmed the modes below at every sample")]
-    raised: Annotated[Share | None, Fact(heading="model too high by", absent="not bounded")]
+    raised: Annotated[
+        Share | None,
+        Fact(heading="model too high by", absent="not bounded", digits=partial(at_most, how="")),
+    ]
 
 
 @dataclass(frozen=True)
@@ -530,7 +534,7 @@ class RobustTarget:
         Share | None,
         Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
     ]
-    worst: Annotated[Share, Fact("found by a search", "deviated")]
+    worst: Annotated[Share, Fact("found by a search", "deviated", digits=positive_percent)]
     drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
 
     @property
@@ -646,18 +650,16 @@ class SensitivityRow:
 class PartRow:
     """The share of a mode's energies that a part has, by its key path: means over the samples.
 
-    ``_largest`` are the ones of largest magnitude, at the samples ``_at``. That of the weight in
-    what strains is negative where it softens.
+    ``_largest`` are the ones of largest magnitude. That of the weight in what strains is negative
+    where it softens.
     """
 
     mode: Key
     part: str
     strain: Annotated[EnergyShare, Fact("of what drives, springs, links and the weight hold")]
     strain_largest: EnergyShare
-    strain_at: str
     kinetic: Annotated[EnergyShare, Fact("of what links, bodies and drives move with")]
     kinetic_largest: EnergyShare
-    kinetic_at: str
 
 
 @dataclass(frozen=True)
@@ -668,7 +670,6 @@ class EffectRow:
     property: str
     percent_per_percent: Annotated[PerCent, Fact(heading="mean")]
     percent_per_percent_largest: Annotated[PerCent, Fact(heading="largest")]
-    at: Annotated[str, Fact("the sample of the largest")]
 
 
 @dataclass(frozen=True)
@@ -729,7 +730,7 @@ class RangeRow:
     lowest_hz: Annotated[Curve, Fact(digits=_lowest)]
     highest_hz: Annotated[Curve, Fact(digits=_highest)]
     how: str
-    error: Share
+    error: Annotated[Share, Fact(digits=positive_percent)]
 
 
 @dataclass(frozen=True)

@@ -184,3 +184,10 @@ def test_content_is_what_a_case_says_and_what_its_files_do(tmp_path: Path) -> No
     assert read(file).content() == content
     table.write_text("time,frequency\n0,180\n1,191\n")
     assert read(file).content() != content
+
+
+def test_bounds_that_a_sweep_sets_have_the_unit_of_their_parameter(tmp_path: Path) -> None:
+    file = tmp_path / "case.yaml"
+    file.write_text(TEXT)
+    variant = checked(read(file), values={"design.m1.max": 0.2, WANTED: 188})
+    assert variant.variant_units == {"design.m1.max": "kg", WANTED: "Hz"}

@@ -111,7 +111,7 @@ def test_what_was_asked_is_drawn_with_the_modes_around_it_and_its_distance(paper
     np.testing.assert_allclose(off, 100.0 * (target.exact_hz / target.target_hz - 1.0))
     assert (above.get_ylabel(), below.get_ylabel()) == ("frequency [Hz]", "off target [%]")
     assert below.get_xlabel() == "time [s]"
-    assert set(legend(figure)) == {"Mode 1 at 190 Hz", "initial design", "optimal design"}
+    assert set(legend(figure)) == {"mode 1 at 190 Hz", "initial design", "optimal design"}
 
 
 def test_targets_far_apart_have_panels_of_their_own(paper):

@@ -24,6 +24,7 @@ from eigassign.output import (
     screen_figures,
     write_run,
 )
+from eigassign.study import ErrorRow
 
 VOID = {"meta", "img", "br", "link", "input"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
@@ -113,7 +114,7 @@ def test_a_full_report_plots_every_description_and_lists_its_numbers():
     assert html.count("<summary>Numbers</summary>") == len(plots)
     curves = {c["name"]: c["y"] for c in island(html, "figures")["frequencies"][0]["data"]}
     target = results.targets[0]
-    assert curves["Mode 1 at 190 Hz"][0] == target.target_hz[0]
+    assert curves["mode 1 at 190 Hz"][0] == target.target_hz[0]
     initial = island(html, "figures")["frequencies"][0]["data"]
     before = next(c for c in initial if c["name"] == "mode 1, initial design")
     assert before["y"][0] == pytest.approx(target.initial_hz[0], rel=1e-6)
@@ -139,7 +140,27 @@ def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
     assert first["class"] == f"verdict {tone}"
     asked = "mode 1 at 190 Hz is 1.00 % off at worst (6.00 % before)."
     assert f"{word} : {asked}" in shown_text(parsed)[:1000]
-    assert ("So it is." in parsed.text) == (word != "Reached")
+    assert ("So it is." in parsed.text) == (tone == "bad")
+
+
+def test_a_worst_error_that_grew_is_said_with_the_rms_that_fell():
+    results = make_results()
+    (target,) = results.targets
+    initial, exact = ErrorRow(0.05, 0.04), ErrorRow(0.06, 0.02)
+    target = replace(target, error=replace(target.error, initial=initial, exact=exact))
+    row = replace(results.assignment, verdict="improved", max_error=0.01)
+    _, parsed, _ = made(replace(results, targets=(target,), assignment=row))
+    said = "mode 1 at 190 Hz is 2.00 % off rms, 6.00 % at worst (4.00 % and 5.00 % before)."
+    assert f"Improved, not reached : {said}" in parsed.text
+
+
+def test_the_sentence_is_of_what_the_reason_is_of():
+    results = make_results(n_targets=2)
+    reason = "mode 2 at 380 Hz is out of reach; the nearest design: so it is"
+    row = replace(results.assignment, verdict="unreachable", reason=reason, max_error=1e-3)
+    _, parsed, _ = made(replace(results, assignment=row))
+    assert "Not reachable : mode 2 at 380 Hz is" in parsed.text
+    assert "Mode 2 at 380 Hz is out of reach. " in parsed.text  # the rest is in the sentence
 
 
 def test_bars_write_large_numbers_out():

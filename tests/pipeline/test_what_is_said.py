@@ -12,6 +12,7 @@ from chains import Tree, case_of, two_link
 from eigassign.output import verdict_of
 from eigassign.pipeline import Options, Result, solve_case
 
+JOINTS = {"q1": "shoulder", "q2": "elbow"}
 HELD = ({"stiffness": 2e4}, {"stiffness": 4e3})
 ELBOW = {"parameter": "bodies.elbow_mass.mass", "min": 0.0, "max": 0.25}
 TOOL = {"parameter": "bodies.tool_mass.mass", "min": 0.0, "max": 0.25}
@@ -52,7 +53,7 @@ def test_the_page_says_how_far_frequencies_can_be_trusted() -> None:
     result = run([{"mode": 3, "at_most": 900.0}, {"mode": 1, "at_least": 5.0}])
     said = page(result)
     assert "solved exactly at all 12 samples" in said
-    trust = r"too high because of the mesh: at most ([0-9.]+) %, at 9 of the samples"
+    trust = r"too high because of the mesh: at most ([0-9.]+) % \(checked at 9 samples\)"
     (share,) = re.findall(trust, said)
     fine = finely(result, 3)[:, [2, 0]]
     coarse = np.column_stack([target.exact_hz for target in result.results.targets])
@@ -125,3 +126,17 @@ def test_a_limit_that_the_mesh_alone_may_miss_is_not_proved_to_be_out_of_reach()
     assert "Give the links more elements" in within.assignment.reason
     assert coarse.results.assignment is not None
     assert coarse.results.assignment.verdict == "unreachable"
+
+
+def test_inputs_say_what_drives_are_alike_and_what_is_carried_along_which_trajectory() -> None:
+    path = {"points": [[0.1, 0.5], [0.6, 1.5]], "duration": 1.0, "samples": 12}
+    loaded = {**path, "name": "there", "set": {"bodies.tool_mass.mass": 3.0}}
+    design = {"m1": ELBOW}
+    both = [loaded, {**path, "name": "back"}]
+    result = run([{"mode": 1, "at_least": 5.0}], trajectory=both, design=design)
+    _, drives, motion = result.results.given
+    assert drives == "Drives: q1 20 kN m/rad, q2 4 kN m/rad"
+    assert motion.endswith("mass of tool_mass 3 kg or 100 g")
+    locked = {name: {"joint": joint, "drive": "locked"} for name, joint in JOINTS.items()}
+    held = run([{"mode": 1, "at_least": 5.0}], coordinates=locked).results
+    assert held.given[1] == "Drives: q1, q2 locked"

@@ -135,7 +135,10 @@ def _missing(error: Any) -> _Explained:
     if isinstance(key, int):
         return (), f"entry {key + 1} is missing"
     field = keys_of(_model_at(parent))[key]
-    kinds = [m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension]
+    kinds: list[object] = [
+        m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension
+    ]
+    kinds += ["a whole number, or auto"] * (key == "elements")
     return (), "required key is missing" + "".join(f": {kind}" for kind in kinds)
 
 

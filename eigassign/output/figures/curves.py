@@ -159,7 +159,7 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     return FigurePlan(
         f"frequencies{suffix(results)}",
         heading,
-        f"Exact frequencies along {results.along} with all that was asked for.{left_out}",
+        f"Frequencies along {results.along}, solved exactly, and what was asked for.{left_out}",
         "Frequencies over time before and after, with targets, limits and bands.",
         _over_time(heading, results, panels),
         "answer",
@@ -225,7 +225,7 @@ def _asked(target: TargetStudy, time_s: Floats, width: float) -> Iterator[Mark]:
     low, high = asked.forbidden_hz
     colour = mode_colour(asked.mode)
     if asked.is_goal:
-        yield Curve(target.target_hz, TARGET, capital(target.label), x)
+        yield Curve(target.target_hz, TARGET, target.label, x)
     elif low is not None and high is not None:
         yield Shade(low, high, graph.VERMILLION, asked.label, x=x)
     elif not asked.is_aim:

@@ -60,7 +60,10 @@ def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
     )
     if few:
         shown = [p for p in shown if p.family in CHOICE or (first and p.method == first.key_method)]
-        caption = f"A point is a setting, of the series its `order`. Worst error {where}"
+        caption = (
+            "A point of the series is an `order`. Fits and reduced models are drawn to compare: no "
+            f"key of a case asks for them. Worst error {where}"
+        )
 
     def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
         x = np.array([p.cost_s(n) / size for p in points])

@@ -176,8 +176,8 @@ def _rule(axes: Axes, rule: Rule) -> Any:
     line = (axes.axvline if rule.upright else axes.axhline)(rule.at, **look, label=rule.label)
     if rule.note:
         axes.annotate(
-            short(rule.note, 60), (0.0, rule.at), (4.0, -4.0), textcoords="offset points", va="top",
-            xycoords=("axes fraction", "data"), size=style.SMALL_PT,
+            short(rule.note, 60), (0.0, rule.at), (4.0, 2.0), textcoords="offset points",
+            va="bottom", xycoords=("axes fraction", "data"), size=style.SMALL_PT,
         )  # fmt: skip
     return line
 

@@ -242,7 +242,7 @@ def _note(rule: Rule, axis: str) -> Iterator[Json]:
         at = float(np.log10(rule.at))  # only logarithmic panels have such rules
         yield {
             "text": short(rule.note, 60), "x": 0.0, "xref": "paper", "xanchor": "left", "y": at,
-            "yref": axis, "yanchor": "top", "showarrow": False,
+            "yref": axis, "yanchor": "bottom", "showarrow": False,
         }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -71,14 +72,16 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     aim, tone = row.aim, TONES.get(row.verdict, "bad")
     findings = [] if aim is None else [Finding(capital(aim.label), aim.before, aim.after, tone)]
     targets = (target for target in results.targets if not target.asked.is_aim)
-    findings += [_finding(target, row.max_error) for target in targets]
+    reason = capital(row.reason.partition("; the nearest design: ")[0])  # which the sentence says
     static = {one.name for one in results.statics}
-    findings += [_kept(one) for one in row.limits if one.name in static or not one.satisfied]
+    findings += [_kept(one) for one in row.limits if not one.satisfied]
+    findings += [_finding(target, row.max_error) for target in targets]
+    findings += [_kept(one) for one in row.limits if one.satisfied and one.name in static]
     return FirstScreen(
         word=WORDS[row.verdict],
         tone=tone if row.shortcoming is None else "bad",
-        sentence=_sentence(findings) if aim is None else f"{aim.words}.",
-        reason="" if row.verdict == "reached" else f"{capital(row.reason)}.",
+        sentence=_sentence(findings, row.reason) if aim is None else f"{aim.words}.",
+        reason="" if tone == "good" or (tone == "fair" and aim is None) else f"{reason}.",
         helps=tuple(_helps(results)),
         findings=tuple(findings[:MOST]),
         bars=tuple(_bars(results)),
@@ -87,20 +90,22 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     )
 
 
-def _sentence(findings: Sequence[Finding]) -> str:
-    """The first finding that is missed, or the first, before and after; how many others are met."""
+def _sentence(findings: Sequence[Finding], reason: str) -> str:
+    """The worst finding, first of all one in the reason, before and after; and of the others."""
     if not findings:
         return "nothing is limited."
-    worst = min(findings, key=lambda one: ("bad", "fair", "good").index(one.tone))
+    tones = ("bad", "fair", "good")
+    worst = min(
+        findings, key=lambda f: (tones.index(f.tone), f.label.lower() not in reason.lower())
+    )
     others = [one for one in findings if one is not worst]
     missed = sum(one.tone != "good" for one in others)
     before = "" if worst.before == "met" else f" ({worst.before} before)"
     said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after}{before}"
     if others:
-        many = f"{missed} of {len(others)} others are missed" if missed else ""
-        many = many or f"all {len(others)} others are met"
-        alone = "the other is missed" if missed else "the other is met"
-        said += f"; {many if len(others) > 1 else alone}"
+        verb, some = ("missed", missed) if missed else ("met", "all")
+        many = f"{some} of the {len(others)} others are {verb}".replace("all of", "all")
+        said += f"; {many if len(others) > 1 else f'the other target is {verb}'}"
     return f"{said}."
 
 
@@ -111,34 +116,53 @@ def _helps(results: RunResults) -> Iterator[str]:
         return
     for one in results.meaning.anatomies[:2]:
         helped = one.helped(3).replace(" -", " −")
-        more = f"; 1 % more of what is no parameter: {helped}" if helped else ""
-        yield f"{capital(one.mode)} is held by {one.most('strain', 2)}{more}."
+        more = f" 1 % more of what is no parameter changes its frequency: {helped}." * bool(helped)
+        yield _plain(f"Strain energy of {one.mode}: {one.most('strain', 2)}.{more}")
     for row in results.meaning.relaxed[:2]:
-        yield f"{capital(row.words)}."
+        if f"{row.before:.3g}" != f"{row.after:.3g}":
+            yield f"{capital(row.words)}."
+
+
+def _plain(text: str) -> str:
+    """Properties as people say them: ``length of forearm`` for ``links.forearm.length``."""
+
+    def said(path: re.Match[str]) -> str:
+        what = path[2].replace(".", " ").replace("_", " ").replace("youngs", "Young's").lstrip()
+        return f"{what} of {path[1]}" if what else path[1]
+
+    return re.sub(r"\b[a-z]+\.([^\s.]+)((?:\.\w+)*)", said, text)
 
 
 def _finding(target: TargetStudy, accepted: float) -> Finding:
-    """The worst distance before and after; of a limit by how much it is violated."""
-    before, after = target.error.initial.max_relative, target.error.exact.max_relative
+    """The worst distance before and after, with the rms where that alone fell; of limits theirs."""
+    both = target.error.initial, target.error.exact
+    before, after = (each.max_relative for each in both)
     more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
+    better = after < before
     if target.asked.is_goal:
-        met = after <= accepted
-        said = percent(before), f"is {percent(after)} off at worst"
-        rms = (percent(each.rms_relative) for each in (target.error.initial, target.error.exact))
-        more.insert(0, f"{' → '.join(rms)} rms; {100 * accepted:.3g} % is accepted")
+        met, accept = after <= accepted, f"{100 * accepted:.3g} % is accepted"
+        said, is_ = percent(before), percent(after)
+        first, last = (each.rms_relative for each in both)
+        if not better and last < first:
+            better, accept = True, f"{accept} at worst"
+            pair = f"{percent(first)} and {said}", f"is {percent(last)} off rms, {is_} at worst"
+        else:
+            accept = f"{percent(first)} → {percent(last)} rms; {accept}"
+            pair = said, f"is {is_} off at worst"
+        more.insert(0, accept)
     else:
         met = target.satisfied
-        said = violated(before), f"is {violated(after)}"
+        pair = violated(before), f"is {violated(after)}"
         more *= len(target.asked.terms) == 1
-    tone = "good" if met else "fair" if after < before else "bad"
-    return Finding(capital(target.label), *said, tone, tuple(more))
+    tone = "good" if met else "fair" if better else "bad"
+    return Finding(capital(target.label), *pair, tone, tuple(more))
 
 
 def _kept(limit: LimitRow) -> Finding:
     """A limit of a quantity that the answer breaks, or of statics, with its amounts."""
-    before, after = (limit.said(_rounded(a)) for a in (limit.initial, limit.optimal))
+    before, after = limit.said(limit.initial), limit.said(limit.optimal)
     tone = "good" if limit.satisfied else "bad"
-    return Finding(capital(limit.words), before, f"is {after}", tone, (limit.stated,))
+    return Finding(capital(limit.words), before, f"is {after}", tone)
 
 
 def _between(hz: Floats) -> str:
@@ -155,10 +179,10 @@ def _trust(results: RunResults) -> Iterator[str]:
     if row.model_error != 0.0:
         judged = results.discretisation
         few = judged is not None and judged.poses < results.time_s.size
-        where = f", at {judged.poses} of the samples" if judged is not None and few else ""
+        where = f" (checked at {judged.poses} samples)" if judged is not None and few else ""
         cause = "of mesh and reduced links" if results.reduced else "of the mesh"
         most = at_most(np.inf if row.model_error is None else row.model_error)
-        yield f"The modes asked for are too high because {cause}: {most}{where}."
+        yield f"Frequencies are too high because {cause}: {most}{where}."
     yield f"{capital(row.optimality.words)}."
     if not row.finished:
         yield "The search was ended before it was done."
@@ -167,7 +191,7 @@ def _trust(results: RunResults) -> Iterator[str]:
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
         yield f"{capital(clear.label)}: {proof}, {below} below."
     if row.robust is not None:
-        yield f"Robust instead of alone: {row.robust.words}."
+        yield f"What robustness costs: {row.robust.words}."
     found = results.meaning.tolerance
     if found is not None:
         yield f"{capital(found.words)}."
@@ -201,7 +225,3 @@ def _cost(results: RunResults) -> Iterator[str]:
         listed = any(row.choice_price is not None for row in results.design)
         what = "Price" if listed else "Price of the change"
         yield f"{what} {number(results.price)}".replace("-", "−")
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}") + 0.0

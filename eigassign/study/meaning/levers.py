@@ -7,7 +7,7 @@ each, the coordinates as they are. Those of the design have slopes already.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,12 @@ FEW = 21  # samples of a trajectory that modes are looked at
 
 
 def anatomies(
-    model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints], where: Callable[[int], str]
+    model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]
 ) -> Iterator[ModeAnatomy]:
     """Yield each mode's energies and what properties do to it, at poses q (n, n_q) of a design y.
 
-    ``numbers`` (n,) are by the mode's name those that it has there, 0 where it does not matter;
-    ``where`` says which pose k is. Raises EigassignError where the model has no such modes.
+    ``numbers`` (n,) are by the mode's name those that it has there, 0 where it does not matter.
+    Raises EigassignError where the model has no such modes.
     """
     count, x = max(int(own.max()) for own in numbers.values()), model.x(q, y)
     found = modes(model.pencil, x, count)
@@ -38,10 +38,9 @@ def anatomies(
     for name, own in numbers.items():
         there = np.flatnonzero(own)
 
-        def row(values: Floats, k: Ints = there, mode: Ints = own) -> tuple[float, float, str]:
+        def row(values: Floats, k: Ints = there, mode: Ints = own) -> tuple[float, float]:
             along = values[k, mode[k] - 1]
-            most = int(np.abs(along).argmax())
-            return float(along.mean()), float(along[most]), where(int(k[most]))
+            return float(along.mean()), float(along[np.abs(along).argmax()])
 
         none = np.zeros_like(found.lam)
         parts = tuple(

@@ -101,12 +101,8 @@ def _anatomies(
         return ()
     of_samples = {name: own[samples] for name, own in numbers.items()}
     q = scene.path.at(y)[0][samples]
-
-    def where(k: int) -> str:
-        return scene.path.where(int(samples[k]))
-
     try:
-        found = tuple(anatomies(scene.model, q, y, of_samples, where))
+        found = tuple(anatomies(scene.model, q, y, of_samples))
     except EigassignError as error:
         notes.append(f"missed modes are not explained: {error}")
         return ()

@@ -81,7 +81,7 @@ def relaxed_limits(
         while row.multiplier * amount > MOST * abs(F) > 0.0:
             amount = _rounded(0.5 * amount)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
-        change = f"{before:.4g} → {after:.4g}"
+        change = f"{before:.4g} → {after:.4g}{' kg' * (kind == 'mass')}"
         if kind.endswith("error") or kind == "room":
             change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
         yield RelaxedRow(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
+from eigassign.facts import positive_percent
 from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.design.search.response import reduced_about
 from eigassign.study.monotone import box_corners, corners, effects
@@ -90,7 +91,7 @@ def _rows(
         "bounded": "at most",
         "followed": "the worst of both corners",
     }.get(said, f"the worst of {DRAWS} draws and of corners")
-    changes = [f"worst error {100 * before:.3g} → {100 * after:.3g} %"] if own else []
+    changes = [f"worst error {positive_percent(before)} → {positive_percent(after)}"] if own else []
     for aim, row in zip(wanted, rows, strict=True):
         if aim.is_aim:
             least = aim.curve(exact).min(), row.lowest_hz.min()

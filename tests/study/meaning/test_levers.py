@@ -75,7 +75,7 @@ def test_energies_and_what_properties_do_agree_with_solves_of_other_mechanisms(s
     if not numbers:
         pytest.skip("modes meet")
     file = model.poses.case.with_design(y)
-    found = list(anatomies(model, np.atleast_2d(q), y, numbers, str))
+    found = list(anatomies(model, np.atleast_2d(q), y, numbers))
     own = {p.parameter for p in model.poses.case.design.parameters.values()}
     effects = [{row.property: row.percent_per_percent for row in one.properties} for one in found]
     for of, one in zip(effects, found, strict=True):
@@ -138,6 +138,7 @@ def test_a_missed_target_is_told_what_it_is_and_what_would_help() -> None:
     card = verdict_of(result.results)
     assert card is not None
     assert any("1 % more of what is no parameter" in line for line in card.helps)
+    assert card.helps[0].startswith("Strain energy of mode 1: drive of q2 ")
     assert b'"anatomies"' in to_json(result.results)
 
 
