@@ -204,12 +204,12 @@ def _in_degrees(source: Source, data: bytes) -> bool:
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
     """SHA-256 of each file that is there, by its name as seen from ``folder``.
 
-    Raises StorageError for one that is needed, is there, and cannot be read.
+    Raises StorageError for one that is there and cannot be read.
     """
     digests = {}
     for each in named:
         if (sha := file_digest(each.file, each.limit)) is not None:
             digests[seen_from(folder, each.file)] = sha
-        elif not each.spare and objection(each.file, each.limit) is None:
+        elif objection(each.file, each.limit) is None:
             raise StorageError(f"{each.file}: cannot be read: no permission, or the disk fails")
     return digests

@@ -185,7 +185,14 @@ MOTION = """\
 PROFILES = edited("{shape: circle, diameter: 30 mm}", "{file: table.csv, name: a}")
 
 
-@pytest.mark.parametrize("text", [PROFILES, edited(MOTION, "  file: table.csv\n")])
+@pytest.mark.parametrize(
+    "text",
+    [
+        PROFILES,
+        edited(MOTION, "  file: table.csv\n"),
+        TEXT + "measurements: {file: table.csv}\n",  # of which a run records what they are
+    ],
+)
 def test_so_is_a_table_that_a_case_names(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

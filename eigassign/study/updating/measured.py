@@ -20,8 +20,7 @@ from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, Measurem
 from eigassign.case.suggestions import shown, unknown
 from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
-from eigassign.errors import MechanismError, StorageError
-from eigassign.files import seen_from
+from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.built_case import BuiltCase
@@ -47,8 +46,7 @@ def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tu
     """All measurements in the order given, and notes on what was ignored.
 
     Raises CaseError for a file that cannot be read or holds what is no measurement (with its line),
-    for a time outside the trajectory, and for a trajectory that cannot be followed; StorageError
-    where the system does not give the file.
+    for a time outside the trajectory, and for a trajectory that cannot be followed.
     """
     given = case.file.measurements or ()
     if isinstance(given, MeasurementFile):
@@ -108,8 +106,6 @@ def _from_file(
         ),
     ]
     table = read_table(Path(given.file), _KEY, columns)
-    if seen_from(file.path.parent, given.file) not in file.files:  # the run records its SHA-256
-        raise StorageError(f"{given.file}: cannot be read: the disk failed meanwhile")
     if not 0 < len(table.lines) <= MOST_MEASUREMENTS:
         some = (
             "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
