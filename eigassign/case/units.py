@@ -127,7 +127,7 @@ _HANDY = {  # units that people read, the largest first
     "m4": {"m4": 1.0, "cm4": 1e-8, "mm4": 1e-12},
     "Pa": {"GPa": 1e9, "MPa": 1e6, "Pa": 1.0},
     "N/m": {"MN/m": 1e6, "kN/m": 1e3, "N/m": 1.0},
-    "m/N": {"mm/N": 1e-3, "um/N": 1e-6, "nm/N": 1e-9},
+    "m/N": {"mm/N": 1e-3, "µm/N": 1e-6, "nm/N": 1e-9},
     "N m/rad": {"MN m/rad": 1e6, "kN m/rad": 1e3, "N m/rad": 1.0},
     "kg m2": {"kg m2": 1.0, "kg cm2": 1e-4},
     "N": {"MN": 1e6, "kN": 1e3, "N": 1.0},

@@ -77,11 +77,11 @@ def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
     assert "statics" in [plan.name for plan in run_figures(results)]
     (table,) = [each for each in run_tables(results) if each.title == "Limits and bands"]
     (line,) = [each for each in table.rows if each[0].startswith("compliance")]
-    assert line[2:] == ("5.5 um/N", "met")
+    assert line[2:] == ("5.5 µm/N", "met")
     card = verdict_of(results)
     assert card is not None
     assert any(
-        "Compliance of forearm.end along [0, 1] at most 5.5 um/N" in f.label for f in card.findings
+        "Compliance of forearm.end along [0, 1] at most 5.5 µm/N" in f.label for f in card.findings
     )
     assert [one.tone for one in card.findings] == ["good"] * 4
 

@@ -94,18 +94,17 @@ def _sentence(findings: Sequence[Finding], reason: str) -> str:
     """The worst finding, first of all one in the reason, before and after; and of the others."""
     if not findings:
         return "nothing is limited."
-    tones = ("bad", "fair", "good")
-    worst = min(
-        findings, key=lambda f: (tones.index(f.tone), f.label.lower() not in reason.lower())
-    )
+    order, asked = ("bad", "fair", "good"), reason.lower()
+    worst = min(findings, key=lambda f: (order.index(f.tone), f.label.lower() not in asked))
     others = [one for one in findings if one is not worst]
     missed = sum(one.tone != "good" for one in others)
     before = "" if worst.before == "met" else f" ({worst.before} before)"
     said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after}{before}"
-    if others:
-        verb, some = ("missed", missed) if missed else ("met", "all")
-        many = f"{some} of the {len(others)} others are {verb}".replace("all of", "all")
-        said += f"; {many if len(others) > 1 else f'the other target is {verb}'}"
+    verb, many = ("missed", f"{missed} of") if missed else ("met", "all")
+    if len(others) == 1:
+        said += f"; the other target is {verb}"
+    elif others:
+        said += f"; {many} {len(others)} others are {verb}"
     return f"{said}."
 
 

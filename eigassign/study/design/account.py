@@ -452,7 +452,7 @@ def _of_starts(found: Found) -> str:
     if not np.isfinite(tally.unseen):
         return f"{words}; too few starts to estimate how many more there are"
     unseen = f"{tally.unseen:.1g}" if tally.unseen < 1.0 else f"{tally.unseen:.0f}"
-    return f"{words}; about {unseen} more are expected"
+    return f"{words}; about {unseen} others may not have been found"
 
 
 def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:
