@@ -29,14 +29,14 @@ LOOP = """
 import json, sys, time
 import eigassign as ea
 from eigassign.case import checked, read
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 from eigassign.batch.plan import plan_of
 from pathlib import Path
 
 plan = plan_of([Path(sys.argv[1])])
 written = read(sys.argv[1])
 values = [plan[k].values for k in map(int, sys.argv[2:])]
-cases = [Case(checked(written, values=each)) for each in values]
+cases = [BuiltCase(checked(written, values=each)) for each in values]
 ea.assign(cases[0])
 wall, processor = time.perf_counter(), time.process_time()
 for case in cases:

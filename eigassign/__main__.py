@@ -14,7 +14,10 @@ def main() -> int:
         from eigassign.cli import main as run
 
         code = run()
-    except KeyboardInterrupt:
+    except BaseException as error:
+        # before 3.12, Python makes a RuntimeError of an interrupt while a class is made
+        if KeyboardInterrupt not in (type(error), type(error.__cause__)):
+            raise
         sys.stderr.write("eigassign: interrupted\n")
         code = 130
     # CPython dies of SIGINT at its end, whatever the code, if an interrupt has passed through code

@@ -42,7 +42,7 @@ class Failure:
 def failure_of(error: BaseException) -> Failure:
     """Exit code and message of any error; a closed pipe has no message."""
     match error:
-        case KeyboardInterrupt():
+        case KeyboardInterrupt() | RuntimeError(__cause__=KeyboardInterrupt()):
             return Failure(INTERRUPTED, "interrupted")
         case Terminated():
             return Failure(error.exit_code, str(error))

@@ -19,6 +19,7 @@ from commands import SECONDS, TWO_LINK, eigassign_process, environment, python
 from wrong_inputs import GOOD
 
 import eigassign as ea
+from eigassign.__main__ import main as started
 from eigassign.cli import cli, main
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, StorageError
 
@@ -260,6 +261,23 @@ def test_ctrl_c_at_any_moment_of_the_start_shows_no_import_of_ours(start: tuple[
         codes.append(process.returncode)
         assert codes[-1] != 130 or err == "eigassign: interrupted\n"
     assert codes.count(130) > len(codes) / 4
+
+
+def test_ctrl_c_while_a_class_is_made_is_ctrl_c(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupting:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    def interrupted() -> None:
+        type("Made", (), {"name": Interrupting()})
+
+    monkeypatch.setattr(cli, "make_context", lambda *_: interrupted())
+    assert main([]) == 130
+    monkeypatch.setattr(sys.modules["eigassign.cli"], "main", interrupted)
+    assert started() == 130
+    assert capsys.readouterr().err == 2 * "eigassign: interrupted\n"
 
 
 @pytest.mark.parametrize("out", ["good.yaml/run", "good.yaml", "/dev/null/run"])
