@@ -122,7 +122,7 @@ def test_modes_are_not_drawn_over_something_else(capsys: Captured) -> None:
 
 def test_modes_say_where_they_were_solved(capsys: Captured) -> None:
     out = answer(capsys, "modes", TWO_LINK, "--q", "1.8, 5.3", "--y", "125 g, 0")
-    assert out.startswith("Modes at q1 = 1.8 rad, q2 = 5.3 rad, m1 = 0.125 kg, m2 = 0 kg\n")
+    assert out.startswith("Modes at q1 = 1.8 rad, q2 = 5.3 rad, m1 = 125 g, m2 = 0 kg\n")
 
 
 def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
