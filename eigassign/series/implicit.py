@@ -7,7 +7,8 @@ reached from a_0 in small steps, and a passage through a singular ∂F/∂p is r
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +58,11 @@ class ImplicitFunction:
     p0: Floats
     names: tuple[str, ...]
     title: str
-    found: dict[bytes, Floats] = field(default_factory=dict, repr=False)  # the last `KEPT`
+
+    @cached_property
+    def found(self) -> dict[bytes, Floats]:
+        """The last `KEPT` solutions, by their arguments; nothing that is stored with the rest."""
+        return {}
 
     def samples(self, a: Floats) -> Floats:
         """p (size, n_samples) at a (n_arguments, n_samples).
