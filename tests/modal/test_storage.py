@@ -45,6 +45,17 @@ def test_any_mechanism_survives_as_arrays(seed):
     )
 
 
+def test_a_loop_survives_after_it_was_solved(tmp_path):
+    case = api.load_case(Path(__file__).parents[2] / "cases" / "five_bar.yaml")
+    model, q, y = case.model(), case.trajectory.q, case.initial_design
+    built = reduce(model.pencil, q[0], y, (1,), 1)
+    before = built.frequencies(q, y), built.slopes(q, y)[0]
+    api.save_reduced(built, tmp_path / "loop.h5")
+    loaded = api.load_reduced(tmp_path / "loop.h5")
+    assert loaded.frequencies(q, y).tobytes() == before[0].tobytes()
+    assert loaded.slopes(q, y)[0].tobytes() == before[1].tobytes()
+
+
 def test_it_is_evaluated_where_there_is_no_mechanism(reduced, tmp_path):
     api.save_reduced(reduced, tmp_path / "arm.h5")
     code = (
