@@ -39,7 +39,7 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 SAID = 5  # choices of the numbers of modes below the bands whose outcome is told
-FINER = 6  # times that instants between samples are added: known cases took at most 3
+FINER = 6  # times that instants between samples are added: cases that could be met took up to 2
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 

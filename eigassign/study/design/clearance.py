@@ -10,7 +10,7 @@ in time, the room that the modes k and k + 1 leave,
 is followed on points between which no coordinate goes on by more than 5° or 2.5 % of its way, and
 which are made denser until half the second difference of g there and beside, twice what a parabola
 and as much as a kink can deviate from the chord, is less than the room that is left: that is
-checked, not proved. Between samples that are farther apart, other targets are looked at likewise.
+checked, not proved. Other targets are looked at between the samples likewise.
 
 Mesh and reduced links raise frequencies, by e at most, relative: mode k is below the band with more
 right than its number says, and mode k + 1 has to stay above it without e. Where e has no bound, or

@@ -49,10 +49,9 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
 SEARCHES = 100  # of branches: from then on only the best goes on, in its likeliest part
-PROMISING = (
-    4  # designs all over the bounds from which a branch is searched too: with 1, 4 of 7 known cases
-)
-#                ended up to 45 % short of their best optimum, with 4 none
+# Designs all over the bounds from which a branch is searched too: with 1, 4 of 7 known cases ended
+# up to 45 % short of their best optimum, with 4 none
+PROMISING = 4
 DRAWN = 6  # times that the limits of a branch are drawn in
 FEW = 5  # branches of an ended search that are completed
 Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
