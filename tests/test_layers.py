@@ -25,7 +25,6 @@ OWNERS = {
     "jinja2": {"output"},
     "platformdirs": {"output"},
     "click": {"cli"},
-    "sklearn": {"chart"},
     "distributed": {"batch"},
 }
 EVERYWHERE = {"numpy", "scipy"}

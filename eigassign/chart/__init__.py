@@ -16,7 +16,6 @@ __all__, __getattr__, __dir__ = face(
     {
         "comparison": "advise chart_meshes compare_methods front skipped_notes",
         "designs": "chart_designs",
-        "methods": "grid_interpolation grid_points spread_points surrogate_families",
         "question": "QUICK Effort build_bench build_question measure",
         "results": (
             "Advice Asked AutoTakes Chart ChartPoint DesignRun Errors Front MeshRow Request Timing "

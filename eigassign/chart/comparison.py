@@ -1,7 +1,6 @@
 """Every method put the same question: built, evaluated, timed, compared; meshes; what to choose.
 
-Evaluations are timed in large batches, as a search over designs asks for them: point by point, and
-of fits by whole trajectories, which they answer in one product of matrices.
+Evaluations are timed in large batches, as a search over designs asks for them.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
-from eigassign.chart.methods import Method, list_methods, surrogate_families
+from eigassign.chart.methods import Method, list_methods
 from eigassign.chart.question import (
     Bench,
     Effort,
@@ -46,7 +45,6 @@ from eigassign.study.build import build_model
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-ANEW = "is set up again for every design, and answers only whole trajectories"
 
 
 def compare_methods(
@@ -64,11 +62,6 @@ def compare_methods(
     counts = {"one trajectory": one, "1000 trajectories": 1000.0 * one}
     named = counts | ({f"{n:g} evaluations": n} if n else {}) | {"online alone": None}
     asked, notes = replace(question.asked, evaluations=n or one), list(skipped_notes(skipped))
-    largest = max([*effort.training, *(k ** len(bench.names) for k in effort.nodes)])
-    if bench.most_solves < largest:
-        notes.append(f"grids and surrogates have {bench.most_solves} exact solves at most")
-    if "Kriging" not in [family for family, *_ in surrogate_families()]:
-        notes.append("Kriging is left out: it needs scikit-learn")
     file = scene.file
     return Chart(
         title=file.title, case_name=file.path.stem, case_sha256=file.sha256,
@@ -119,37 +112,26 @@ def _chart_method(
     bench: Bench, question: Question, method: Method, exact_s: float
 ) -> tuple[ChartPoint, float]:
     """Set up, evaluated, timed and compared; and the seconds of setting up."""
-    points, asked, effort, anew = question.points, question.asked, bench.effort, method.per_design
-    solver, samples = method.family.startswith("exact"), asked.trajectory_samples
-    rows = question.runs if anew else [slice(0, method.parameters.get("points"))]
-    parts = [points[each] for each in rows]
-    own, set_up = measure(lambda: method.build(parts[0].y[0] if anew else None), effort)
-    pairs = [(own, parts[0]), *((method.build(part.y[0]), part) for part in parts[1:])]
-    hz, spent = timed(lambda: np.vstack([built.evaluate(part) for built, part in pairs]))
+    asked, effort, solver = question.asked, bench.effort, method.family.startswith("exact")
+    points = question.points[: method.parameters.get("points")]
+    built, set_up = measure(method.build, effort)
+    hz, spent = timed(partial(built.evaluate, points))
     # as many as take 20 ms at the pace of the first answers
-    many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(parts[0])), 32768))
-    some = parts[0][np.resize(np.arange(len(parts[0])), samples if anew else many)]
-    job, count = partial(own.evaluate, some), len(some)
-    if anew:
-        job = partial(lambda at: method.build(at.y[0]).evaluate(at), some)
-    elif own.along is not None:
-        designs = points.y[np.resize([run.start for run in question.runs], 1 + 32768 // samples)]
-        job, count = partial(own.along, designs), len(designs) * samples
-    offline = Timing(0.0, 0.0, 0.0, 0) if solver or anew else set_up
-    online, solves = measure(job, effort, count)[1], sum(built.solves for built, _ in pairs)
-    exact, n = question.exact_hz[rows[0].start :][: len(hz)], 0 if anew else asked.random_points
+    many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(points)), 32768))
+    some = points[np.resize(np.arange(len(points)), many)]
+    offline = Timing(0.0, 0.0, 0.0, 0) if solver else set_up
+    online = measure(partial(built.evaluate, some), effort, many)[1]
+    exact, n = question.exact_hz[: len(hz)], asked.random_points
     pays = not solver and online.median_s < exact_s
     point = ChartPoint(
         method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
-        offline=offline, online=online, solves=0 if anew else solves,
-        solves_online=solves / (samples * len(parts)) if anew else float(solver),
+        offline=offline, online=online, solves=built.solves, solves_online=float(solver),
         everywhere=errors(hz, exact, asked.floor_hz if solver else 0.0),
-        random=errors(hz[:n], exact[:n]) if n else None,
+        random=errors(hz[:n], exact[:n]),
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
         # from so many evaluations: offline + N online < N exact
         break_even=offline.median_s / (exact_s - online.median_s) if pays else None,
-        use=method.use, key=method.key, at_once=samples if anew else 1, note=ANEW if anew else "",
-        estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
+        use=method.use, key=method.key,
     )  # fmt: skip
     return point, set_up.median_s
 
@@ -216,13 +198,11 @@ def front(
 ) -> Front:
     """The methods that nothing beats in cost and error at once; errors below the floor are equal.
 
-    A point that equals another in one of the two and is no better in the other is beaten. A method
-    that is set up anew for every design has no part in the front of single evaluations.
+    A point that equals another in one of the two and is no better in the other is beaten.
     """
     able = [
         (p.cost_s(evaluations), max(p.everywhere.worst_hz, floor_hz), p.method)
         for p in _rivals(points)
-        if p.at_once == 1 or evaluations is not None
     ]
     kept, best = list[str](), np.inf
     for _, error, method in sorted(able, key=lambda each: each[:2]):
@@ -236,11 +216,10 @@ def advise(
 ) -> Iterator[Advice]:
     """What to choose for each number of evaluations, in words and as data.
 
-    For an accuracy the quickest method that is accurate enough, without those whose own estimate is
-    over a hundred times as large (most are cautious): they may know of places that the points of
-    the question miss. Nothing is advised below round-off: no method can be seen to be that
-    accurate. For a time, which counts the set-up, the most accurate method, the quicker of equals.
-    The words are of the first of them that a case can ask for.
+    For an accuracy the quickest method that is accurate enough. Nothing is advised below round-off:
+    no method can be seen to be that accurate. For a time, which counts the set-up, the most
+    accurate method, the quicker of equals. The words are of the first of them that a case can ask
+    for.
     """
     floor, rivals = asked.floor_hz / asked.typical_hz, _rivals(points)
     whole = (float(asked.trajectory_samples), 1000.0 * asked.trajectory_samples)
@@ -272,9 +251,9 @@ def _chosen(
         took, worst = p.parameters["choosing_s"], p.everywhere.worst_relative
         advice = replace(advice, auto=AutoTakes(p.method, worst, p.cost_s(n), took))
     if budget is None:
-        able = [p for p in rivals if _is_within(p, accuracy)]
+        able = [p for p in rivals if p.everywhere.worst_relative <= accuracy]
         keyed = [p for p in able if p.key]  # the lowest order, whatever the clock says
-        keyed += [p for p in own if _is_within(p, accuracy)]
+        keyed += [p for p in own if p.everywhere.worst_relative <= accuracy]
         able.sort(key=lambda p: p.cost_s(n))
     else:
         able = [p for p in rivals if p.cost_s(n) <= budget]
@@ -287,11 +266,6 @@ def _chosen(
         advice = replace(advice, key=p.key, key_method=p.method, key_sample_s=p.online.median_s)
         advice = replace(advice, key_relative=p.everywhere.worst_relative)
     return replace(advice, words=_words(advice, rivals))
-
-
-def _is_within(point: ChartPoint, accuracy: float) -> bool:
-    """True of what is accurate enough and does not doubt it."""
-    return max(point.everywhere.worst_relative, (point.estimate or 0.0) / 100.0) <= accuracy
 
 
 def _words(advice: Advice, rivals: Sequence[ChartPoint]) -> str:

@@ -1,10 +1,7 @@
 """The question put to every method, and how the answers are timed.
 
 Frequencies are asked for at random samples of trajectory × design box, and along the trajectory at
-several designs. Surrogates and grids are functions of a few *features* u in [0, 1]: the place along
-the trajectory, and each design parameter that may change. The place is the joint coordinate itself
-where only one matters to any frequency, else the distance travelled in joint coordinates. Either is
-the best choice for them: they need not learn poses that the trajectory never takes.
+several designs.
 
 Times are processor time, which on one thread is the time it takes where nothing else runs.
 """
@@ -46,11 +43,6 @@ class Effort:
     coefficients: int = 5000  # largest set that is expanded
     half_orders: tuple[int, ...] = (0, 1, 2, 3)
     expansion_points: tuple[int, ...] = (1, 3, 5)
-    fitted: tuple[tuple[int, int], ...] = ((1, 3), (2, 1))  # half order, points of reduced models
-    accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)  # of fits
-    nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)  # of a grid, along each axis
-    stations: tuple[int, ...] = (3, 5, 9, 17, 33, 65)
-    training: tuple[int, ...] = (27, 64, 125, 343)  # points of surrogates
     factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
     most_dof: int = 40_000  # of a refined mesh
     objectives: int = 600  # exact evaluations of the objective in a search
@@ -60,9 +52,8 @@ class Effort:
 
 QUICK = Effort(
     quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
-    expansion_points=(1, 3), fitted=(), accuracies=(1e-2, 1e-4, 1e-6, 1e-8), nodes=(3, 5, 7),
-    stations=(5, 17), training=(27, 125), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
-    objectives=60, repeat_s=0.1,
+    expansion_points=(1, 3), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500, objectives=60,
+    repeat_s=0.1,
 )  # fmt: skip
 
 
@@ -85,53 +76,35 @@ def measure(job: Callable[[], T], effort: Effort, count: int = 1) -> tuple[T, Ti
     return result, Timing(median, low, high, len(spent))
 
 
-# --- Features of the case, and its exact solves
+# --- The case, and its exact solves
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Poses q (n, n_q), designs y (n, n_y) and features u (n, d)."""
+    """Poses q (n, n_q) and designs y (n, n_y)."""
 
     q: Floats
     y: Floats
-    u: Floats
 
     def __len__(self) -> int:
         return len(self.q)
 
     def __getitem__(self, rows: slice | Ints) -> Points:
-        return Points(self.q[rows], self.y[rows], self.u[rows])
+        return Points(self.q[rows], self.y[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A case on which methods are tried: the features of its samples, and its exact solves."""
+    """A case on which methods are tried, and its exact solves."""
 
     scene: Scene
     effort: Effort
-    names: tuple[str, ...]  # of the features
-    place: Floats | None  # u_0 (n_t,) of the samples; None: no pose that matters changes
     lower: Floats  # (n_y,); the same as upper where a parameter is kept
     upper: Floats
 
     def points(self, samples: Ints, y: Floats) -> Points:
         """Samples of the trajectory (n,) at designs (n, n_y)."""
-        free = self.upper > self.lower
-        u = (y - self.lower)[:, free] / (self.upper - self.lower)[free]
-        u = u if self.place is None else np.column_stack([self.place[samples], u])
-        return Points(self.scene.path.q[samples], y, u)
-
-    def nearest(self, u: Floats) -> Points:
-        """The points at features (n, d), each at the nearest sample of the trajectory, once."""
-        samples, unit = np.zeros(len(u), dtype=np.intp), u
-        if self.place is not None:
-            order = np.argsort(self.place, kind="stable")
-            known, unit = self.place[order], u[:, 1:]
-            samples = order[np.searchsorted(0.5 * (known[1:] + known[:-1]), u[:, 0])]
-        free, y = self.upper > self.lower, np.tile(self.lower, (len(u), 1))
-        y[:, free] = (1.0 - unit) * self.lower[free] + unit * self.upper[free]
-        found = self.points(samples, y)
-        return found[np.unique(found.u, axis=0, return_index=True)[1]]
+        return Points(self.scene.path.q[samples], y)
 
     def exact(self, points: Points) -> Floats:
         """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
@@ -147,18 +120,11 @@ class Bench:
         self.exact(some[:1])
         return max(timed(lambda: self.exact(some))[1] / count, 1e-6)
 
-    @property
-    def most_solves(self) -> int:
-        """The most exact solves of one training: a table of 20 000 numbers stays in the cache."""
-        return max(4, min(20_000, int(self.effort.most_s / self.solve_s)))
-
 
 def build_bench(scene: Scene, effort: Effort) -> Bench:
     """Raises CaseError where nothing varies that a frequency could depend on."""
-    (lower, upper), place, model = scene.bounds, _place(scene), scene.model
-    names = [] if place is None else ["place along the trajectory"]
-    names += [model.y_names[k] for k in np.flatnonzero(upper > lower)]
-    if not names:
+    (lower, upper), model = scene.bounds, scene.model
+    if not (_moves(scene) or (upper > lower).any()):
         why, remedy = "no coordinate changes a frequency", "give"
         which = zip(scene.file.coordinates.values(), model.pencil.active, strict=False)
         if joints := ", ".join(dict.fromkeys(each.joint for each, active in which if active)):
@@ -167,18 +133,13 @@ def build_bench(scene: Scene, effort: Effort) -> Bench:
         room = f"{remedy} a design parameter a `max` above its `min`"
         message = f"nothing to chart: {why}, and no design parameter may change; {room}"
         raise CaseError((scene.file.problem("trajectory", message),))
-    return Bench(scene, effort, tuple(names), place, lower, upper)
+    return Bench(scene, effort, lower, upper)
 
 
-def _place(scene: Scene) -> Floats | None:
-    """The place (n_t,) of every sample."""
+def _moves(scene: Scene) -> bool:
+    """True where a joint on which a frequency depends moves along the trajectory, in rad or m."""
     s = scene.path.q @ joint_map(scene.model).T
-    if not s.size or np.ptp(s, axis=0).max() <= 1e-9:  # rad or m: it stands still
-        return None
-    if s.shape[1] == 1:
-        return np.asarray((s[:, 0] - s.min()) / np.ptp(s))
-    travelled = np.cumsum(np.linalg.norm(np.diff(s, axis=0, prepend=s[:1]), axis=1))
-    return np.asarray(travelled / travelled[-1])
+    return bool(s.size) and float(np.ptp(s, axis=0).max()) > 1e-9
 
 
 # --- The question
@@ -214,8 +175,8 @@ def build_question(bench: Bench) -> Question:
     exact_hz, samples = bench.exact(points), len(scene.path.q)
     floor = max(rounding_error(scene.model.pencil, x, max(modes)) for x in found.x[[0, -1]])
     asked = Asked(
-        modes=modes, n_dof=scene.model.n_dof, features=bench.names, random_points=n_random,
-        designs=len(runs), samples_per_design=n, trajectory_samples=samples,
+        modes=modes, n_dof=scene.model.n_dof, random_points=n_random, designs=len(runs),
+        samples_per_design=n, trajectory_samples=samples,
         evaluations=float(samples), seed=SEED, typical_hz=float(np.median(exact_hz)),
         floor_hz=floor * float(exact_hz.max()),
     )  # fmt: skip

@@ -10,7 +10,6 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -20,7 +19,7 @@ import scipy
 from eigassign._version import __version__
 from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
 
-SCHEMA = 5  # of chart.json
+SCHEMA = 6  # of chart.json
 _BREAK_EVEN = "evaluations from which it beats exact solves"
 _AUTO, _TIME = "order: auto takes", lambda s: time_in_words(s) if s else ""  # none is not told
 ErrorHz = Annotated[Hertz, Fact(digits=".2e")]
@@ -29,10 +28,8 @@ _KINDS = {  # of methods whose family begins so: the first that fits
     "Taylor": "series of λ",
     "1/λ": "series of 1/λ",
     "reduced": "reduced models",
-    "fit": "fits",
     "exact by others": "exact solves by others",
     "exact": "exact solves",
-    "": "interpolation and surrogates",
 }
 
 
@@ -120,11 +117,8 @@ class ChartPoint:
     random: Annotated[Errors | None, Fact("over random samples of trajectory × design box")]
     trajectory: Annotated[Errors | None, Fact("at several designs", "worst along the trajectory")]
     break_even: Annotated[float | None, Fact(_BREAK_EVEN, "pays from", "", ",.0f", "never")]
-    note: str = ""
     use: Annotated[str, Fact("the call that asks for it", "how")] = ""
     key: Annotated[str, Fact("what a case file asks for it by, under `expansion`")] = ""
-    at_once: Annotated[int, Fact("evaluations that come together: those of a trajectory")] = 1
-    estimate: Annotated[float | None, Fact("of fits: their own worst estimate, relative")] = None
 
     @property
     def exact_solves(self) -> str:
@@ -136,8 +130,7 @@ class ChartPoint:
         """Seconds for set-up and so many evaluations; of one evaluation alone where None."""
         if evaluations is None:
             return self.online.median_s
-        paid = ceil(evaluations / self.at_once) * self.at_once
-        return self.offline.median_s + paid * self.online.median_s
+        return self.offline.median_s + evaluations * self.online.median_s
 
 
 @dataclass(frozen=True)
@@ -234,7 +227,6 @@ class Asked:
 
     modes: tuple[int, ...]
     n_dof: int
-    features: Annotated[tuple[str, ...], Fact("what surrogates and grids are functions of")]
     random_points: int
     designs: int
     samples_per_design: int

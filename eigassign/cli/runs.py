@@ -290,9 +290,9 @@ def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str,
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     """Compare time and accuracy of all methods on one case.
 
-    Times exact solves, expansions, reduced models, interpolation and surrogates on this machine,
-    and compares them with the same exact frequencies. Compares meshes, and methods that search for
-    a design. Writes figures, chart.json and report.html, and says what to write in the case.
+    Times exact solves, expansions and reduced models on this machine, and compares them with the
+    same exact frequencies. Compares meshes, and methods that search for a design. Writes figures,
+    chart.json and report.html, and says what to write in the case.
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request

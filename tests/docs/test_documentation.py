@@ -276,7 +276,6 @@ def test_every_benchmark_is_described_and_its_peers_can_be_installed() -> None:
     assert {name for name in run if f"`{name}`" not in described} == set()
     extra = read(ROOT / "pyproject.toml").split("bench = [")[1]
     peers = {"eastereig": "EasterEig", "openseespy": "openseespy", "exudyn": "exudyn"}
-    peers |= {"smt": "smt", "sklearn": "scikit-learn"}
     used = {
         package
         for name, package in peers.items()

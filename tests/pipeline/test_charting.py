@@ -15,10 +15,7 @@ from eigassign.chart import Request
 from eigassign.pipeline import Options, chart_case
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
-FEW = replace(
-    TINY, half_orders=(), expansion_points=(1,), fitted=(), nodes=(), stations=(), accuracies=(),
-    factors=(1.0,), objectives=3,
-)  # fmt: skip
+FEW = replace(TINY, half_orders=(), expansion_points=(1,), factors=(1.0,), objectives=3)
 
 
 def test_a_case_whose_auto_refuses_is_charted_all_the_same(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """The figures of a chart: time against error on each front, elements, and ways to a design.
 
-Every figure is a scatter over two logarithmic axes. The first has four families, and what to write
+Every figure is a scatter over two logarithmic axes. The first has three families, and what to write
 in the case. Methods that differ by a setting are joined by a line: eigassign's filled, the others
 hollow and dashed. A colour is a kind of method; the legend names the kinds. A broad band joins the
 methods that no other beats.
@@ -22,7 +22,7 @@ from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark,
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
 WHOSE = {True: "eigassign", False: "others"}  # groups of the legend
 BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
-CHOICE = ("exact", "Taylor, full", "reduced, 1 point", "fit to an accuracy")  # families of it
+CHOICE = ("exact", "Taylor, full", "reduced, 1 point")  # families of it
 RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 
 
@@ -61,8 +61,8 @@ def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
     if few:
         shown = [p for p in shown if p.family in CHOICE or (first and p.method == first.key_method)]
         caption = (
-            "A point of the series is an `order`. Fits and reduced models are drawn to compare: no "
-            f"key of a case asks for them. Worst error {where}"
+            "A point of the series is an `order`. Reduced models are drawn to compare: no key of a "
+            f"case asks for them. Worst error {where}"
         )
 
     def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
@@ -82,11 +82,9 @@ def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
         best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
         below.append(curve(best, BAND))
     ringed = [p for p in shown if p.method in taken]
-    # what is set up anew for every design has no part in single evaluations
-    drawn = [p for p in shown if p.at_once == 1 or n is not None]
     curves = [
-        curve([p for p in drawn if p.family == family], PLAIN, kind_of(family), WHOSE[ours])
-        for family, ours in dict.fromkeys((p.family, p.ours) for p in drawn)
+        curve([p for p in shown if p.family == family], PLAIN, kind_of(family), WHOSE[ours])
+        for family, ours in dict.fromkeys((p.family, p.ours) for p in shown)
     ]
     marks = (*below, *([curve(ringed, RING, ring)] if ringed else ()), *_coloured(curves))
     room = (np.array([50.0 * floor]),)  # for the name of the level
