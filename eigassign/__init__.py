@@ -22,7 +22,7 @@ one function, `eigassign.pipeline.run.solve_case`.
     series         truncated power series and expressions that are evaluated on them
     case           a case file: schema, units, rules, every problem with its line
     mechanism      links, joints, kinematics: K and M of eq. (1), and the trajectory
-    modal          exact modes, expansions of eqs. (4)–(9), reduced models, fits
+    modal          exact modes, expansions of eqs. (4)–(9), reduced models
     assignment     the quadratic program of eqs. (13)–(14)
     study          one case: choices left to auto, optimal design, comparison with exact
     chart          time against accuracy of every method on one case
@@ -43,13 +43,9 @@ if TYPE_CHECKING:
     from typing import Any
 
     from eigassign.api import (
-        Box,
         Case,
-        Fit,
-        PathFit,
         assign,
         expand,
-        fit,
         load_case,
         load_reduced,
         reduce,
@@ -60,16 +56,12 @@ if TYPE_CHECKING:
     from eigassign.errors import CaseError, EigassignError
 
 __all__ = [
-    "Box",
     "Case",
     "CaseError",
     "EigassignError",
-    "Fit",
-    "PathFit",
     "__version__",
     "assign",
     "expand",
-    "fit",
     "load_case",
     "load_reduced",
     "reduce",

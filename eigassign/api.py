@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from eigassign.errors import EigassignError, UsageError
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal.expansion import Expansion
-from eigassign.modal.fit.fit import Fit, PathFit, fit
-from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
@@ -36,13 +34,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "Box",
     "Case",
-    "Fit",
-    "PathFit",
     "assign",
     "expand",
-    "fit",
     "load_case",
     "load_reduced",
     "reduce",

@@ -44,8 +44,7 @@ def test_what_people_look_at_is_shown_in_a_few_lines(case: ea.Case, result: Resu
         expansion,
     ]
     shown += [expansion.inverse, expansion.space, ea.reduce(model, q[0], y), model.shapes(q[0], y)]
-    shown += [model.tracked(q, y), ea.fit(model, q, y, solves=3), ea.fit(model, case.trajectory, y)]
-    shown += [result, result.results, result.assignment]
+    shown += [model.tracked(q, y), result, result.results, result.assignment]
     shown += [*result.results.targets, *result.results.studies, result.results.poses]
     assert [each for each in shown if len(repr(each)) > LONGEST or "\n" in repr(each)] == []
 
@@ -57,8 +56,6 @@ def test_a_repr_says_what_it_is(case: ea.Case, result: Result) -> None:
     assert f"m1 = {result.design['m1']:.4g} kg" in repr(result)
     expansion = ea.expand(case.model(), [1.8, 5.3], [0.1, 0.1], order=2)
     assert repr(expansion).startswith("<Expansion of λ of mode 1: order 2, 10 coefficients in 3 va")
-    fitted = ea.fit(case.model(), case.trajectory.q, [0.1, 0.1], modes=[1, 2], solves=5)
-    assert "of modes (1, 2): 5 terms in 1 variable from 5 solves>" in repr(fitted)
 
 
 @pytest.mark.parametrize("name", [n for n in ea.__all__ if inspect.isfunction(getattr(ea, n))])
@@ -71,7 +68,7 @@ def test_help_says_what_a_function_raises(name: str) -> None:
 def test_help_says_what_objects_hold_and_in_which_units(case: ea.Case) -> None:
     model, q, y = case.model(), case.trajectory.q, case.initial_design
     objects = [case, model, ea.expand(model, q[0], y, order=1), ea.reduce(model, q[0], y)]
-    for each in [*objects, ea.fit(model, q, y, solves=3)]:
+    for each in objects:
         text = " ".join((inspect.getdoc(type(each)) or "").split())
         assert "(n" in text, type(each)  # shapes
         assert "Hz" in text or "f = √λ / 2π" in text, type(each)

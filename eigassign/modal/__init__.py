@@ -1,4 +1,4 @@
-"""Frequencies of the affine pencil: exact, by Taylor expansion, reduced, and fitted.
+"""Frequencies of the affine pencil: exact, by Taylor expansion, and reduced.
 
 In reading order:
 
@@ -18,7 +18,6 @@ In reading order:
     statics      what gives way under forces at nodes and the weight, with slopes
     slow_motion  how much the neglected motion would move the frequencies
     adaptive     the least mesh, order and reduction that meet an accuracy
-    fit          polynomials through exact frequencies, with an error estimate
 """
 
 from eigassign.faces import face
@@ -40,10 +39,6 @@ __all__, __getattr__, __dir__ = face(
         "exact.substructure": "Inner proved solve_large solve_together",
         "exact.tracking": "overlaps track",
         "expansion": ("Expansion NearestExpansion companion_order expand radius_share"),
-        "fit.interpolation": "Interpolant Nodes basis_at interpolate interval_nodes sample_nodes",
-        "fit.path": "smooth_parts",
-        "fit.region": "Box",
-        "fit.source": "FINE",
         "model": "Model",
         "projection": "project project_at project_terms",
         "reduced.added_mass": "added_mass",

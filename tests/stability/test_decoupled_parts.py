@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from calibration import Drawn, Floats, Tally, tally
+from calibration import Drawn, Tally, tally
 from decoupled import comb, decoupled
 from stress import answered, judged
 from test_calibration import polynomial, reduced_model
 
-from eigassign import fit
-from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal import Box, expand, reduce, reduce_adaptively
+from eigassign.modal import expand, reduce, reduce_adaptively
 
 TIP = np.linspace(0.0, 0.1, 21)[:, None]  # kg
 
@@ -34,8 +31,6 @@ def test_a_cantilever_that_a_mass_brings_down_is_not_overlooked(start):
         assert (approximation.error_estimate([], TIP)[exact < 0.999 * exact[0]] > 0.01).all()
         assert answered(approximation, [], TIP[TIP[:, 0] < 0.07]) == 1.0
         assert answered(approximation, [], 5.0 * TIP[10:]) == 0.0
-    with pytest.raises(AccuracyError, match="what is fitted leaves an error of"):
-        fit(reduce(model.pencil, [], [start], (1,), 2), [], Box([0.0], [0.1]), accuracy=1e-4)
 
 
 def test_a_reduced_model_that_adapts_finds_it():
@@ -60,34 +55,6 @@ def none_below(found: Tally) -> None:
     assert found.covered >= 0.999
     assert np.median(found.overestimate[found.above_rounding]) < 20.0
     assert found.refused[found.half_orders > 1].mean() < 0.1
-
-
-def near(seed: int, samples: int) -> Drawn | None:
-    """One pose, and designs up to half of the box away: kinks are everywhere in the whole of it."""
-    drawn, rng = decoupled(seed, samples), np.random.default_rng([seed, 42])
-    if drawn is None:
-        return None
-    y = drawn.y0 + float(rng.choice([1e-3, 1e-2, 0.1, 0.5])) * (drawn.y - drawn.y0)
-    return replace(drawn, q=np.tile(drawn.q0, (len(y), 1)), y=y)
-
-
-def fitted(drawn: Drawn) -> tuple[Floats, Floats]:
-    """A fit over the box that the designs span, of exact solves or of a reduced model."""
-    rng = np.random.default_rng([drawn.seed, 45])
-    asked: dict[str, Any] = {"solves": int(rng.choice([9, 16, 40]))}
-    if rng.random() < 0.5:
-        asked = {"accuracy": float(rng.choice([1e-2, 1e-4, 1e-6]))}
-    source: Any = drawn.model
-    box = Box(drawn.y.min(axis=0), drawn.y.max(axis=0))
-    try:
-        if rng.random() < 0.3:
-            source = reduce(drawn.model.pencil, drawn.q0, drawn.y0, drawn.modes, drawn.half_order)
-        found = fit(source, drawn.q0, box, drawn.modes, most=400, **asked)
-    except (AccuracyError, UsageError):  # where nothing matters there is no region either
-        nothing = np.full((len(drawn.y), len(drawn.modes)), np.inf)
-        return nothing, nothing
-    hz = found.frequencies(drawn.q, drawn.y)
-    return hz, np.full(hz.shape, found.error_estimate)
 
 
 def test_no_answer_of_decoupled_parts_is_below_its_estimate():
@@ -119,21 +86,3 @@ def test_first_order_and_links_almost_without_mass_are_right_or_refused(seeds):
     found = tally(seeds, 6, reduced_model, light)
     assert found.covered == 1.0
     assert found.refused.mean() < 0.5
-
-
-def test_no_fit_of_decoupled_parts_is_below_its_estimate():
-    none_of_fits_below(tally(range(8), 20, fitted, near))
-
-
-@pytest.mark.slow
-def test_no_fit_of_thousands_of_decoupled_parts_is_below_its_estimate():
-    none_of_fits_below(tally(range(30_000, 30_800), 30, fitted, near))
-
-
-def none_of_fits_below(found: Tally) -> None:
-    """As of all fits, an error may be twice its estimate; round-off of exact solves aside."""
-    given = ~found.refused
-    over = np.maximum(found.error - found.floor, 0.0)[given] / found.estimate[given]
-    assert (over <= 2.0).all()
-    assert (over <= 1.0).mean() >= 0.999
-    assert given.mean() > 0.2

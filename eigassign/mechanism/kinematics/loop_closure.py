@@ -415,16 +415,14 @@ def _guess(tree: Topology, assembly: object) -> Floats | None:
 
 
 def kronecker(count: int, n: int) -> Floats:
-    """Evenly spread points (count, n) of the unit cube: (1/2 + k α) mod 1 (Roberts 2018)."""
-    return np.mod(0.5 + np.arange(count)[:, None] * strides(n), 1.0)
+    """Evenly spread points (count, n) of the unit cube: (1/2 + k α) mod 1 (Roberts 2018).
 
-
-def strides(n: int) -> Floats:
-    """α_i = g^-i (n,), g > 1 the root of g^(n+1) = g + 1, the golden ratio for n = 1."""
+    α_i = g^-i (n,), g > 1 the root of g^(n+1) = g + 1, the golden ratio for n = 1.
+    """
     g = 1.5
     for _ in range(60):  # contracts by at least 2 a step
         g = (1.0 + g) ** (1.0 / (n + 1.0))
-    return np.asarray(g ** -np.arange(1.0, n + 1.0))
+    return np.mod(0.5 + np.arange(count)[:, None] * g ** -np.arange(1.0, n + 1.0), 1.0)
 
 
 def _wrapped(angles: Floats) -> Floats:

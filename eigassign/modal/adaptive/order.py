@@ -158,7 +158,7 @@ def expansions(
     tried = f"of order up to {max(_affordable(pencil, orders))} at up to {MAX_POINTS} points"
     raise AccuracyError(
         f"no expansion {tried if looks < most_looks else 'tried'} reaches {accuracy:.1e}: "
-        f"{nearest}. Ask for less, narrow the bounds of the design, or use ea.reduce or ea.fit"
+        f"{nearest}. Ask for less, narrow the bounds of the design, or use ea.reduce"
     )
 
 

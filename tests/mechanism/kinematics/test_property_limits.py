@@ -75,7 +75,6 @@ def test_a_value_that_no_mechanism_can_have_is_refused(path, low, high, section,
             lambda y: model.shapes(pose, y, 2),
             lambda y: ea.expand(model, pose, y, order=2),
             lambda y: ea.reduce(model, pose, y),
-            lambda y: ea.fit(model, pose, ea.Box(y, [high]) if y < [low] else ea.Box([low], y)),
         ]
         for ask in asks:
             with pytest.raises(UsageError, match=rf"no mechanism has p = .*{path.split('.')[-1]}"):
