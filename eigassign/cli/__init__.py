@@ -10,13 +10,14 @@ Reading order:
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, status, schema
     export     export, animate
-    start      init, docs, completion
+    start      init, docs
     batch      batch, merge
     cache      cache path, list, clear
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -32,8 +33,10 @@ from eigassign.cli.export import animate, export
 from eigassign.cli.inspect import check, modes, schema, status
 from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
-from eigassign.cli.start import complete, completion, docs, init
+from eigassign.cli.start import docs, init
 from eigassign.errors import UsageError
+
+COMPLETE = "_EIGASSIGN_COMPLETE"  # the name that click gives it
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -44,12 +47,19 @@ def main(args: Sequence[str] | None = None) -> int:
     process.replace_what_cannot_be_encoded()
     try:
         with process.terminable():
-            completed = complete(cli)
-            code = _invoke(arguments) if completed is None else completed
+            asked = os.environ.get(COMPLETE)
+            code = _invoke(arguments) if asked is None else _completed(asked)
             process.flush_streams()
             return code
     except BaseException as error:
         return _reported(error, arguments)
+
+
+def _completed(asked: str) -> int:
+    """Print click's script of a shell, or what that script asks for behind a tab; the exit code."""
+    from click.shell_completion import shell_complete
+
+    return shell_complete(cli, {}, "eigassign", COMPLETE, asked)
 
 
 def _reported(error: BaseException, arguments: list[str]) -> int:
@@ -118,6 +128,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, validate, chart, merge, status, export, animate, cache, schema, completion)
+MORE = (modes, expand, validate, chart, merge, status, export, animate, cache, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

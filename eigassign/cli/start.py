@@ -1,8 +1,7 @@
-"""The first minute: `init` writes a case to start from, `docs` shows the manual, `completion`."""
+"""The first minute: `init` writes a case to start from, `docs` shows the manual."""
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import show
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, at_home, quoted, read_bytes
+from eigassign.files import quoted
 
 PACKAGE = Path(__file__).parents[1]
 STARTERS = PACKAGE / "starters"
@@ -215,74 +214,3 @@ def _in_plain_text(found: re.Match[str]) -> str:
     for pattern, shown in _SHOWN.items():
         formula = re.sub(pattern, shown, formula)
     return formula if found[2] else re.sub(r"^(?=.)", "    ", formula.strip(), flags=re.MULTILINE)
-
-
-# --- Shell completion
-
-VARIABLE = "_EIGASSIGN_COMPLETE"
-SHELLS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ""}  # and the file that each reads at start
-_ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }\n"
-
-
-@click.command(
-    epilog=arguments.examples("eigassign completion bash", "eigassign completion bash --install")
-)
-@click.argument("shell", type=click.Choice(list(SHELLS)), required=False, metavar="[SHELL]")
-@click.option("--install", is_flag=True, help="Set up completion for new terminals of this user.")
-def completion(shell: str | None, install: bool) -> int:
-    """Set up completion by tab, in bash, zsh or fish.
-
-    Prints the script of SHELL (default: that of $SHELL). With --install it is written to a file in
-    your home folder, and for bash and zsh a line is added to .bashrc or .zshrc.
-    """
-    name = shell or Path(os.environ.get("SHELL", "")).name
-    if name not in SHELLS:
-        raise UsageError(f"unknown shell {name or '$SHELL'!r}: give bash, zsh or fish")
-    script = _script(name)
-    if not install:
-        click.echo(script)
-        return 0
-    home = at_home("~", "--install")
-    if name == "fish":
-        _write(home / ".config/fish/completions/eigassign.fish", script)
-    else:
-        place = home / f".local/share/eigassign/completion.{name}"
-        _write(place, script)
-        _add_line(home / SHELLS[name], f'[ ! -r "{place}" ] || . "{place}"')
-    click.echo("open a new terminal, type eigassign and press tab")
-    return 0
-
-
-def complete(cli: click.Command) -> int | None:
-    """Print what the shell asks for behind a tab; its exit code, None if it asks nothing."""
-    if (asked := os.environ.get(VARIABLE)) is None:
-        return None
-    from click.shell_completion import shell_complete
-
-    return shell_complete(cli, {}, "eigassign", VARIABLE, asked)
-
-
-def _script(shell: str) -> str:
-    from click.shell_completion import get_completion_class
-
-    made = get_completion_class(shell)
-    if made is None:
-        raise UsageError(f"this version of click knows no completion of {shell}")
-    source = made(click.Command("eigassign"), {}, "eigassign", VARIABLE).source()
-    return _ZSH + source if shell == "zsh" else source
-
-
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    show(f"{path} written")
-
-
-def _add_line(path: Path, line: str) -> None:
-    """Add a line at the end of a file, unless it has that line."""
-    before = read_bytes(path, CASE).decode() if path.exists() else ""
-    if line not in before.splitlines():
-        apart = "" if before.endswith("\n") or not before else "\n"
-        with open(path, "a", encoding="utf-8") as file:
-            file.write(f"{apart}{line}\n")
-        show(f"{path}: one line added")

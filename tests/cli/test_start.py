@@ -1,9 +1,8 @@
-"""The first minute: starters that run as they are, the manual, completion, and the examples."""
+"""The first minute: starters that run as they are, the manual, tabs, and the examples."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -123,28 +122,12 @@ def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_is_installed_by_one_command_once(shell: str, capsys: Captured) -> None:
-    rc = Path(f".{shell}rc")
-    if shell != "fish":
-        rc.write_text("export A=1")
-    for _ in range(2):
-        assert main(["completion", shell, "--install"]) == 0
-    scripts = [path for path in Path().rglob("*eigassign*/*") if path.is_file()]
-    scripts += Path().glob(".config/fish/completions/*")
-    assert len(scripts) == 1
-    assert "_EIGASSIGN_COMPLETE" in scripts[0].read_text()
-    if shell != "fish":
-        first, line = rc.read_text().splitlines()
-        assert first == "export A=1"
-        assert str(scripts[0].absolute()) in line
-
-
-def test_without_a_home_folder_completion_is_not_installed(
-    monkeypatch: pytest.MonkeyPatch, capsys: Captured
+def test_a_shell_is_given_the_script_of_click(
+    shell: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
-    monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # as it is where none is known
-    assert main(["completion", "bash", "--install"]) == 2
-    assert "--install: there is no home folder for '~'" in capsys.readouterr().err
+    monkeypatch.setenv("_EIGASSIGN_COMPLETE", f"{shell}_source")
+    assert main([]) == 0
+    assert f"_EIGASSIGN_COMPLETE={shell}_complete" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
