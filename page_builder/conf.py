@@ -3,8 +3,8 @@
 The site has the manual, the README, the cases and the benchmarks, at the places that they have in
 the repository, so that every link leads where it does there. The headings of the manual's index and
 the links below them are the table of contents. Formulas stand as TeX in the pages, with the field's
-symbols as they are (λ, φ, ∂): hosts of repositories set them, `eigassign docs` shows them as text,
-and here they are MathML, which needs no script.
+symbols as they are (λ, φ, ∂): hosts of repositories set them, `eigassign docs` leaves them so, and
+here they are MathML, which needs no script.
 """
 
 from __future__ import annotations

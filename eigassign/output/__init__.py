@@ -26,7 +26,7 @@ __all__, __getattr__, __dir__ = face(
         "batch.index": "Index",
         "batch.outcome": "CaseOutcome frequency_ranges from_line to_line",
         "batch.summary": "batch_table",
-        "console": "print_assignment print_tables print_verdict progress wrapped",
+        "console": "markdown print_assignment print_tables print_verdict progress wrapped",
         "exchange.files": "write_exchange",
         "exchange.reduced_file": "load_reduced",
         "figures.front": "chart_figures",

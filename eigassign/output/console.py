@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import shutil
 import sys
 import textwrap
@@ -49,13 +50,24 @@ def wrapped(lines: Iterable[str], room: int) -> list[str]:
     return text
 
 
+_FORMULA = re.compile(r"(```.*?```|`[^`]*`)|(\$\$.+?\$\$)|\$[^$]+\$", re.DOTALL)  # or code
+
+
 def markdown(text: str, out: TextIO) -> str:
-    """A page of the manual as ``out`` shows it, in lines of at most 100 columns."""
+    """A page of the manual as ``out`` shows it, in lines of at most 100 columns.
+
+    Formulas stay TeX as it is written.
+    """
     console = _console(out, min(width(), 100))
     from rich.markdown import Markdown  # takes 0.15 s, and only the manual needs it
 
-    console.print(Markdown(text, hyperlinks=False))
+    console.print(Markdown(_FORMULA.sub(_as_code, text), hyperlinks=False))
     return _written(console)
+
+
+def _as_code(found: re.Match[str]) -> str:
+    code, displayed = found.groups()
+    return code or (f"```\n{displayed}\n```" if displayed else f"`{found[0]}`")
 
 
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:

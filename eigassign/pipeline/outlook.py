@@ -75,7 +75,7 @@ def next_step(case: CaseFile) -> str:
     if not missing:
         return f"eigassign optimize {name}"
     needs = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
-    pose, more = "", f"eigassign docs {missing[0]}"
+    pose, more = "", "eigassign docs case-file"
     if case.trajectory is None and case.expansion.q == "auto" and case.coordinates:
         pose = f' --q "{", ".join(f"{value:g}" for value in resting_pose(case))}"'
     return f"eigassign modes {name}{pose} --draw (to optimize it needs {needs}: {more})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import shlex
@@ -14,6 +15,7 @@ from commands import TWO_LINK
 
 import eigassign as ea
 from eigassign.cli import cli, main
+from eigassign.output import markdown
 
 CASES = TWO_LINK.parent
 STARTERS = Path(ea.__file__).parent / "starters"
@@ -93,32 +95,27 @@ def test_the_first_help_page_shows_six_commands_and_the_rest_below(capsys: Captu
     assert [*listed[0], *listed[1]] == list(cli.commands)  # each in one line
 
 
-def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
-    def shown(*topic: str) -> str:
-        assert main(["docs", *topic]) == 0
-        return capsys.readouterr().out
+def test_the_manual_lists_its_pages_and_shows_one(capsys: Captured) -> None:
+    assert main(["docs"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert listed[0].split(maxsplit=1) == ["tutorial", "Tutorial"]
+    names = [line.split()[0] for line in listed]
+    assert {"case-file", "own-arm", "keys", "theory"} <= set(names)
+    for name in [*names, "how-to/own-arm.md", "case-file.md#targets"]:
+        assert main(["docs", name]) == 0
+        assert capsys.readouterr().out.startswith("# ")
+    assert main(["docs", "case_file"]) == 2
+    assert "did you mean 'case-file'?" in capsys.readouterr().err
 
-    assert shown().startswith("# The manual of eigassign\n")
-    assert shown("case-file").startswith("# The case file\n")
-    assert shown("Case", "file") == shown("case-file.md") == shown("case-file")
-    joints = shown("joints")
-    assert joints.startswith("### joints\n")
-    assert "#### joints, type: revolute" in joints
-    assert "### bodies" not in joints
-    assert shown("../reference/keys.md#joints-type-nut").startswith("#### joints, type: nut")
-    assert shown("set-up").startswith("## Set-up")
-    assert shown("keep_out").startswith("### targets, with keep_out")
-    assert "#### keep_out" in shown("keep_out")
-    assert shown("links").startswith("### links\n")  # the keys, not the prose of a guide
-    assert "#### links, type: beam" in shown("links")
-    assert shown("Links").startswith("## Links\n\nTake lengths")
-    assert shown("update").startswith("## eigassign update\n")
-    assert shown("urdf").startswith("## Robots from URDF\n")  # no heading begins so, one has it
-    assert shown("dmig").startswith("#### links, type: superelement\n")  # one text has it
-    assert main(["docs", "no such thing"]) == 2
-    assert "eigassign docs lists the pages" in capsys.readouterr().err
-    assert main(["docs", "waypoints"]) == 2
-    assert "it is mentioned below 'trajectory, with tip'" in capsys.readouterr().err
+
+def test_a_terminal_shows_markdown_and_leaves_formulas_as_they_are() -> None:
+    page = "# Title\n\nA *word*, `$x`, $K_{EE} φ_1$.\n\n$$\na \\\\ b_i c_j\n$$\n"
+    shown = markdown(page, io.StringIO())
+    assert "# Title" not in shown
+    assert "*word*" not in shown
+    assert "word, $x, $K_{EE} φ_1$" in shown
+    assert "a \\\\ b_i c_j" in shown
+    assert "\x1b" not in shown
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -220,31 +220,6 @@ def test_the_manual_s_index_lists_every_page_and_all_are_installed() -> None:
     assert '"docs/*.md", "docs/*/*.md"' in read(ROOT / "pyproject.toml")
 
 
-@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=page_id)
-def test_what_a_link_names_is_a_topic_of_the_terminal(
-    page: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    links = re.findall(r"\]\(((?!https?:)[^)]*\.md(?:#[^)]*)?)\)", prose(page))
-    for link in dict.fromkeys(links):
-        path, _, anchor = link.partition("#")
-        if MANUAL in (page.parent / path).resolve().parents:
-            assert main(["docs", link]) == 0
-            shown = capsys.readouterr().out.splitlines()[0]
-            assert not anchor or anchor in anchors_of(shown), link
-
-
-@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=page_id)
-def test_formulas_are_text_in_the_terminal(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["docs", page.stem]) == 0
-    shown = re.sub(r"^```.*?^```|`[^`]*`", "", capsys.readouterr().out, flags=re.DOTALL | re.M)
-    assert re.findall(r"\$|\\[a-z]+|[_^]\{", shown) == []
-    if page.stem == "theory":
-        assert "\n\n    K = Bᵀ k B,    M = Bᵀ m B     (1)\n\n" in shown
-        assert "φ_F = −M_FF⁻¹ M_FE φ_E" in shown
-        assert "[K_0 − λ_0 M_0, −M_0 φ_0; −φ_0ᵀ M_0, 0] [φ_γ; λ_γ] = [r_γ; s_γ]" in shown
-        assert "stiffness and mass matrix of [u; q̇], order n_u + n_q" in shown
-
-
 def test_every_how_to_page_has_its_picture_and_all_are_small() -> None:
     pages = {page.stem: read(page) for page in (MANUAL / "how-to").glob("*.md")}
     assert set(builder("pictures").PICTURES) == set(pages)
