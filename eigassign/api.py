@@ -20,7 +20,6 @@ from eigassign.output.exchange import reduced_file
 from eigassign.output.figures.motion import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
-from eigassign.pipeline.animation import animate
 from eigassign.pipeline.outlook import picture
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
@@ -52,9 +51,9 @@ class Case(built_case.BuiltCase):
     ``model()`` is the mechanism: ``.frequencies(q, y)`` in Hz at q (n, n_q) in rad or m and y
     (n_y,) in SI units, by K φ = λ M φ, eq. (1). ``trajectory.q`` (n, n_q) at ``.time_s`` (n,) in s,
     of several trajectories one after the other; ``trajectories`` each by itself;
-    ``initial_design`` y as written; ``file`` what the file says. ``plot()``, ``plot_mode()`` and
-    ``animate()`` draw it. These raise CaseError, with its lines, for a mechanism that cannot be
-    modelled or cannot follow its trajectory. Made by ``load_case``.
+    ``initial_design`` y as written; ``file`` what the file says. ``plot()`` and ``plot_mode()``
+    draw it. These raise CaseError, with its lines, for a mechanism that cannot be modelled or
+    cannot follow its trajectory. Made by ``load_case``.
     """
 
     def _repr_html_(self) -> str:
@@ -81,20 +80,6 @@ class Case(built_case.BuiltCase):
         lengths and for more modes than there are.
         """
         return drawn(mode_figures(self._pictures(mode, q, y))[mode - 1])
-
-    def animate(
-        self,
-        path: str | Path,
-        mode: int | None = None,
-        q: Sequence[float] | None = None,
-        y: Sequence[float] | None = None,
-    ) -> None:
-        """Write ``path``, a GIF or animated PNG by its ending: the motion along the trajectory.
-
-        With ``mode`` one period of that mode instead, at q and y as in `plot_mode`. Raises
-        UsageError for another ending, StorageError where it cannot be written.
-        """
-        animate(self, path, mode, q, y)
 
     def _pictures(
         self, mode: int, q: Sequence[float] | None, y: Sequence[float] | None

@@ -19,7 +19,6 @@ OWNERS = {
     "osqp": {"assignment"},
     "h5py": {"hdf5", "output"},
     "matplotlib": {"output"},
-    "PIL": {"output"},  # comes with matplotlib
     "markupsafe": {"output"},  # comes with Jinja
     "rich": {"output"},
     "jinja2": {"output"},

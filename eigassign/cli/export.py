@@ -1,4 +1,4 @@
-"""Files for other programs and for people: `export`, `animate`."""
+"""Files for other programs: `export`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import print_json, reporting, show
-from eigassign.files import folder_name
 
 
 @click.command(
@@ -59,46 +58,4 @@ def export(
         f"  modes {numbers}: {made.size} unknowns, expansion points {made.points}; error estimate "
         f"at most {made.error_estimate:.1e} at {made.samples} poses and designs"
     )
-    return 0
-
-
-@click.command(
-    epilog=arguments.examples(
-        "eigassign animate planar_arm.yaml arm.gif",
-        'eigassign animate planar_arm.yaml second.png --mode 2 --q "30 deg, 90 deg"',
-    )
-)
-@arguments.case
-@click.argument("file", required=False, type=arguments.PATH)
-@click.option(
-    "--mode", type=click.IntRange(1), help="Animate the shape of this mode (default: the motion)."
-)
-@arguments.pose
-@click.option("--trajectory", metavar="NAME", help="Which trajectory (default: the first).")
-@arguments.common
-def animate(
-    case: Path,
-    file: Path | None,
-    mode: int | None,
-    q: str | None,
-    y: str | None,
-    trajectory: str | None,
-    **how: Any,
-) -> int:
-    """Animate the motion, or a mode.
-
-    FILE ends in .gif, or in .png for an animated PNG; without FILE it is results/<case>_motion.gif,
-    or results/<case>_mode_1.gif of mode 1. An existing FILE is replaced.
-    """
-    from eigassign.pipeline.animation import animate as animated
-    from eigassign.study.built_case import load_case
-
-    if file is None:
-        what = "motion" if mode is None else f"mode_{mode}"
-        file = Path("results", folder_name(f"{case.stem}_{what}") + ".gif")
-    with reporting(how) as reporter:
-        loaded = load_case(case, how["allow_outside"])
-        reporter.stage("drawing the frames")
-        animated(loaded, file, mode, q, y, trajectory)
-    show(f"{file} written")
     return 0

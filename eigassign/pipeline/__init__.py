@@ -9,7 +9,6 @@ Reading order:
     run                the paper's flowchart: case, model, expansion, assignment, verification
     outlook            what a run will take, and a picture of the mechanism
     queries            check a case; its frequencies at one point
-    animation          a GIF or animated PNG of the motion or a mode
     urdf               a robot from URDF as the content of a case
     export             a reduced model for other programs
     update             measured frequencies to the parameters that explain them

@@ -40,7 +40,7 @@ __all__, __getattr__, __dir__ = face(
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
-        "pictures.drawing": "AMPLITUDE draw_modes draw_poses moving_poses rest_pose spread_samples",
+        "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
         "meaning.levers": "anatomies",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",

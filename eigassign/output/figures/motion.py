@@ -1,13 +1,7 @@
-"""Mode shapes, the mechanism by itself, and both in motion: along a trajectory or in one mode.
-
-An animation is drawn frame by frame on one canvas and encoded by Pillow, which matplotlib brings:
-GIF, which everything shows, or animated PNG, which has all colours.
-"""
+"""Mode shapes, and the mechanism by itself."""
 
 from __future__ import annotations
 
-import io
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +25,6 @@ from eigassign.study.results import DrawnPoses, ModePictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from PIL.Image import Image
 
 Floats = NDArray[np.float64]
 _REST = "#d4d4d4"
@@ -170,109 +163,3 @@ def _draw_mechanism(title: str, poses: DrawnPoses) -> Figure:
         draw(drawing, of_roles(every, "link", "rigid"), pose, _REST)
     _draw_pose(drawing, poses, 0)
     return figure
-
-
-# --- In motion
-
-
-@dataclass(frozen=True)
-class Animation:
-    """``moving`` in its n poses over what stays, ``captions`` (n,) below; it begins anew forever.
-
-    ``still``: its first pose is drawn in grey under all frames.
-    """
-
-    title: str
-    moving: DrawnPoses
-    still: DrawnPoses
-    captions: tuple[str, ...]
-
-
-def along_trajectory(title: str, poses: DrawnPoses) -> Animation:
-    """Poses evenly spread in time, with the time of each; it takes as long as they have frames.
-
-    The links and joints of the first pose stay.
-    """
-    names = poses.of or ("",) * len(poses.lines)
-    times = zip(names, poses.time_s, strict=True)
-    captions = tuple(f"{short(name, 16)} t = {t:.3g} s".strip() for name, t in times)
-    return Animation(short(title, 60), poses, poses, captions)
-
-
-def swinging(pictures: ModePictures, mode: int, frames: int = 32) -> Animation:
-    """One period of a mode (0 is the lowest) over the mechanism at rest."""
-    rest, deformed = pictures.rest, pictures.deformed
-    factors = np.cos(np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False))
-
-    def places(still: Floats, moved: Floats) -> Floats:
-        """(n_poses, d) of something that stays in place, and that a mode moves."""
-        return np.asarray(still[0] + factors[:, None] * (moved[mode] - still[0]))
-
-    lines = [
-        still + factors[:, None, None] * (moved - still)
-        for still, moved in zip(rest.lines[0], deformed.lines[mode], strict=True)
-    ]
-    moving = replace(
-        rest,
-        time_s=np.zeros(frames),
-        lines=tuple(tuple(line[k] for line in lines) for k in range(frames)),
-        joints=tuple(
-            replace(a, places=places(a.places, b.places), axes=np.repeat(a.axes, frames, axis=0))
-            for a, b in zip(rest.joints, deformed.joints, strict=True)
-        ),
-        bodies=tuple(
-            replace(a, places=places(a.places, b.places))
-            for a, b in zip(rest.bodies, deformed.bodies, strict=True)
-        ),
-        springs=tuple(
-            replace(a, starts=places(a.starts, b.starts), ends=places(a.ends, b.ends))
-            for a, b in zip(rest.springs, deformed.springs, strict=True)
-        ),
-    )
-    hz = pictures.frequencies_hz[mode]
-    title = f"{short(pictures.title, 44)}: mode {mode + 1}, {hz:.5g} Hz"
-    return Animation(title, moving, rest, ("",) * frames)
-
-
-def encode_animation(animation: Animation, kind: str) -> bytes:
-    """The animation as a file, ``kind`` gif or png, the same bytes every time.
-
-    A frame is shown for 40 ms: GIF knows hundredths of a second, and browsers slow 10 ms down.
-    """
-    from PIL.Image import Dither
-
-    frames = _frames(animation)
-    looping: dict[str, Any] = {"save_all": True, "duration": 40, "loop": 0}
-    data = io.BytesIO()
-    if kind == "gif":
-        palette = frames[0].quantize(64)
-        frames = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in frames]
-        looping |= {"disposal": 1, "optimize": False}
-    frames[0].save(data, format=kind.upper(), append_images=frames[1:], **looping)
-    return data.getvalue()
-
-
-def _frames(animation: Animation) -> list[Image]:
-    """The pictures of all poses; what stays is drawn once, for it takes longest."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL import Image
-
-    moving, frames = animation.moving, []
-    with style.applied():
-        figure, drawing = _sheet(animation.title, extent(animation.still, [points_of(moving)]))
-        note = _note(figure, "")
-        canvas: Any = FigureCanvasAgg(figure)
-        _draw_staying(drawing, animation.still)
-        canvas.draw()
-        staying, artists = canvas.copy_from_bbox(figure.bbox), drawing.axes.get_children()
-        for pose, caption in enumerate(animation.captions):
-            canvas.restore_region(staying)
-            _draw_pose(drawing, moving, pose)
-            for artist in drawing.axes.get_children():
-                if artist not in artists:
-                    drawing.axes.draw_artist(artist)
-                    artist.remove()
-            note.set_text(caption)
-            figure.draw_artist(note)
-            frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB"))
-    return frames

@@ -1,4 +1,4 @@
-"""The mechanism as a drawing, whoever draws it: figures, animations and pages show the same parts.
+"""The mechanism as a drawing, whoever draws it: figures and pages show the same parts.
 
 A part has places in m, which move, and shapes in inches, which lie on the sheet as they are. Links
 are as thick as their sections; of a mechanism whose sections would be hairs, they are drawn some

@@ -20,7 +20,7 @@ from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type
 from eigassign.mechanism.kinematics.rotations import mounting, multiply
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
-from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
+from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model, ModeShapes
 from eigassign.study.results import (
     DrawnBody,
@@ -34,7 +34,6 @@ from eigassign.study.results import (
 Floats = NDArray[np.float64]
 POSES = 7  # drawn, first and last sample included
 CROWDED = 12  # lines of a mechanism of which only three poses can be told apart
-FRAMES = 75  # of an animation along a trajectory: three seconds
 AMPLITUDE = 0.1  # a mode's largest displacement, relative to the mechanism's extent
 
 
@@ -51,17 +50,6 @@ def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats
     if not trajectory.several:
         return poses
     return replace(poses, of=tuple(trajectory.name_of(k) for k in chosen))
-
-
-def moving_poses(file: CaseFile, model: Model, path: NamedTrajectory, y: Floats) -> DrawnPoses:
-    """Poses of one trajectory evenly spread in time, for an animation, at design y."""
-    time_s, q = path.trajectory.time_s, path.trajectory.q
-    at = np.linspace(time_s[0], time_s[-1], int(np.clip(len(time_s), 2, FRAMES)))
-    chosen = np.abs(time_s[:, None] - at).argmin(axis=0)
-    x = model.x(q, y)
-    tip = path.trajectory.tip
-    tip = _farthest_travelled(file, model, x, []) if tip is None else tip
-    return _posed(file, model, x[chosen], time_s[chosen], tip)
 
 
 def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> DrawnPoses:
