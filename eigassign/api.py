@@ -17,7 +17,7 @@ from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output.exchange import reduced_file
-from eigassign.output.figures.motion import mode_figures
+from eigassign.output.figures.modes import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
 from eigassign.pipeline.outlook import picture

@@ -31,7 +31,7 @@ __all__, __getattr__, __dir__ = face(
         "exchange.reduced_file": "load_reduced",
         "figures.front": "chart_figures",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
-        "figures.motion": ("mechanism_plan mode_figures thumbnail"),
+        "figures.modes": ("mechanism_plan mode_figures thumbnail"),
         "figures.paper": "draw render",
         "figures.run": "run_figures",
         "figures.scene": "scale_words",

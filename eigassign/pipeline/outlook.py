@@ -17,7 +17,7 @@ from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.motion import mechanism_plan
+from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports.page import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
 from eigassign.pipeline.run_files import new_run_folder

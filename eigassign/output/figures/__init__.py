@@ -11,7 +11,7 @@ In reading order; each imports from those above it only:
     scene          the mechanism as parts at places: links as thick as their sections, symbols
     mechanism      the parts drawn with matplotlib; poses along the trajectory
     screen         descriptions as Plotly's data, their tables; the scene for a page
-    motion         mode shapes, and the mechanism by itself
+    modes          mode shapes, and the mechanism by itself
     run            which figures a run has
     update         measured frequencies against the model, parameters with intervals
     front          time against error of a chart's methods

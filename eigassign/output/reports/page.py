@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from eigassign._version import __version__
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.motion import mode_figures
+from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figures, screen_table
