@@ -47,9 +47,7 @@ if TYPE_CHECKING:
         assign,
         expand,
         load_case,
-        load_reduced,
         reduce,
-        save_reduced,
         update,
         urdf_mapping,
     )
@@ -63,9 +61,7 @@ __all__ = [
     "assign",
     "expand",
     "load_case",
-    "load_reduced",
     "reduce",
-    "save_reduced",
     "update",
     "urdf_mapping",
 ]

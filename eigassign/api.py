@@ -16,7 +16,6 @@ from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.output.exchange import reduced_file
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
@@ -37,9 +36,7 @@ __all__ = [
     "assign",
     "expand",
     "load_case",
-    "load_reduced",
     "reduce",
-    "save_reduced",
     "update",
     "urdf_mapping",
 ]
@@ -186,23 +183,3 @@ def _loaded(case: object) -> built_case.BuiltCase:
     if not isinstance(case, built_case.BuiltCase):
         raise UsageError(f"expected a case, got {type(case).__name__}: ea.load_case(...) makes one")
     return case
-
-
-def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
-    """Keep a reduced model in a file, for use without its mechanism.
-
-    HDF5, which `load_reduced` reads; or for other programs, by the ending: .npz with a reader that
-    needs NumPy only, .mat with a MATLAB function, .c (C99) with its header. They give frequencies
-    in Hz at q (rad or m) and y (SI units), to 1e-12 as ``.frequencies`` does, without the error
-    estimate. Raises StorageError where they cannot be written.
-    """
-    reduced_file.save_reduced(reduced, path)
-
-
-def load_reduced(path: str | Path) -> ReducedModel:
-    """Read a reduced model; raises StorageError for a file that is damaged or of another version.
-
-    A file of somebody else is believed as far as its hash and shapes go: its numbers are its
-    author's.
-    """
-    return reduced_file.load_reduced(path)

@@ -28,7 +28,7 @@ OWNERS = {
 }
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {
-    *("cli.cache", "cli.export", "cli.inspect", "cli.runs", "cli.start", "cli.reporter"),
+    *("cli.cache", "cli.inspect", "cli.runs", "cli.start", "cli.reporter"),
     "output.console",
 }
 MODULES = sorted(ROOT.rglob("*.py"))

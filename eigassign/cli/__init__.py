@@ -9,7 +9,6 @@ Reading order:
     reporter   stages, warnings and the log on stderr; JSON on stdout
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, status, schema
-    export     export
     start      init, docs
     batch      batch, merge
     cache      cache path, list, clear
@@ -29,7 +28,6 @@ from eigassign import process
 from eigassign._version import __version__
 from eigassign.cli.batch import batch, merge
 from eigassign.cli.cache import cache
-from eigassign.cli.export import export
 from eigassign.cli.inspect import check, modes, schema, status
 from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
@@ -128,6 +126,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, validate, chart, merge, status, export, cache, schema)
+MORE = (modes, expand, validate, chart, merge, status, cache, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -10,7 +10,7 @@ In reading order:
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced      Ritz on the Taylor vectors, with an error estimate
     expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9)), judged by a reduced model
-    storage      expansions and reduced models as plain arrays
+    storage      expansions as plain arrays
     truncation   what the reduction of links leaves out, bounded
     discretisation  what a mesh leaves out, bounded
     model        the model of a case, as notebooks meet it
@@ -51,9 +51,7 @@ __all__, __getattr__, __dir__ = face(
         "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes stiffening theta_in_time",
         "statics": "Flexibility compliances sags",
-        "storage": (
-            "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
-        ),
+        "storage": "expansion_arrays stored_series tree_arrays",
         "surrogate": "Surrogate",
         "under_load": "WeightChanges buckling sag_of_nodes weight_changes",
         "taylor.bordered": "factor_dense factor_sparse",

@@ -3,7 +3,6 @@
 In reading order; each imports from those above it only:
 
     store         files and folders that are written whole or not at all: runs, the cache
-    exchange      a reduced model in files: HDF5, NumPy, MATLAB, C99
     documents     rows as JSON: results.json
     result_files  the CSV files of a run
     tables        the tables of a run as text
@@ -27,8 +26,6 @@ __all__, __getattr__, __dir__ = face(
         "batch.outcome": "CaseOutcome frequency_ranges from_line to_line",
         "batch.summary": "batch_table",
         "console": "markdown print_assignment print_tables print_verdict progress wrapped",
-        "exchange.files": "write_exchange",
-        "exchange.reduced_file": "load_reduced",
         "figures.front": "chart_figures",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
         "figures.modes": ("mechanism_plan mode_figures thumbnail"),

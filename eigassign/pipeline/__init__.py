@@ -10,7 +10,6 @@ Reading order:
     outlook            what a run will take, and a picture of the mechanism
     queries            check a case; its frequencies at one point
     urdf               a robot from URDF as the content of a case
-    export             a reduced model for other programs
     update             measured frequencies to the parameters that explain them
     chart              time against accuracy of every method on one case
 """

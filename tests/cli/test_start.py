@@ -196,7 +196,6 @@ LONG = (
     "update",
     "validate",
     "status",
-    "export",
 )  # each over 3 s
 SLOW = {f"eigassign {name}": pytest.mark.slow for name in LONG} | {"eigassign": pytest.mark.slow}
 

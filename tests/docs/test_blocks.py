@@ -37,7 +37,7 @@ PAGES = [
     *sorted((ROOT / "cases").rglob("README.md")),
     *sorted((ROOT / "benchmarks").rglob("*.md")),
 ]
-QUICK = ("init", "check", "modes", "schema", "docs")
+QUICK = ("init", "check", "modes", "expand", "schema", "docs")
 BLOCK = re.compile(r"(?:^<!-- not run: (.+) -->\n)?^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 Captured = pytest.CaptureFixture[str]
 

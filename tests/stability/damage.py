@@ -1,7 +1,7 @@
 """Damaged copies of what was stored, with the hash as it was or made anew.
 
-Bytes of the file are changed; or numbers and the tree of classes in the arrays, which are then
-packed as an undamaged file is, so that only what they say can betray them.
+Bytes of the file are changed; or numbers in the arrays, which are then packed as an undamaged file
+is, so that only what they say can betray them.
 """
 
 from __future__ import annotations
@@ -56,23 +56,13 @@ def removed(arrays: Arrays, rng: np.random.Generator) -> None:
     del arrays[chosen(arrays, rng)]
 
 
-def misspelt(arrays: Arrays, rng: np.random.Generator) -> None:
-    text = arrays.get("tree")
-    if text is None:
-        return removed(arrays, rng)
-    digits = np.flatnonzero((text >= 48) & (text < 58))
-    for _ in range(rng.integers(1, 4)):
-        text[rng.choice(digits)] = rng.integers(48, 58)
-    return None
-
-
 def garbled(arrays: Arrays, rng: np.random.Generator) -> None:
-    flat = arrays["tree" if "tree" in arrays else chosen(arrays, rng)].reshape(-1).view(np.uint8)
+    flat = arrays[chosen(arrays, rng)].reshape(-1).view(np.uint8)
     flat[rng.integers(len(flat))] = rng.integers(32, 127)
 
 
 DAMAGES: tuple[Damage, ...] = (
-    *(replaced, scaled, counted_otherwise, shortened, turned, removed, misspelt, garbled),
+    *(replaced, scaled, counted_otherwise, shortened, turned, removed, garbled),
 )
 
 

@@ -11,9 +11,8 @@ import pytest
 from damage import damaged, forged
 
 import eigassign as ea
-from eigassign.errors import StorageError
 from eigassign.hdf5 import pack
-from eigassign.modal import FORMAT, expansion_arrays, reduced_arrays
+from eigassign.modal import expansion_arrays
 from eigassign.output import Cache
 from eigassign.pipeline import affordable_order, expand_plan, expansion_key
 from eigassign.study import Plan, plan_expansion
@@ -25,7 +24,6 @@ SLOW = [
     pytest.param(name, 100, marks=pytest.mark.slow)
     for name in ("two_link", "five_bar", "pick_and_place", "gantry", "stress/veering")
 ]
-each_case = pytest.mark.parametrize(("name", "count"), [("two_link", FEW), *SLOW])
 pytestmark = pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 
 
@@ -34,7 +32,7 @@ def plan_of(case: ea.Case) -> Plan:
     return plan_expansion(case.file, case.model(), trajectory)
 
 
-@each_case
+@pytest.mark.parametrize(("name", "count"), [("two_link", FEW), *SLOW])
 def test_files_of_the_cache(
     name: str,
     count: int,
@@ -60,30 +58,5 @@ def test_files_of_the_cache(
             assert FROM_CACHE not in notes
             assert all((again[n] == a).all() for n, a in arrays.items())
         believed += FROM_CACHE in notes
-    record_property("believed with the hash made anew", f"{believed} of {count}")
-    assert believed < count
-
-
-@each_case
-def test_reduced_models(
-    name: str, count: int, tmp_path: Path, record_property: Callable[[str, object], None]
-) -> None:
-    case = ea.load_case(CASES / f"{name}.yaml")
-    model, plan = case.model(), plan_of(case)
-    arrays = reduced_arrays(ea.reduce(model, plan.q0, plan.y0, plan.modes, 2))
-    whole, path = pack(FORMAT, arrays, {}), tmp_path / "a.h5"
-    rng, believed = np.random.default_rng(12), 0
-    for k in range(2 * count):
-        path.write_bytes(damaged(whole, rng) if k < count else forged(FORMAT, arrays, rng))
-        try:
-            found = ea.load_reduced(path)
-        except StorageError:
-            continue
-        assert k >= count, "damage without a hash to match is believed"
-        believed += 1
-        again = reduced_arrays(found)
-        assert again["numbers"].shape == arrays["numbers"].shape
-        assert np.isfinite(again["numbers"]).all()
-        assert np.isfinite(found.frequencies(*np.split(found.points[0], [found.n_q]))).all()
     record_property("believed with the hash made anew", f"{believed} of {count}")
     assert believed < count

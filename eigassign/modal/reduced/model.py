@@ -41,8 +41,8 @@ class ReducedModel(ReducedPencil):
 
     modes: tuple[int, ...]
     half_order: int
-    certified: ErrorTerms | Callable[[], ErrorTerms]  # as they are, or how to make them
-    widened: ReducedModel | Callable[[], ReducedModel | None] | None  # on more vectors
+    certified: Callable[[], ErrorTerms]  # how to make them
+    widened: Callable[[], ReducedModel | None] | None  # on more vectors
 
     def __repr__(self) -> str:
         return (
@@ -54,7 +54,7 @@ class ReducedModel(ReducedPencil):
     @cached_property
     def error_terms(self) -> ErrorTerms:
         """The arrays of the error estimate, made when they are first asked for."""
-        return self.certified() if callable(self.certified) else self.certified
+        return self.certified()
 
     @cached_property
     def wider(self) -> ReducedModel | None:
@@ -62,7 +62,7 @@ class ReducedModel(ReducedPencil):
 
         Beside a basis that holds those modes, fewer can have come down unseen.
         """
-        return self.widened() if callable(self.widened) else self.widened
+        return self.widened() if self.widened else None
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n_samples, n_modes) in Hz; ``error_estimate`` says how far to trust them.

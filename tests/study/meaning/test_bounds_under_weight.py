@@ -11,7 +11,6 @@ from chains import case_of
 from scipy.spatial.transform import Rotation
 
 import eigassign as ea
-from eigassign.cli import main
 from eigassign.errors import MechanismError
 from eigassign.pipeline import Stages, prepare
 from eigassign.study import Scene, proved_ranges
@@ -194,11 +193,6 @@ def test_designs_that_buckle_are_no_designs(tmp_path: Any, design: str, asked: s
     found = ea.assign(ea.load_case(tmp_path / "mast.yaml")).results
     assert found.assignment.verdict == "reached"
     assert any("the initial one, because the middle of the bounds" in note for note in found.notes)
-
-
-def test_a_model_is_exported_for_the_designs_that_stand(tmp_path: Any) -> None:
-    (tmp_path / "mast.yaml").write_text(MAST + LOAD % "")
-    assert main(["export", str(tmp_path / "mast.yaml"), str(tmp_path / "mast.npz")]) == 0
 
 
 def test_what_buckles_is_named_with_its_design(tmp_path: Any) -> None:
