@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     type=click.Choice(["none", "cheap", "all"]),
     default="cheap",
     show_default=True,
-    help="How much of what the answer means is studied: all adds the error against mass or price.",
+    help="How much of what the answer means is studied: all adds what a large model can reach.",
 )
 @arguments.writing("results/<case>")
 @arguments.caching

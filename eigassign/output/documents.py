@@ -37,7 +37,6 @@ from eigassign.study.results import (
     StaticRow,
     TargetStudy,
     ToleranceRows,
-    TradeOff,
     WeightRow,
 )
 from eigassign.study.updating.fit import UpdateResults
@@ -190,7 +189,6 @@ class RunDocument(OriginDocument):
     reach: Annotated[Sequence[RangeRow], Fact("over all designs within the bounds")]
     unreachable: Annotated[Sequence[str], Fact("what is out of reach, in words")]
     tolerance: Annotated[ToleranceRows | None, Fact("what deviations do to the targets")]
-    trade_off: Annotated[TradeOff | None, Fact("error against mass or price")]
     other_modes: Annotated[Sequence[ModeDocument], Fact("some modes without a target")]
     discretisation: Annotated[MeshError | None, Fact("how much too high the mesh is")]
     weight: Annotated[WeightRow | None, Fact("what gravity changes that is not computed")]
@@ -237,7 +235,6 @@ def run_document(results: RunResults) -> RunDocument:
         unreachable=meaning.unreachable,
         anatomies=meaning.anatomies,
         tolerance=meaning.tolerance,
-        trade_off=meaning.trade_off,
         other_modes=_modes(results.others),
         approximation=[
             filled(StudyDocument, study, max_relative=_worst(study)) for study in results.studies

@@ -414,22 +414,6 @@ def robust(results: RunResults) -> Table:
     return facts_table("Robust", row.targets, names, caption)
 
 
-def trade_off(results: RunResults) -> Table:
-    """Error against mass or price."""
-    found = results.meaning.trade_off
-    if found is None:
-        return Table("Trade-off", (), ())
-    unit = f" [{found.unit}]" if found.unit else ""
-    columns = (f"{found.quantity}{unit}", "added", found.error, *_named(results))
-    rows = []
-    for point in found.points:
-        added = round(point.amount - found.initial, 12) + 0.0  # not −0
-        cells = (number(point.amount), number(added), percent(point.error))
-        rows.append((*cells, *_by_name(results, point.design)))
-    caption = "The best design that was found for each; the last is the answer."
-    return Table("Trade-off", columns, tuple(rows), caption)
-
-
 def approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and over maps."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
@@ -485,7 +469,7 @@ SECTIONS = {  # of a page, with their headings; what is in none is in the append
 _KINDS: dict[str, tuple[Callable[[RunResults], Table], ...]] = {
     "design": (design, combinations),
     "requirements": (objective, errors, required),
-    "depends": (sensitivity, limits, anatomy, helps, reach, trade_off),
+    "depends": (sensitivity, limits, anatomy, helps, reach),
     "robustness": (clearances, tolerance, robust, weight),
     "motion": (drives,),
     "appendix": (optima, approximation, solver, timing),

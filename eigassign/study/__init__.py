@@ -45,7 +45,6 @@ __all__, __getattr__, __dir__ = face(
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",
-        "meaning.tradeoff": "kept trade_off",
         "planning": (
             "Plan at_corners at_random automatic_elements central_sample corners joint_map "
             "mesh_share plan_expansion series_share shown_point truncation_share "
@@ -56,7 +55,7 @@ __all__, __getattr__, __dir__ = face(
             "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "
-            "TargetStudy ToleranceRows TradeOff TradeOffPoint TrajectoryRow ValidationRow"
+            "TargetStudy ToleranceRows TrajectoryRow ValidationRow"
         ),
         "scene": "Scene",
         "settling": "settle_model",

@@ -747,30 +747,6 @@ class ToleranceRows:
     words: Annotated[str, Fact("the same in words")]
 
 
-@dataclass(frozen=True)
-class TradeOffPoint:
-    """The least error found for this ``amount`` of mass or price, and its design (n_y,)."""
-
-    amount: float
-    error: Share
-    design: Floats
-
-
-@dataclass(frozen=True, repr=False)
-class TradeOff(Brief):
-    """Error against mass (kg) or price: ascending amounts, falling errors, the answer last.
-
-    ``initial`` is the amount of the initial design; a price counts from there. ``error`` says which
-    it is, rms or worst, weighted.
-    """
-
-    quantity: Annotated[str, Fact("mass or price")]
-    unit: str
-    initial: float
-    error: str
-    points: tuple[TradeOffPoint, ...]
-
-
 @dataclass(frozen=True, repr=False)
 class Meaning(Brief):
     """The meaning of the answer: what it hangs on, what holds it back, how sure it is."""
@@ -779,7 +755,6 @@ class Meaning(Brief):
     relaxed: tuple[RelaxedRow, ...] = ()
     reach: tuple[RangeRow, ...] = ()  # over all designs within the bounds; the least error
     tolerance: ToleranceRows | None = None
-    trade_off: TradeOff | None = None
     unreachable: tuple[str, ...] = ()  # in words, with numbers
     anatomies: tuple[ModeAnatomy, ...] = ()  # of the modes of targets that are missed
     notes: tuple[str, ...] = ()

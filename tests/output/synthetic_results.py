@@ -34,8 +34,6 @@ from eigassign.study import (
     TargetAlong,
     TargetStudy,
     ToleranceRows,
-    TradeOff,
-    TradeOffPoint,
     TrajectoryRow,
 )
 
@@ -269,14 +267,10 @@ def studied(results: RunResults) -> RunResults:
             for wide in [np.linspace(1.0, 0.05, t.exact_hz.size)]
         )
 
-    points = tuple(
-        TradeOffPoint(2.0 + 0.05 * k, 0.05 / (1 + k), np.full(len(names), 0.1)) for k in range(5)
-    )
     meaning = Meaning(
         sensitivity=sensitivity,
         reach=around(0.2),
         tolerance=ToleranceRows(around(0.01), 0.01, 0.02, "worst error 1 → 2 %"),
-        trade_off=TradeOff("mass", "kg", 2.0, "rms error", points),
     )
     return replace(results, meaning=meaning)
 

@@ -216,16 +216,6 @@ def test_ranges_enclose_the_answer_along_each_trajectory():
     np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), answer)
 
 
-def test_error_falls_over_mass_to_the_answer(paper):
-    results = studied(paper)
-    (axes,) = drawn(results, "trade_off").axes
-    curve, end = axes.get_lines()[:2]
-    points = results.meaning.trade_off.points
-    np.testing.assert_allclose(curve.get_ydata(), [100.0 * p.error for p in points])
-    np.testing.assert_allclose(end.get_xdata(), [points[-1].amount])
-    assert axes.get_xlabel() == "mass [kg]"
-
-
 def test_the_comparison_shows_both_expansions_and_their_errors(paper):
     figure = drawn(paper, "approximation_mode_1_time")
     above, below = figure.axes

@@ -16,10 +16,7 @@ from eigassign.study import (
     ClearanceRow,
     CombinationRow,
     ErrorRow,
-    Meaning,
     RunResults,
-    TradeOff,
-    TradeOffPoint,
 )
 
 
@@ -80,15 +77,6 @@ def test_what_a_change_costs_stands_beside_it() -> None:
     plain = table(make_results(), "Design")
     assert plain is not None
     assert "change costs" not in plain.columns
-
-
-def test_error_stands_against_mass_and_what_is_added() -> None:
-    points = tuple(TradeOffPoint(a, e, np.array([a, 0.0])) for a, e in ((2.0, 0.05), (2.25, 0.01)))
-    meaning = Meaning(trade_off=TradeOff("mass", "kg", 2.0, "rms error", points))
-    found = table(replace(make_results(), meaning=meaning), "Trade-off")
-    assert found is not None
-    assert found.columns[:4] == ("mass [kg]", "added", "rms error", "m1 [g]")
-    assert found.rows[1] == ("2.25", "0.25", "1.00 %", "2250", "0")
 
 
 def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met() -> None:

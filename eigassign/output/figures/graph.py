@@ -106,7 +106,6 @@ class Panel:
     logarithmic: bool = False
     decades: int | None = 5  # of errors: what is smaller is as good as nothing
     holds: tuple[Floats, ...] = ()
-    from_zero: bool = False
     key: tuple[tuple[str, Look], ...] = ()
     names: tuple[str, ...] = ()
     within: tuple[float, float] | None = None
@@ -132,7 +131,7 @@ class Panel:
         """The ends of an ordinate that all curves lie in."""
         low, high = bounds(self._values)
         margin = 0.05 * (high - low)
-        return 0.0 if self.from_zero else low - margin, high + margin
+        return low - margin, high + margin
 
     @cached_property
     def cut(self) -> bool:

@@ -1,4 +1,4 @@
-"""What an answer means: what it hangs on, what it can reach, what deviations and mass do to it."""
+"""What an answer means: what it hangs on, what it can reach, what deviations do to it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from eigassign.facts import capital, percent
 from eigassign.output.figures import graph
-from eigassign.output.figures.approximation import POINT
 from eigassign.output.figures.curves import OPTIMAL, TARGET
 from eigassign.output.figures.graph import (
     BarGroup,
@@ -17,11 +16,8 @@ from eigassign.output.figures.graph import (
     Curve,
     FigurePlan,
     Graph,
-    Look,
     Panel,
-    Rule,
     Shade,
-    labelled,
 )
 from eigassign.study.results import (
     RangeRow,
@@ -29,14 +25,13 @@ from eigassign.study.results import (
     SensitivityRow,
     TargetAlong,
     TargetStudy,
-    TradeOff,
 )
 
 Floats = NDArray[np.float64]
 
 
 def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
-    """Sensitivities, reach and tolerance of each target, error against mass or price."""
+    """Sensitivities, reach and tolerance of each target."""
     found = results.meaning
     if any(row.percent_per_percent_largest for row in found.sensitivity):
         yield sensitivities(found.sensitivity)
@@ -48,8 +43,6 @@ def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
         for along in target.along if any(shown) and target.asked.terms else ():
             number += 1
             yield ranges(results, target, along, shown, number)
-    if found.trade_off is not None and len(found.trade_off.points) > 1:
-        yield trade_off(found.trade_off)
 
 
 def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePlan:
@@ -123,35 +116,4 @@ def ranges(
         "The answer's frequency over time inside the range of others.",
         Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,), clock=clock),
         "depends" if shown[0] is not None else "robustness",
-    )
-
-
-def trade_off(found: TradeOff) -> FigurePlan:
-    """Error in % over mass or price, the initial design's upright, the answer at the end."""
-    first, last = found.points[0], found.points[-1]
-    amount = np.array([point.amount for point in found.points])
-    error = np.array([100.0 * point.error for point in found.points])
-    answer = Look(graph.SKY, 0.0, marker="o", size=10.0, filled=False)
-    marks = (
-        Curve(error, Look(graph.BLUE, 1.4, marker="o"), "best found"),
-        Curve(error[-1:], answer, "answer", amount[-1:]),
-        Rule(found.initial, POINT, f"{found.quantity} of the initial design", upright=True),
-    )
-    low, high = graph.bounds([amount, np.array([found.initial])])
-    margin = 0.04 * (high - low)
-    return FigurePlan(
-        "trade_off",
-        f"{capital(found.error)} against {found.quantity}",
-        f"The least {found.error} found for each {found.quantity}: from {percent(first.error)} to "
-        f"{percent(last.error)}, the answer.",
-        f"A falling curve of the {found.error} over the {found.quantity}.",
-        Graph(
-            title=f"{capital(found.error)} against {found.quantity}",
-            x_label=labelled(found.quantity, found.unit),
-            x=amount,
-            panels=(Panel(f"{found.error} [%]", marks, 2.4, from_zero=True),),
-            x_limits=(low - margin, high + margin),
-        ),
-        "depends",
-        "Trade-off",
     )

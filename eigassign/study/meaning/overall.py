@@ -1,7 +1,7 @@
 """What the answer means: what it hangs on, what its limits cost, what can be reached at all.
 
 How much is studied is the user's choice and changes no answer. What follows from slopes already
-known, or from two exact solves a pose, is cheap; `all` adds what designs have to be searched for.
+known, or from two exact solves a pose of a small model, is cheap; `all` adds those of a large one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from eigassign.study.meaning.levers import FEW, anatomies
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
-from eigassign.study.meaning.tradeoff import trade_off
 from eigassign.study.results import Meaning, ModeAnatomy, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
 
@@ -67,7 +66,6 @@ def study_meaning(
         relaxed=() if found is None else tuple(_relaxed(scene, answer, found)),
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
-        trade_off=trade_off(scene, found) if found and studies is Studies.ALL else None,
         unreachable=beyond,
         anatomies=_anatomies(scene, answer.y, wanted, exact, max_error, notes),
         notes=tuple(notes),

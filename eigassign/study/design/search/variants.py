@@ -203,7 +203,7 @@ def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appr
     return with_scenarios(nominal, task.scene.tolerances, task.scenarios, largest)
 
 
-def cost_of(scene: Scene, unit: float = 1.0) -> Cost | None:
+def cost_of(scene: Scene, unit: float) -> Cost | None:
     """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing.
 
     What is chosen of lists with a price each counts in full. Of the lightest design the mass is
