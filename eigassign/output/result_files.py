@@ -51,12 +51,13 @@ def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
 
 
 def frequency_columns(results: RunResults) -> list[Column]:
-    """Every sample with its frequencies in Hz: of targets, or without any of the expanded modes.
+    """Every sample with its frequencies in Hz: of targets, and of the expanded modes.
 
     Of several trajectories one below the other, the first column naming them.
     """
-    own = _assigned(results) if results.targets else _expanded(results)
-    return [*_samples(results), *own]
+    if not results.targets:
+        return [*_samples(results), *_expanded(results)]
+    return [*_samples(results), *_assigned(results), *_others(results)]
 
 
 def _samples(results: RunResults) -> Iterator[Column]:
@@ -133,6 +134,18 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
                 for t in targets
             ]
     return found
+
+
+def _others(results: RunResults) -> Iterator[Column]:
+    """Expanded modes that no target names, before and after (the paper's Figure 5)."""
+    others = results.others
+    if others is None:
+        return
+    expanded = {study.mode for study in results.studies}
+    for k, mode in enumerate(others.modes):
+        if mode in expanded:
+            yield f"mode {mode} initial [Hz]", others.initial_hz[:, k].tolist()
+            yield f"mode {mode} exact [Hz]", others.optimal_hz[:, k].tolist()
 
 
 def _expanded(results: RunResults) -> Iterator[Column]:

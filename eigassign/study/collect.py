@@ -123,7 +123,7 @@ def _with_answer(
         results,
         design=design_rows(scene, answer.y),
         targets=targets,
-        others=_others(assigned),
+        others=_others(scene, assigned),
         spectrum=_spectrum(assigned),
         solver=None if answer.one_shot is None else solver_row(answer.one_shot),
         assignment=row,
@@ -211,12 +211,13 @@ def _poses(scene: Scene) -> DrawnPoses:
     return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)
 
 
-def _others(assigned: VerifiedAssignment) -> OtherModes | None:
-    """Up to three modes above the lowest assigned one that have no target themselves."""
+def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
+    """Modes without a target: the expanded ones, and three above the lowest assigned one."""
     targets = {mode for target in assigned.targets for mode in target.numbers}
     before, after = assigned.solved.initial.hz, assigned.solved.exact.hz
-    above = range(min(targets, default=0) + 1, before.shape[1] + 1)
-    rest = [m for m in above if m not in targets][:3]
+    free = [mode for mode in range(1, before.shape[1] + 1) if mode not in targets]
+    above = [mode for mode in free if mode > min(targets, default=0)][:3]
+    rest = [mode for mode in free if mode in above or mode in scene.modes]
     columns = [mode - 1 for mode in rest]
     return OtherModes(tuple(rest), before[:, columns], after[:, columns]) if rest else None
 

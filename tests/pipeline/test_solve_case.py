@@ -211,6 +211,19 @@ def test_the_three_modes_above_the_assigned_one_are_shown(tmp_path: Path) -> Non
     np.testing.assert_allclose(others.optimal_hz, exact[:, 1:], rtol=1e-12)
 
 
+def test_expanded_modes_without_a_target_are_columns_before_and_after(tmp_path: Path) -> None:
+    """The paper's Figure 5."""
+    text = shipped(("modes: [1]", "modes: [1, 2, 3, 4]"))
+    result, case = solved(tmp_path, text), case_of(tmp_path, text)
+    columns, q = result.to_dict(), case.trajectory.q
+    designs = {"initial": case.initial_design, "exact": list(result.design.values())}
+    for when, y in designs.items():
+        found = np.stack([columns[f"mode {mode} {when} [Hz]"] for mode in (2, 3, 4)], axis=1)
+        np.testing.assert_allclose(found, case.model().frequencies(q, y, 4)[:, 1:], rtol=1e-12)
+    plain = solved(tmp_path, shipped()).to_dict()
+    assert [name for name in plain if name.startswith(("mode 2", "mode 3", "mode 4"))] == []
+
+
 def test_a_prediction_over_the_tolerance_is_said_with_advice_that_helps(tmp_path: Path) -> None:
     text = shipped(("max_error: 2 %", "max_error: 0.1 %")) + ONE_SHOT
     results = solved(tmp_path, text).results
