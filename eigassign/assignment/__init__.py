@@ -29,7 +29,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.optima": "Tally with_end",
         "exact.sequential": "End Optimum minimise",
         "exact.scenarios": "Tolerances with_scenarios",
-        "exact.stationarity": "stationarity",
+        "exact.stationarity": "first_order",
         "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
         "program": ("Bounds ProgramAnswer ScaledProgram build_program scaled_program unscaled"),

@@ -34,7 +34,7 @@ __all__, __getattr__, __dir__ = face(
         "elements.sections": "section_values",
         "elements.sparse_factor": "factorise kept_factor largest_beside",
         "imports.parts": "imported_part",
-        "imports.reading": "read_matrix",
+        "imports.reading": "matrix_of read_contents",
         "inverse_kinematics.chain": "TipChain TipEvaluation reduced tip_chain",
         "inverse_kinematics.follow": "follow",
         "inverse_kinematics.tip_path": ("Course planar_attitude spatial_attitude spline straight"),

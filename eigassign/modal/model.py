@@ -196,10 +196,6 @@ class Model:
         """
         return self.total_mass(self._design(y))[0]
 
-    def mass_slopes(self, y: ArrayLike) -> Floats:
-        """∂mass/∂y (n_y,) in kg per SI unit of y."""
-        return self.total_mass(self._design(y))[1]
-
     @cached_property
     def energies(self) -> EnergyForms:
         """The energies of modes by links, drives, springs and bodies, `EnergyForms`."""

@@ -33,7 +33,7 @@ __all__, __getattr__, __dir__ = face(
             "random_q reach_warnings study_modes validate_expansions"
         ),
         "design.answer": "Answer find_answer",
-        "design.clearance": "check_clear",
+        "design.clearance": "BandMotion",
         "design.followed": "followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings",
         "design.search.optimum": "Found find_optimum",

@@ -17,7 +17,7 @@ from random_assignments import load_text, random_case
 
 import eigassign as ea
 from eigassign.assignment import ForbiddenBand
-from eigassign.study import check_clear
+from eigassign.study import BandMotion
 
 SEEDS = range(200)
 QUICK = (0,)
@@ -73,10 +73,10 @@ def test_an_answer_called_clear_is_clear_at_random_instants_and_a_forged_one_is_
             continue
         assert (along(case, q, y, low, high) == said.below).all()
         for k in {said.below + 1, max(said.below - 1, 0)} - {said.below}:
-            assert not check_clear(model, band, k, q, y).clear
+            assert not BandMotion(model, band, k, q, y).judged().clear
         hz = model.frequencies(q, y, said.below + 1)[:, said.below]
         wide = ForbiddenBand(*kind, np.full(len(q), hz.min() * (1.0 + 1e-9)))
-        assert not check_clear(model, wide, said.below, q, y).clear
+        assert not BandMotion(model, wide, said.below, q, y).judged().clear
 
 
 # --- Load cases, several trajectories, jumps, profiles, parts

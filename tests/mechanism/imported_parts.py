@@ -11,6 +11,8 @@ from scipy.io import mmwrite
 from spatial_cases import ALLOY
 from spatial_oracle import Tree, element, section
 
+from eigassign.mechanism import matrix_of, read_contents
+
 FLAT = {"shape": "rectangle", "width": 0.02, "height": 0.03}
 LENGTH, ELEMENTS = 0.6, 8
 KEPT = {"planar": [0, 1, 5], "spatial": [0, 1, 2, 3, 4, 5]}
@@ -75,3 +77,8 @@ def part(space: str, files: tuple[str, str], **more: Any) -> Tree:
         "end": {"position": [LENGTH, *pad], "dofs": list(range(last, last + width))},
     }
     return {"type": "superelement", "stiffness": files[0], "mass": files[1], "nodes": nodes, **more}
+
+
+def read_matrix(file: Path, key: str) -> sparse.csr_array:
+    """The only matrix of a file; raises MechanismError at ``key``."""
+    return matrix_of(read_contents(file, key), file, key).matrix

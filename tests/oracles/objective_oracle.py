@@ -271,7 +271,7 @@ class _Search:
                     "type": "ineq",
                     "fun": lambda x, s=sign, e=edge: s * (p.model.mass(self.y(x[:n])) / e - 1.0),
                     "jac": lambda x, s=sign, e=edge: np.append(
-                        s * p.model.mass_slopes(self.y(x[:n])) * p.width / e, [0.0] * has_t),
+                        s * p.model.total_mass(self.y(x[:n]))[1] * p.width / e, [0.0] * has_t),
                 })  # fmt: skip
         if len(p.C):
             C, offset = p.C * p.width, p.C @ (p.lower - p.width)
@@ -288,7 +288,7 @@ class _Search:
         else:
             x0 = v
             fun = lambda x: p.model.mass(self.y(x)) / self.heavy  # noqa: E731
-            jac = lambda x: p.model.mass_slopes(self.y(x)) * p.width / self.heavy  # noqa: E731
+            jac = lambda x: p.model.total_mass(self.y(x))[1] * p.width / self.heavy  # noqa: E731
         try:
             found = minimize(
                 fun, x0, jac=jac, method="SLSQP", bounds=bounds, constraints=limits,

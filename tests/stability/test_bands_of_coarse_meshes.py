@@ -11,7 +11,7 @@ from meshes import DRAWS, FINER
 from eigassign.assignment import ForbiddenBand
 from eigassign.errors import EigassignError
 from eigassign.mechanism import refined, with_elements, with_reduction
-from eigassign.study import automatic_elements, build_model, check_clear
+from eigassign.study import BandMotion, automatic_elements, build_model
 
 EACH = 6  # bands of one mechanism
 
@@ -53,7 +53,7 @@ def judged(seed: int) -> tuple[int, int, list[str]]:
             continue
         band = ForbiddenBand("band", "", (), slice(0, 1), np.array([lower]), np.array([upper]))
         try:
-            found = check_clear(model, band, below, q, y)
+            found = BandMotion(model, band, below, q, y).judged()
         except EigassignError:
             continue
         clear, open_ = clear + found.clear, open_ + (not found.clear)

@@ -66,7 +66,6 @@ from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 # Bounds further away are taken to be there, in units that change λ by 100 %: no linear model holds
 # so far, and h·y of a continuous column, 0 but for OSQP's tolerance, is multiplied by it.
 FAR = 1e4
-ROUGH = 1e-5
 # Of the distance between rows: their effect on λ counts (by the range of their values alone a tree
 # has 1.4 times as many nodes), but rows without any are still different rows.
 APART = 1e-3

@@ -32,20 +32,16 @@ class BindingLimit:
     multiplier: float
 
 
-def stationarity(problem: DesignProblem, y: Floats, seen: Appraisal) -> float:
-    """How far y is from first-order optimality: 0 at a local optimum, 1 where nothing is balanced.
-
-    The part of the slope of F (or of the violation, where inequalities are missed) that no limit
-    on which y lies can balance, in units of the bounds, relative to the largest slope that the
-    residuals could give: for least squares the largest cosine between Jᵀ's rows and r.
-    """
-    return first_order(problem, y, seen)[0]
-
-
 def first_order(
     problem: DesignProblem, y: Floats, seen: Appraisal
 ) -> tuple[float, tuple[BindingLimit, ...]]:
-    """The stationarity, and the limits that y lies on with what F falls by per unit relaxed."""
+    """The stationarity, and the limits that y lies on with what F falls by per unit relaxed.
+
+    It says how far y is from first-order optimality: 0 at a local optimum, 1 where nothing is
+    balanced. The part of the slope of F (or of the violation, where inequalities are missed) that
+    no limit on which y lies can balance, in units of the bounds, relative to the largest slope that
+    the residuals could give: for least squares the largest cosine between Jᵀ's rows and r.
+    """
     box = UnitBox.of(problem)
     if box.n == 0:
         return 0.0, ()

@@ -26,7 +26,6 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import vector
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
 LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs
 _SPELT = {1.0: "m", 1e-3: "mm", 0.0254: "inches"}

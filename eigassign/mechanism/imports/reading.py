@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy import sparse
 
-from eigassign.case.rules.files import split_variable
 from eigassign.case.suggestions import listed, shown
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes
@@ -69,15 +68,6 @@ def read_contents(file: Path, key: str) -> Contents | None:
         return next(filter(None, (read(data) for read in _READERS)), None)
 
     return guarded(contents, file, key)
-
-
-def read_matrix(file: str | Path, key: str) -> sparse.csr_array:
-    """The only matrix of a file, or the one that ``parts.mat:K`` names; raises MechanismError."""
-    place, name = split_variable(str(file))
-    matrix: sparse.csr_array = matrix_of(
-        read_contents(Path(place), key), Path(place), key, name
-    ).matrix
-    return matrix
 
 
 def matrix_of(

@@ -47,7 +47,6 @@ from eigassign.modal.reduced.residual import (
 from eigassign.modal.reduced.spans import Spans, spans
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 # Beside each factor: what becomes of 8 386 answers of the families of `tests/stability` (planar,
 # decoupled, softened, in space, in loops, bending alike) with another value in its place.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.facts import capital, percent
 from eigassign.output.figures import graph
@@ -26,8 +25,6 @@ from eigassign.study.results import (
     TargetAlong,
     TargetStudy,
 )
-
-Floats = NDArray[np.float64]
 
 
 def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:

@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.facts import number
 from eigassign.output.figures import graph, style
@@ -26,7 +25,6 @@ from eigassign.study.results import DrawnPoses, ModePictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 _REST = "#d4d4d4"
 
 

@@ -54,22 +54,6 @@ STILL = (
 )
 
 
-def check_clear(
-    model: Model,
-    band: ForbiddenBand,
-    below: int,
-    q: Floats,
-    y: Floats,
-    raised: float | None = None,
-) -> ClearanceRow:
-    """Judge a band along one trajectory, of poses q (n, n_q) at its rows and design y (n_y,).
-
-    ``below`` is k; e is ``raised``, or else what can be proved of it. Raises what the exact solves
-    raise.
-    """
-    return _Motion(model, band, below, q, y, raised).judged()
-
-
 def check_band(
     scene: Scene,
     own: Sequence[Follower],
@@ -78,14 +62,15 @@ def check_band(
     y: Floats,
     raised: float | None = None,
 ) -> ClearanceRow:
-    """The same along the trajectories of a scene, also of a band of one of the followed modes.
+    """Judge a band along the trajectories of a scene at the design y, k = ``below``.
 
-    A band is not clear where the shape of its mode is lost between samples.
+    e is ``raised``, or else what can be proved of it. A band of a followed mode is not clear where
+    the shape of its mode is lost between samples. Raises what the exact solves raise.
     """
     q = scene.path.at(y)[0][band.rows]
     shapes = (_Shape(band, scene.path, one, y) for one in own if one.mode in band.followed)
     try:
-        return _Motion(scene.model, band, below, q, y, raised, next(shapes, None)).judged()
+        return BandMotion(scene.model, band, below, q, y, raised, next(shapes, None)).judged()
     except LostModeError:
         return ClearanceRow(band.label, below, False, 0.0, False, None)
 
@@ -138,7 +123,7 @@ def _refined(path: Trajectories, rows: slice, at: Floats) -> tuple[Trajectories,
 
 
 @dataclass(frozen=True, eq=False)
-class _Motion:
+class BandMotion:
     """A band, k, and the poses and the design at which it is looked at."""
 
     model: Model
@@ -319,7 +304,7 @@ def least_room(model: Model, band: ForbiddenBand, row: ClearanceRow, q: Floats, 
     """The room of a band that was found to be clear, within `WITHIN` of itself."""
     if not row.clear:
         return row.room
-    return least_along(_Motion(model, band, row.below, q, y, row.raised).room, q, WITHIN).room
+    return least_along(BandMotion(model, band, row.below, q, y, row.raised).room, q, WITHIN).room
 
 
 def finer_path(

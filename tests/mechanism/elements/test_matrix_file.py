@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from imported_parts import read_matrix
 from scipy import sparse
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism import read_matrix
 
 GOOD = sparse.csr_array(np.diag(np.arange(1.0, 6.0)) + np.eye(5, k=1) + np.eye(5, k=-1))
 PARTS: dict[str, Any] = {

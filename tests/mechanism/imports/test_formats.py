@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported
+from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported, read_matrix
 from scipy import sparse
 from scipy.io import hb_write, mmwrite
 from spatial_cases import built, case_of
@@ -35,7 +35,7 @@ from writers import (
 )
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism import imported_part, read_matrix
+from eigassign.mechanism import imported_part
 
 IDS = [1000 + 7 * k for k in range(ELEMENTS + 1)]
 PLACES = {node: (LENGTH * k / ELEMENTS, 0.0, 0.0) for k, node in enumerate(IDS)}

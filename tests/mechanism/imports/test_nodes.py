@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported
+from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported, read_matrix
 from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from test_formats import (
@@ -28,7 +28,7 @@ from test_formats import (
 from writers import coordinate, dmig, dofs, grids, matlab, op4_binary, op4_text
 
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism import part_lines, read_matrix
+from eigassign.mechanism import part_lines
 
 CCX = Path(__file__).parent / "calculix"
 PRINTED_HZ = [6634.938, 8549.826, 11988.96, 18453.90, 21866.74, 22228.68]  # by CalculiX

@@ -13,7 +13,7 @@ from scenes import SHIPPED, changed, scene_of
 import eigassign
 from eigassign.assignment import ForbiddenBand
 from eigassign.pipeline import solve_case
-from eigassign.study import Scene, check_clear, load_case
+from eigassign.study import BandMotion, Scene, load_case
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def band(scene: Scene, low: float, high: float) -> ForbiddenBand:
 
 def test_room_is_the_least_distance_to_an_edge(arm: Scene) -> None:
     hz = arm.model.frequencies(arm.path.q, arm.initial, 2)
-    found = check_clear(arm.model, band(arm, 230.0, 300.0), 1, arm.path.q, arm.initial)
+    found = BandMotion(arm.model, band(arm, 230.0, 300.0), 1, arm.path.q, arm.initial).judged()
     assert found.clear
     assert found.counted
     exact = min(1.0 - hz[:, 0].max() / 230.0, hz[:, 1].min() / 300.0 - 1.0)
@@ -50,15 +50,15 @@ def test_a_mode_that_passes_a_band_between_two_samples_is_seen(
         if two.max() < low or two.min() > low + width:
             below = int(two.max() < low)
             there = ForbiddenBand("", "", (), slice(0, 2), np.full(2, low), np.full(2, low + width))
-            assert not check_clear(arm.model, there, below, q, arm.initial).clear
+            assert not BandMotion(arm.model, there, below, q, arm.initial).judged().clear
     above = ForbiddenBand("", "", (), slice(0, 2), *np.full((2, 2), 1.02 * hz.max()))
-    assert check_clear(arm.model, above, 1, q, arm.initial).clear
+    assert BandMotion(arm.model, above, 1, q, arm.initial).judged().clear
 
 
 def test_a_forged_answer_is_rejected(arm: Scene) -> None:
     for low, high, below in ((150.0, 300.0, 1), (230.0, 300.0, 2), (230.0, 300.0, 0)):
         forged = band(arm, low, high), below, arm.path.q
-        assert not check_clear(arm.model, *forged, arm.initial).clear
+        assert not BandMotion(arm.model, *forged, arm.initial).judged().clear
 
 
 @pytest.mark.parametrize("low", [196.0, pytest.param(203.0, marks=pytest.mark.slow)])
@@ -104,11 +104,11 @@ def test_a_mode_that_mesh_or_reduced_links_raise_beyond_a_band_is_not_clear_of_i
     assert scene.model.frequencies(pose, scene.initial, 3)[0, below] > high
     assert true.model.frequencies(pose, scene.initial, 3)[0, below] < low
     there = ForbiddenBand("band", "", (), slice(0, 1), np.array([low]), np.array([high]))
-    found = check_clear(scene.model, there, below, pose, scene.initial)
+    found = BandMotion(scene.model, there, below, pose, scene.initial).judged()
     assert found.counted
     assert not found.clear
     assert (found.raised is not None) == bounded
-    assert check_clear(true.model, there, below + 1, pose, scene.initial).clear
+    assert BandMotion(true.model, there, below + 1, pose, scene.initial).judged().clear
 
 
 def test_links_left_to_auto_are_modelled_up_to_the_bands(tmp_path: Path) -> None:
@@ -232,5 +232,5 @@ def test_a_coordinate_that_only_trembles_asks_for_no_more_points(arm: Scene) -> 
 
     q = np.column_stack([np.linspace(1.7, 1.9, 21), 5.3 + 1e-12 * (-1.0) ** np.arange(21)])
     there = ForbiddenBand("", "", (), slice(0, 21), np.full(21, 230.0), np.full(21, 300.0))
-    check_clear(Counting(), there, 1, q, arm.initial)  # type: ignore[arg-type]
+    BandMotion(Counting(), there, 1, q, arm.initial).judged()  # type: ignore[arg-type]
     assert max(solved) <= 21

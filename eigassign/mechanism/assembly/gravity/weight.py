@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
@@ -53,8 +52,6 @@ from eigassign.mechanism.kinematics.rotations import (
 )
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, split
 from eigassign.series.expression import Scalar, atom_of, one_atom, parts
-
-Ints = NDArray[np.intp]
 
 
 def add_weight(
