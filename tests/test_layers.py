@@ -17,7 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
-    "h5py": {"hdf5", "output"},
+    "h5py": {"hdf5", "mechanism", "output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja
     "rich": {"output"},

@@ -1,23 +1,34 @@
-"""MATLAB's .mat files: of versions 4 to 7 by SciPy, of 7.3, which are HDF5, by `eigassign.hdf5`."""
+"""MATLAB's .mat files of versions 4 to 7.3, which another process reads: see `matlab_child`.
+
+What that process sends is only numbers: it may crash, or be ended by its limits, and indices of
+sparse matrices are checked here before anything is computed with them.
+"""
 
 from __future__ import annotations
 
-import io
-import zlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
 from functools import partial
-from math import prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.files import MATRIX, how_to_raise, raised
-from eigassign.hdf5 import ForeignFile
-from eigassign.mechanism.imports.entries import Contents, Matrix, UnfitError, require_few
+from eigassign.mechanism.imports.entries import ENTRIES, Contents, Matrix, UnfitError, require_few
+from eigassign.mechanism.imports.matlab_child import TOO_MUCH
+from eigassign.process import ONE_THREAD
 
-_HEADER, _COMPRESSED = 128, 15  # bytes before the first element; type of one that is compressed
-_INTEGERS = {f"{sign}int{8 << k}" for sign in ("u", "") for k in range(4)}
-_NUMBERS = {"double", "single", "sparse"} | _INTEGERS
+_CHILD = Path(__file__).with_name("matlab_child.py")
+_START = 300e6  # bytes of addresses: 140 MB after all imports
+_ENTRY = 32  # bytes of memory: a full matrix of SciPy's takes 16, packed or sparse ones 24
+_SECONDS = 5.0  # of the processor: 0.3 to start; and one for so many bytes of the file
+_PACE = 2e7  # packed by deflate, and unpacked at a tenth of its usual pace
 
 
 def _is_oldest(data: bytes) -> bool:
@@ -34,74 +45,54 @@ def _is_oldest(data: bytes) -> bool:
 
 def read_matlab(data: bytes) -> Contents | None:
     """Its variables that are matrices of numbers; None of other files."""
-    from scipy.io import whosmat
-
-    if data.startswith(b"MATLAB 7.3"):
-        return _of_hdf5(data)
-    if data.startswith(b"MATLAB "):
-        data = _unpacked(data)
-    elif not _is_oldest(data):
+    if not data.startswith(b"MATLAB ") and not _is_oldest(data):
         return None
-    stream: Any = io.BytesIO(data)
-    variables = whosmat(stream)
-    shapes = {
-        name: (shape[0], 0 if kind == "sparse" else prod(shape))
-        for name, shape, kind in variables
-        if kind in _NUMBERS and len(shape) == 2
-    }
-    return Contents({name: partial(_matrix, data, name, *size) for name, size in shapes.items()})
+    sent, at, matrices = _sent(data), 0, dict[str, Callable[[], Matrix]]()
+    while at < len(sent):
+        end = sent.index(b"\n", at) + 1
+        name, shape, parts = json.loads(sent[at:end])
+        arrays, at = [], end
+        for dtype, length in parts:
+            arrays.append(np.frombuffer(sent, dtype, length, at))
+            at += arrays[-1].nbytes
+        matrices[name] = partial(_matrix, shape, arrays)
+    return Contents(matrices)
 
 
-def _unpacked(data: bytes) -> bytes:
-    """The same without compression, whose elements SciPy would unpack to any size."""
-    order, parts, at = "<" if data[126:128] == b"IM" else ">", [data[:_HEADER]], _HEADER
-    room = int(raised(MATRIX))
-    while at + 8 <= len(data):
-        kind, size = np.frombuffer(data, f"{order}u4", 2, at).tolist()
-        element = data[at : at + 8 + size]
-        if kind == _COMPRESSED:
-            element = zlib.decompressobj().decompress(element[8:], room + 1)
-        if len(element) < 8 or (room := room - len(element)) < 0:
-            most = raised(MATRIX)
-            raised_by = how_to_raise(most + 1, MATRIX)
-            raise UnfitError(f"unpacks to more than {most / 1e6:.3g} MB: {raised_by}")
-        parts.append(element)
-        at += 8 + size
-    return b"".join(parts)
+def _sent(data: bytes) -> bytes:
+    """What the other process makes of the file.
 
-
-def _matrix(data: bytes, name: str, rows: int, entries: int) -> Matrix:
-    from scipy.io import loadmat
-
-    require_few(rows, entries)
-    stream: Any = io.BytesIO(data)
-    read: Any = loadmat(stream, variable_names=[name])[name]
-    require_few(read.shape[0], read.nnz if hasattr(read, "nnz") else read.size)
-    if hasattr(read, "check_format"):
-        read.check_format(full_check=True)
-    return Matrix(read)
-
-
-def _of_hdf5(data: bytes) -> Contents:
-    """Full ones are arrays by columns, sparse ones values, their rows and where columns start.
-
-    Text is stored as whole numbers, and these are passed over.
+    Raises UnfitError for more than limits allow, ValueError for a file that it does not survive.
     """
-    file = ForeignFile(data)
-    kinds = {name: each.dtype.kind for name, each in file.arrays.items() if each.dtype is not None}
-    by_columns = [name for name in file.arrays if f"{name}/jc" in kinds]
+    room, entries = int(raised(MATRIX)), int(raised(ENTRIES))
+    memory = int(_START + _ENTRY * entries + 2 * len(data))
+    seconds = int(max(_SECONDS, raised(_SECONDS)) + len(data) / _PACE)
+    command = [sys.executable, "-P", "-Wignore", str(_CHILD)]
+    done = subprocess.run(
+        [*command, *map(str, (memory, seconds, entries, room))],
+        input=data,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        timeout=5 * seconds,  # on a machine that does other things; the only limit on Windows
+        env={**os.environ, **ONE_THREAD},
+    )
+    if done.returncode == TOO_MUCH:
+        raised_by = how_to_raise(room + 1, MATRIX)
+        raise UnfitError(f"unpacks to more than {room / 1e6:.3g} MB: {raised_by}")
+    if done.returncode:
+        raise ValueError(f"its reader ended with {done.returncode}")
+    return done.stdout
 
-    def matrix(name: str) -> Matrix:
-        if name in kinds:
-            require_few(0, prod(file.arrays[name].shape))
-            return Matrix(file.read(name).T)
-        values, at, starts = (file.read(f"{name}/{key}") for key in ("data", "ir", "jc"))
-        n = len(starts) - 1
-        require_few(n, len(values))
-        found = (values, at.astype(np.int64), starts.astype(np.int64))
-        read = sparse.csc_array(found, (n, n))
-        read.check_format(full_check=True)
-        return Matrix(read)
 
-    full = [name for name, kind in kinds.items() if kind == "f" and "/" not in name]
-    return Contents({name: partial(matrix, name) for name in (*full, *by_columns)})
+def _matrix(shape: tuple[int, int], arrays: list[NDArray[Any]]) -> Matrix:
+    """The matrix, or in the place of one that was not sent zeros of its shape."""
+    if not arrays:
+        return Matrix(np.broadcast_to(0.0, shape))
+    if len(arrays) == 1:
+        return Matrix(arrays[0].reshape(shape[::-1]).T)
+    values, rows, starts = arrays
+    require_few(max(shape), len(values))
+    found = (values.copy(), rows.astype(np.int64), starts.astype(np.int64))
+    A: Any = sparse.csc_array(found, shape)
+    A.check_format(full_check=True)
+    return Matrix(A)
