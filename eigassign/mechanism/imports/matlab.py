@@ -24,7 +24,7 @@ from eigassign.mechanism.imports.entries import ENTRIES, Contents, Matrix, Unfit
 from eigassign.mechanism.imports.matlab_child import TOO_MUCH
 from eigassign.process import ONE_THREAD
 
-_CHILD = Path(__file__).with_name("matlab_child.py")
+_CHILD = str(Path(__file__).with_name("matlab_child.py"))
 _START = 300e6  # bytes of addresses: 140 MB after all imports
 _ENTRY = 32  # bytes of memory: a full matrix of SciPy's takes 16, packed or sparse ones 24
 _SECONDS = 5.0  # of the processor: 0.3 to start; and one for so many bytes of the file
@@ -64,12 +64,12 @@ def _sent(data: bytes) -> bytes:
 
     Raises UnfitError for more than limits allow, ValueError for a file that it does not survive.
     """
-    room, entries = int(raised(MATRIX)), int(raised(ENTRIES))
-    memory = int(_START + _ENTRY * entries + 2 * len(data))
+    room = int(raised(MATRIX))
+    memory = int(_START + _ENTRY * raised(ENTRIES) + 2 * len(data))
     seconds = int(max(_SECONDS, raised(_SECONDS)) + len(data) / _PACE)
-    command = [sys.executable, "-P", "-Wignore", str(_CHILD)]
+    command = [sys.executable, "-P", "-Wignore", _CHILD, *map(str, (memory, seconds, room))]
     done = subprocess.run(
-        [*command, *map(str, (memory, seconds, entries, room))],
+        command,
         input=data,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -85,9 +85,6 @@ def _sent(data: bytes) -> bytes:
 
 
 def _matrix(shape: tuple[int, int], arrays: list[NDArray[Any]]) -> Matrix:
-    """The matrix, or in the place of one that was not sent zeros of its shape."""
-    if not arrays:
-        return Matrix(np.broadcast_to(0.0, shape))
     if len(arrays) == 1:
         return Matrix(arrays[0].reshape(shape[::-1]).T)
     values, rows, starts = arrays

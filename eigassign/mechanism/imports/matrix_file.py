@@ -1,17 +1,16 @@
 """Matrix Market, NumPy's .npy and .npz, tables: what SciPy and NumPy read, checked beforehand.
 
-Such files come from anywhere. Their size is bounded before they are read, what they say of their
-own size before it is believed, and the indices of sparse ones before anything is computed with
-them: SciPy follows an index that is out of range wherever it points.
+Such files come from anywhere. What they unpack to is bounded before they are read, and the indices
+of sparse ones before anything is computed with them: SciPy follows an index that is out of range
+wherever it points.
 """
 
 from __future__ import annotations
 
 import io
 import re
-import zipfile
 from functools import partial
-from math import isqrt, prod
+from math import isqrt
 from typing import Any
 
 import numpy as np
@@ -30,22 +29,38 @@ from eigassign.mechanism.imports.entries import (
 _NUMPY, _ZIP, _MARKET = b"\x93NUMPY", b"PK\x03\x04", b"%%matrixmarket"
 _BLANKS = bytes.maketrans(b",;", b"  ")
 _WIDEST = 26 * isqrt(ENTRIES)  # bytes of a line of as many numbers as rows can have
-_INDICES = {f"{name}.npy" for name in ("indices", "indptr", "row", "col", "offsets")}
+_INDICES = {"indices", "indptr", "row", "col", "offsets"}
 
 
 def read_numpy(data: bytes) -> Contents | None:
     """The array of .npy, the sparse matrix of ``scipy.sparse.save_npz``, the arrays of ``savez``.
 
-    None of other files.
+    None of other files; objects are refused.
     """
     if not data.startswith((_NUMPY, _ZIP)):
         return None
-    names = [""]
-    if data.startswith(_ZIP):
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = [name.removesuffix(".npy") for name in archive.namelist()]
-        names = [""] if "format" in names else names
-    return Contents({name: partial(_of_numpy, data, name) for name in names})
+    if data.startswith(_NUMPY):
+        return Contents({"": lambda: Matrix(np.load(io.BytesIO(data), allow_pickle=False))})
+    archive = np.load(io.BytesIO(data), allow_pickle=False)
+    size = sum(member.file_size for member in archive.zip.infolist())
+    if size > raised(MATRIX):
+        raise UnfitError(f"unpacks to {size / 1e6:.3g} MB: {how_to_raise(size, MATRIX)}")
+    if "format" in archive:
+        return Contents({"": lambda: _sparse(data, archive)})
+    return Contents({name: partial(_array, archive, name) for name in archive})
+
+
+def _array(archive: Any, name: str) -> Matrix:
+    return Matrix(archive[name])
+
+
+def _sparse(data: bytes, archive: Any) -> Matrix:
+    if any(archive[name].dtype.kind not in "iu" for name in _INDICES.intersection(archive)):
+        raise ValueError("its indices are no whole numbers")
+    matrix: Any = sparse.load_npz(io.BytesIO(data))
+    if hasattr(matrix, "check_format"):
+        matrix.check_format(full_check=True)
+    return Matrix(matrix)
 
 
 def read_table(data: bytes) -> Contents | None:
@@ -63,42 +78,6 @@ def read_matrix_market(data: bytes) -> Contents | None:
     """The one matrix of a Matrix Market file; None of other files."""
     known = data[:20].lower().startswith(_MARKET)
     return Contents({"": lambda: Matrix(_matrix_market(data))}) if known else None
-
-
-def _of_numpy(data: bytes, name: str) -> Matrix:
-    """The array, dense or sparse."""
-    if data.startswith(_NUMPY):
-        _require_room(io.BytesIO(data), len(data))
-        return Matrix(np.load(io.BytesIO(data), allow_pickle=False))
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = archive.infolist()
-        if (size := sum(member.file_size for member in members)) > raised(MATRIX):
-            raise UnfitError(f"unpacks to {size / 1e6:.3g} MB: {how_to_raise(size, MATRIX)}")
-        for member in members:
-            with archive.open(member) as stream:
-                dtype = _require_room(stream, member.file_size)
-            if member.filename in _INDICES and dtype.kind not in "iu":
-                raise ValueError("its indices are no whole numbers")
-    if name:
-        return Matrix(np.load(io.BytesIO(data), allow_pickle=False)[name])
-    matrix: Any = sparse.load_npz(io.BytesIO(data))
-    if hasattr(matrix, "check_format"):
-        matrix.check_format(full_check=True)
-    return Matrix(matrix)
-
-
-def _require_room(stream: Any, size: int) -> np.dtype[Any]:
-    """Its dtype; ValueError unless the array of a .npy stream of ``size`` bytes is all in there."""
-    version = np.lib.format.read_magic(stream)
-    header = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }[version]
-    shape, _, dtype = header(stream)
-    if dtype.hasobject or prod(shape) * dtype.itemsize > size:
-        raise ValueError("it ends before its array does")
-    require_few(0, prod(shape))
-    return dtype
 
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?"
