@@ -24,6 +24,7 @@ Cells = NDArray[np.bytes_]
 MOST = 2_000_000  # dofs
 ENTRIES = 20_000_000  # all that is done with an entry takes some 150 bytes: 3 GB
 LARGEST = 1e30  # entry or coordinate, in any units: squares of squares are finite
+LEAST = 1e-75  # an entry that is not zero: squares of squares are still normal numbers
 COMPLEX = "has complex entries: damping is not modelled, export the real stiffness and mass"
 _EMPTY = 16  # lines are filled to their length: one number of 8 characters in a line of 80 is less
 LABEL = 100  # freedoms of a node that are told apart: Abaqus numbers them up to 40

@@ -28,6 +28,7 @@ from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
     LARGEST,
+    LEAST,
     Contents,
     Matrix,
     UnfitError,
@@ -162,4 +163,5 @@ def _real(matrix: Any) -> sparse.csr_array:
         raise UnfitError("has entries that are not finite")
     if np.abs(out.data).max(initial=0.0) > LARGEST:
         raise UnfitError(f"has entries beyond {LARGEST:g}")
+    out.data = np.where(np.abs(out.data) < LEAST, 0.0, out.data)
     return out

@@ -40,6 +40,12 @@ def test_an_undamaged_file_is_read(tmp_path: Path) -> None:
     assert (read_matrix(npz(tmp_path), "key").toarray() == GOOD.toarray()).all()
 
 
+def test_an_entry_that_is_next_to_nothing_is_zero(tmp_path: Path) -> None:
+    """A flipped bit makes a 0 of 2.7e-315, by which a scale was divided."""
+    np.save(tmp_path / "K.npy", [[2.0, 2.7e-315], [1e-74, 2.0]])
+    assert read_matrix(tmp_path / "K.npy", "key").toarray().tolist() == [[2.0, 0.0], [1e-74, 2.0]]
+
+
 @pytest.mark.parametrize(
     "changes",
     [
