@@ -15,8 +15,6 @@ import h5py
 import numpy as np
 import pytest
 
-import eigassign as ea
-from eigassign.errors import StorageError
 from eigassign.output import Cache
 
 KEY = 64 * "0"
@@ -67,13 +65,6 @@ def test_what_is_no_file_of_the_cache_is_set_aside_with_one_warning(
     assert len(caplog.records) == 1
 
 
-@pytest.mark.parametrize("place", PLACED, ids=lambda place: place.__name__)
-def test_what_is_no_file_is_no_reduced_model(place: Callable[[Path], None], tmp_path: Path) -> None:
-    place(tmp_path / "a.h5")
-    with pytest.raises(StorageError, match=r"cannot read .*a\.h5"):
-        ea.load_reduced(tmp_path / "a.h5")
-
-
 # --- HDF5 of five megabytes that takes a gigabyte where it is believed
 
 
@@ -109,17 +100,8 @@ def attributes(file: Any) -> None:
 READ = """
 import sys
 from pathlib import Path
-import eigassign as ea
-from eigassign.errors import StorageError
 from eigassign.output import Cache
 folder = Path(sys.argv[1])
-for path in folder.glob("*.h5"):
-    try:
-        ea.load_reduced(path)
-    except StorageError as error:
-        assert "not an intact reduced model" in str(error), error
-    else:
-        raise SystemExit(f"{path} is believed")
 assert not any(entry.intact for entry in Cache(folder).entries())
 assert Cache(folder).load(sys.argv[2]) is None
 print(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
