@@ -19,7 +19,6 @@ from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
-from eigassign.pipeline.outlook import picture
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
@@ -55,7 +54,7 @@ class Case(built_case.BuiltCase):
 
     def _repr_html_(self) -> str:
         try:
-            return html([repr(self)], plan=picture(self))
+            return html([repr(self)], plan=queries.picture(self))
         except EigassignError as error:
             return html([repr(self), str(error)])
 
@@ -65,7 +64,7 @@ class Case(built_case.BuiltCase):
         A matplotlib figure, which a notebook shows; ``.savefig("arm.pdf")`` keeps it. Raises
         CaseError for a mechanism that cannot be modelled or follow its trajectory.
         """
-        return drawn(picture(self))
+        return drawn(queries.picture(self))
 
     def plot_mode(
         self, mode: int = 1, q: Sequence[float] | None = None, y: Sequence[float] | None = None

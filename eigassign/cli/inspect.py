@@ -17,8 +17,7 @@ from eigassign.files import printable, quoted
 
 if TYPE_CHECKING:
     from eigassign.output.store.run_record import RunStatus
-    from eigassign.pipeline.outlook import Outlook
-    from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
+    from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, RunSize
 
 
 _DRAWING = ("out", "force", "figures", "allow_outside")
@@ -39,14 +38,13 @@ LEFT_BY = ("run", "update", "batch", "chart")
 @arguments.json
 @arguments.common
 def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int:
-    """Check case files, and say what a run will take.
+    """Check case files, and say what they amount to.
 
     Lists every problem as file:line:column: key: message, also those of the first 100 variants of a
     sweep. For a valid case it prints warnings of implausible values, the degrees of freedom, errors
-    of the model, and how much time and memory a run takes.
+    of the model, and how much memory a run takes.
     """
-    from eigassign.pipeline import outlook
-    from eigassign.pipeline.queries import check as checked
+    from eigassign.pipeline import queries
     from eigassign.pipeline.stages import Stages
 
     codes, answers = [0], dict[str, Any]()
@@ -54,12 +52,12 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
         for case in cases:
             try:
                 with Stages(reporter.stage)("check", f"checking {case}", at_once=False):
-                    answer = checked(case, how["allow_outside"])
-                    notes = (*answer.notes, *_sweep(case, how["allow_outside"], answer.outlook))
+                    answer = queries.check(case, how["allow_outside"])
+                    notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
-                    folder = outlook.draw(case, None, *(how[key] for key in _DRAWING[1:]))
+                    folder = queries.draw(case, None, *(how[key] for key in _DRAWING[1:]))
                     reporter.stage(f"{folder}/figures written")
             except EigassignError as error:
                 codes.append(process.report(error))
@@ -76,12 +74,10 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     return max(codes)
 
 
-def _sweep(case: Path, allow_outside: bool, takes: Outlook | None) -> list[str]:
+def _sweep(case: Path, allow_outside: bool) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
     from eigassign.batch.plan import plan_of, variant_problem
     from eigassign.batch.work import CaseOptions, check_cases
-    from eigassign.facts import duration
-    from eigassign.pipeline.outlook import ELSE_S
 
     plan = plan_of([case])
     if not plan.is_swept:
@@ -92,10 +88,7 @@ def _sweep(case: Path, allow_outside: bool, takes: Outlook | None) -> list[str]:
         found = [(index, problem) for index, problems in wrong for problem in problems]
         raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
-    command = f"eigassign batch {quoted(case)} --dry-run"
-    case_s = 0.0 if takes is None or takes.optimize_s is None else takes.optimize_s - ELSE_S
-    all_take = f"about {duration(len(plan) * case_s)} on one core" if case_s else "what they take"
-    return [f"sweep: {len(plan)} variants, {seen}; {all_take}: {command}"]
+    return [f"sweep: {len(plan)} variants, {seen}: eigassign batch {quoted(case)} --dry-run"]
 
 
 def _trajectories(answer: CheckAnswer) -> list[str]:
@@ -118,33 +111,19 @@ def _described(name: str, answer: CheckAnswer) -> list[str]:
         *_trajectories(answer),
     ]
     lines += [f"  {note}" for note in answer.notes]
-    lines += [f"  {line}" for line in _expected(answer.outlook)] if answer.outlook else []
+    lines += [f"  {line}" for line in _held(answer.size)] if answer.size else []
     return [*lines, f"  next: {answer.next}"]
 
 
-def _expected(outlook: Outlook) -> list[str]:
-    size = outlook.expansion
-    modes = f"mode{'s' if len(outlook.modes) > 1 else ''} {', '.join(map(str, outlook.modes))}"
-    mb = size.memory_mb
-    memory = "1 MB" if mb < 1.0 else f"{float(f'{mb:.1g}'):.0f} MB"
-    lines = []
+def _held(size: RunSize) -> list[str]:
+    """Coefficients, and memory to two digits."""
+    modes = f"mode{'s' if len(size.modes) > 1 else ''} {', '.join(map(str, size.modes))}"
+    lines = [f"memory: about {float(f'{size.memory_mb:.2g}'):.0f} MB"]
     if size.order:
-        lines.append(
-            f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
-            f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
-        )
-    if outlook.optimize_s is not None:
-        large = f", {outlook.memory_mb / 1e3:.1g} GB" if outlook.memory_mb > 300.0 else ""
-        lines.append(f"optimize: {_about(outlook.optimize_s)}{large}")
+        each = " each" if len(size.modes) > 1 else ""
+        expansion = f"expansion of {modes} to order {size.order}"
+        lines.insert(0, f"{expansion}: {size.coefficients} coefficients{each}")
     return lines
-
-
-def _about(seconds: float) -> str:
-    """Seconds in words that promise no more than an estimate can."""
-    if seconds < 1.0:
-        return "less than a second"
-    rough = float(f"{seconds:.1g}")
-    return f"about {rough:.0f} s" if rough < 100 else f"about {seconds / 60:.0f} min"
 
 
 @click.command(

@@ -7,8 +7,8 @@ Reading order:
     coefficient_files  expansion coefficients as files for other programs
     run_files          the run folder, and the log in it
     run                the paper's flowchart: case, model, expansion, assignment, verification
-    outlook            what a run will take, and a picture of the mechanism
-    queries            check a case; its frequencies at one point
+    outlook            what a case of a batch will take
+    queries            check a case, draw it; its frequencies at one point
     urdf               a robot from URDF as the content of a case
     update             measured frequencies to the parameters that explain them
     chart              time against accuracy of every method on one case
@@ -21,8 +21,7 @@ __all__, __getattr__, __dir__ = face(
     {
         "chart": "chart_case",
         "expansions": "affordable_order expand_plan expansion_key",
-        "outlook": "draw",
-        "queries": "check modes",
+        "queries": "check draw modes",
         "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
         "stages": "Stages silent",
         "update": "update_case",

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Annotated
 
 import numpy as np
@@ -25,11 +24,16 @@ from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
+from eigassign.files import quoted
 from eigassign.mechanism.elements.free_part import part_lines
 from eigassign.mechanism.kinematics.parameters import written_loads
+from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.model import Model
+from eigassign.output.figures.graph import FigurePlan
+from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
-from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
+from eigassign.pipeline.expansions import expansion_size
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.study.accuracy import digits_lines, judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
@@ -37,12 +41,14 @@ from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
 from eigassign.study.meaning.levers import anatomies
 from eigassign.study.pictures import drawing
-from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
+from eigassign.study.planning import Plan, expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import ModeAnatomy, WeightRow
 from eigassign.study.updating.measured import read_measurements
 from eigassign.study.weight import GIVEN, study_weight
 
 Floats = NDArray[np.float64]
+ALONE_MB = 150.0  # MB of a process, and for each unknown of a part before it is reduced: of 7 437
+PART_MB = 0.05  # 330 MB in `check`, 420 MB in a search
 
 
 Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
@@ -70,6 +76,16 @@ class ModesAnswer:
 
 
 @dataclass(frozen=True)
+class RunSize:
+    """What a run holds: its full expansion, ``coefficients`` of each mode, and about all of it."""
+
+    modes: tuple[int, ...]
+    order: int  # 0: nothing is expanded
+    coefficients: int
+    memory_mb: float  # of a process
+
+
+@dataclass(frozen=True)
 class CheckAnswer:
     """A case in figures; ``warnings`` are plausibility problems that do not stop a run."""
 
@@ -83,7 +99,7 @@ class CheckAnswer:
     trajectories: tuple[tuple[str, int, float], ...]  # of each its name, samples and duration
     targets: int
     notes: tuple[str, ...]
-    outlook: Outlook | None  # what a run takes; None of a case without a point to expand at
+    size: RunSize | None  # None of a case without a point to expand at
     next: str  # what to do with it
     warnings: tuple[Problem, ...]
 
@@ -218,7 +234,6 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
 
 
 def _checked(case: BuiltCase) -> CheckAnswer:
-    started = perf_counter()
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = part_lines(file)
@@ -247,7 +262,6 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         notes += weight.lines
         warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
     warnings += tuple(_doubts(case, asked, None if trajectory is None else trajectory.q[:1]))
-    takes = None if plan is None else outlook(case, plan, trajectory, started)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
         title=file.title,
@@ -260,10 +274,35 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         trajectories=each,
         targets=len(file.targets),
         notes=tuple(notes),
-        outlook=takes,
+        size=None if plan is None else _size(model, plan),
         next=next_step(file),
         warnings=warnings,
     )
+
+
+def _size(model: Model, plan: Plan) -> RunSize:
+    size, reduced = expansion_size(model, plan), model.reduced
+    whole = [one.reduction for one in ([] if reduced is None else reduced.links)]
+    memory_mb = ALONE_MB + size.memory_mb + PART_MB * sum(r.mesh.n_local for r in whole if r)
+    return RunSize(plan.modes, size.order, size.coefficients, memory_mb)
+
+
+def next_step(case: CaseFile) -> str:
+    """The command for a case that is in order."""
+    name = quoted(case.path)
+    if case.measurements is not None:
+        return f"eigassign update {name}"
+    given = (case.trajectory, case.design.parameters, case.has_question)
+    keys = ("trajectory", "design", "targets")
+    missing = [key for key, value in zip(keys, given, strict=True) if not value]
+    if not missing:
+        return f"eigassign optimize {name}"
+    needs = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
+    pose = ""
+    if case.trajectory is None and case.expansion.q == "auto" and case.coordinates:
+        pose = f' --q "{", ".join(f"{value:g}" for value in resting_pose(case))}"'
+    more = "eigassign docs case-file"
+    return f"eigassign modes {name}{pose} --draw (to optimize it needs {needs}: {more})"
 
 
 def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> Iterator[Problem]:
@@ -284,6 +323,45 @@ def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> 
     for one in ours:
         for doubt in far_off(one, hz[[mode - 1 for mode, _ in one.mode_terms]]):
             yield file.problem(f"{one.place}.{one.kind}", doubt)
+
+
+# --- The mechanism alone, in a picture
+
+
+def draw(
+    path: str | Path,
+    out: Path | None = None,
+    force: bool = False,
+    formats: Sequence[str] = ("png",),
+    allow_outside: bool = False,
+) -> Path:
+    """`picture` in a folder: ``out``, or results/<case>_check.
+
+    Raises StorageError where the folder may not be replaced.
+    """
+    case = load_case(path, allow_outside)
+    with new_run_folder(case.file, out, force, "_check") as folder:
+        report.write_figures([picture(case)], folder.hidden, formats)
+    return folder.path
+
+
+def picture(case: BuiltCase) -> FigurePlan:
+    """The mechanism along its trajectory, or in one pose; raises CaseError where it has none."""
+    file, y = case.file, case.initial_design
+    with case.located():
+        model = case.model()
+        if file.trajectory is None:
+            poses = drawing.rest_pose(file, model, some_pose(case), y)
+        else:
+            poses = drawing.draw_poses(file, model, case.trajectory, y)
+    return mechanism_plan(file.title, poses)
+
+
+def some_pose(case: BuiltCase) -> Floats:
+    """q (n_q,) of a case without a trajectory: its expansion point, else where it may rest."""
+    given = case.file.expansion.q
+    pose = resting_pose(case.file) if given == "auto" else given
+    return np.append(np.asarray(pose, dtype=np.float64), written_loads(case.file))
 
 
 # --- ``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions

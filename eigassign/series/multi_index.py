@@ -91,7 +91,7 @@ class LowerSet(Brief):
             raise UsageError(
                 f"order {order} in {self.n_variables} variables: {len(self)} coefficients have "
                 f"{count:.3g} products of two, which takes {size}: lower the order, or "
-                f" {how_to_raise(count, MOST_PAIRS)}"
+                f"{how_to_raise(count, MOST_PAIRS)}"
             )
 
     @cached_property

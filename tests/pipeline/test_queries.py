@@ -7,8 +7,8 @@ import pytest
 from run_cases import SHIPPED, automatic, chain, shipped, without, written
 
 import eigassign
-from eigassign.errors import CaseError, UsageError
-from eigassign.pipeline import Options, check, modes, optimize
+from eigassign.errors import CaseError, StorageError, UsageError
+from eigassign.pipeline import Options, check, draw, modes, optimize
 
 
 def test_modes_are_taken_where_the_case_says_unless_asked_elsewhere() -> None:
@@ -74,6 +74,65 @@ def test_check_says_what_the_case_amounts_to() -> None:
     assert (answer.n_dof, answer.n_rigid, answer.samples, answer.duration_s) == (23, 2, 152, 1.0)
     assert (answer.q_names, answer.y_names, answer.targets) == (("q1", "q2"), ("m1", "m2"), 1)
     assert answer.warnings == ()
+
+
+def test_check_states_coefficients_and_memory_and_the_next_step() -> None:
+    answer = check(SHIPPED)
+    assert answer.size is not None
+    assert (answer.size.order, answer.size.modes) == (4, (1,))
+    assert answer.size.coefficients == 35  # C(3 + 4, 4): q1 does not matter
+    assert 100.0 < answer.size.memory_mb < 160.0
+    assert answer.next == f"eigassign optimize {SHIPPED}"
+
+
+def test_sizes_grow_with_the_order_and_are_not_stated_without_a_point(tmp_path: Path) -> None:
+    text = (SHIPPED.parent / "arm_6r.yaml").read_text()
+    found = []
+    for order in (3, 8):
+        path = tmp_path / f"order_{order}.yaml"
+        path.write_text(text.replace("order: 3", f"order: {order}"))
+        found.append(check(path).size)
+    low, high = found
+    assert low is not None
+    assert high is not None
+    assert (low.coefficients, high.coefficients) == (165, 12870)
+    assert 400.0 < high.memory_mb - low.memory_mb < 900.0  # 650 MB
+    path.write_text(text.partition("trajectory:")[0])
+    answer = check(path)
+    assert answer.size is None
+    assert "needs trajectory, design and targets" in answer.next
+    assert '--q "0, 0, 0, 0, 0, 0" --draw' in answer.next
+
+
+def test_memory_counts_large_parts() -> None:
+    """Of 7 685 unknowns before they are reduced."""
+    size = check(SHIPPED.parent / "casting_arm.yaml").size
+    assert size is not None
+    assert 350.0 < size.memory_mb < 600.0
+
+
+def test_check_refuses_a_series_that_does_not_fit(tmp_path: Path) -> None:
+    text = (SHIPPED.parent / "arm_6r.yaml").read_text().replace("order: 3", "order: 20")
+    with pytest.raises(CaseError, match=r"expansion\.order: .* takes about 24 GB: lower the order"):
+        check(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("trajectory", [True, False])
+def test_a_case_is_drawn_with_and_without_its_trajectory(
+    trajectory: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (SHIPPED.parent / "gantry.yaml").read_text()
+    path = Path("gantry.yaml")
+    path.write_text(text if trajectory else text.partition("trajectory:")[0])
+    folder = draw(path, None, False, ("svg",))
+    assert folder == Path("results/gantry_check")
+    assert (folder / "figures" / "mechanism.svg").read_bytes().startswith(b"<?xml")
+    assert draw(path, None, False, ("svg",)) == folder  # again: of the same case
+    Path("mine").mkdir()
+    Path("mine/thesis.txt").touch()
+    with pytest.raises(StorageError, match="mine"):
+        draw(path, Path("mine"), False, ("svg",))
 
 
 def test_check_follows_the_trajectory(tmp_path: Path) -> None:
