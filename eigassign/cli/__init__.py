@@ -8,7 +8,7 @@ Reading order:
     arguments  options that several commands share
     reporter   stages, warnings and the log on stderr; JSON on stdout
     runs       optimize, expand, update, validate, chart
-    inspect    check, modes, status, schema
+    inspect    check, modes, schema
     start      init, docs
     batch      batch, merge
     cache      cache path, list, clear
@@ -28,7 +28,7 @@ from eigassign import process
 from eigassign._version import __version__
 from eigassign.cli.batch import batch, merge
 from eigassign.cli.cache import cache
-from eigassign.cli.inspect import check, modes, schema, status
+from eigassign.cli.inspect import check, modes, schema
 from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
 from eigassign.cli.start import docs, init
@@ -126,6 +126,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, validate, chart, merge, status, cache, schema)
+MORE = (modes, expand, validate, chart, merge, cache, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -1,4 +1,4 @@
-"""Quick questions about a case or a run: `check`, `modes`, `status`, `schema`."""
+"""Quick questions about a case: `check`, `modes`; and `schema`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
 if TYPE_CHECKING:
-    from eigassign.output.store.run_record import RunStatus
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, RunSize
 
 
@@ -202,53 +201,6 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
     print_tables([found])
     if folder is not None:
         show(f"{folder} written")
-
-
-@click.command(epilog=arguments.examples("eigassign status results/planar_arm"))
-@click.argument("runs", nargs=-1, required=True, type=arguments.PATH)
-@arguments.json
-@arguments.common
-def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
-    """Verify that result folders are as they were written.
-
-    Compares the hashes in run.json with the files of the folder, the case file and the files that
-    the case names, and the version with the installed one. Exit code 0 if all agree, 1 if something
-    has changed or is missing, 2 if there is no finished run.
-    """
-    from eigassign.output.store.run_record import run_status
-
-    codes, answers = [0], dict[str, Any]()
-    with reporting(how):
-        for run in runs:
-            try:
-                found = run_status(run)
-            except EigassignError as error:
-                codes.append(process.report(error))
-                answers[str(run)] = process.document(error)
-                continue
-            codes.append(0 if found.intact and found.current else 1)
-            judged = {"intact": found.intact, "current": found.current}
-            answers[str(run)] = {**judged, **vars(found)}
-            if not as_json:
-                show(*_state_of(str(run), found))
-    if as_json:
-        print_json(answers)
-    return max(codes)
-
-
-def _state_of(name: str, found: RunStatus) -> list[str]:
-    changes = found.changes
-    verdict = "intact" if found.intact else "damaged or edited"
-    lines = [f"{name}: {verdict}; {'up to date' if found.current else 'out of date'}"]
-    for what in ("changed", "missing", "added"):
-        lines += [f"  {what}: {file}" for file in getattr(changes, what)]
-    lines.append(f"  case {found.case}: {_SINCE[found.case_state]}")
-    lines += [f"  its file {file}: {_SINCE[state]}" for file, state in found.case_files.items()]
-    lines.append(f"  version {found.version}; {found.installed} is installed")
-    return lines
-
-
-_SINCE = {"same": "as it was", "changed": "changed since", "missing": "missing"}
 
 
 @click.command(

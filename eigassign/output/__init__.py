@@ -42,7 +42,7 @@ __all__, __getattr__, __dir__ = face(
         "schema": "FILES NUMBERS results_schema",
         "store.cache": "Cache default_directory",
         "store.run_folder": "run_folder",
-        "store.run_record": "run_status",
+        "store.run_record": "is_untouched",
         "tables": "Table modes_table run_tables validation_table",
     },
 )

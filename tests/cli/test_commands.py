@@ -276,28 +276,6 @@ def test_optimize_leaves_a_foreign_folder_alone_unless_forced(capsys: Captured) 
     assert Path("mine.1/thesis.txt").read_text() == "years of work"
 
 
-def test_status_says_whether_runs_are_as_they_were_written_and_of_the_case_as_it_is(
-    capsys: Captured,
-) -> None:
-    assert main(["modes", "good.yaml", "--out", "run", "--count", "1", "--figures", "none"]) == 0
-    capsys.readouterr()
-    assert answer(capsys, "status", "run").startswith("run: intact; up to date\n")
-    Path("run/notes.md").write_text("mine")
-    found = json.loads(answer(capsys, "status", "run", "--json"))["run"]
-    assert (found["intact"], found["current"], found["case_state"]) == (True, True, "same")
-    assert found["changes"] == {"changed": [], "missing": [], "added": ["notes.md"]}
-    assert found["version"] == found["installed"] == __version__
-    Path("good.yaml").write_text(GOOD + "\n")
-    assert "intact; out of date" in answer(capsys, "status", "run", code=1)
-    Path("run/case.yaml").unlink()
-    text = answer(capsys, "status", "run", code=1)
-    assert "missing: case.yaml" in text
-    assert "good.yaml: changed since" in text
-    found = json.loads(answer(capsys, "status", "run", "nowhere", "--json", code=2))
-    assert found["run"]["changes"]["missing"] == ["case.yaml"]
-    assert "not a run folder" in found["nowhere"]["problems"][0]["message"]
-
-
 def test_an_edited_case_in_a_run_is_kept_beside_the_next_run(capsys: Captured) -> None:
     args = ["modes", "good.yaml", "--out", "run", "--count", "1", "--figures", "none"]
     assert main(args) == 0

@@ -195,7 +195,6 @@ LONG = (
     "expand",
     "update",
     "validate",
-    "status",
 )  # each over 3 s
 SLOW = {f"eigassign {name}": pytest.mark.slow for name in LONG} | {"eigassign": pytest.mark.slow}
 
@@ -212,8 +211,6 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
         shutil.copy(TWO_LINK, "cases")
         for path in CASES.glob("arm_update.*"):
             shutil.copy(path, ".")
-        if name == "eigassign status":
-            assert main(["optimize", "planar_arm.yaml", "--figures", "none"]) == 0
         for part in ("1", "2") if name == "eigassign merge" else ():
             swept = ["--set", "expansion.order=2,3", "--columns"]
             swept += ["--shard", f"{part}/2", "--out", f"part-{part}"]

@@ -30,7 +30,7 @@ AGAIN, COLUMNS = (*SWEEP, "out"), (*SWEEP, "columns", "--columns")
 DRY, MERGE = (*AGAIN, "--dry-run"), ("merge", "out")
 SHARD = (*SWEEP, "part-2", "--shard", "2/2")
 SHARDS = ("merge", "whole", "part-1", "part-2")
-STATUS, OPTIMIZE = ("status", "run"), ("optimize", "beam.yaml", *RUN)
+OPTIMIZE = ("optimize", "beam.yaml", *RUN)
 MADE = (AGAIN, COLUMNS, (*SWEEP, "part-1", "--shard", "1/2"), SHARD, OPTIMIZE)
 ONE = "frequency=190Hz"  # a case of the sweep
 READ: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
@@ -41,11 +41,11 @@ READ: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
     ("part-2/manifest.jsonl", (SHARDS, SHARD)),
     (f"out/{ONE}/run.json", (AGAIN, DRY, MERGE)),
     (f"part-2/{ONE}/run.json", (SHARDS,)),
-    ("run/run.json", (STATUS, OPTIMIZE)),
+    ("run/run.json", (OPTIMIZE,)),
     (f"out/{ONE}/outcome.json", (AGAIN, DRY, MERGE)),
     (f"part-2/{ONE}/outcome.json", (SHARDS,)),
     (f"out/{ONE}/results.json", (AGAIN, MERGE)),
-    ("run/results.json", (("validate", "beam.yaml", "--against", "run"), STATUS, OPTIMIZE)),
+    ("run/results.json", (("validate", "beam.yaml", "--against", "run"), OPTIMIZE)),
     ("columns/summary.json", ((*MERGE, "--against", "columns"), COLUMNS)),
     ("columns/columns.h5", (COLUMNS, ("merge", "columns"))),
 )

@@ -9,8 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from eigassign.errors import UsageError
-from eigassign.output import run_folder, run_status
+from eigassign.output import is_untouched, run_folder
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 
@@ -90,10 +89,7 @@ class Scene:
         """Whether there is at the target what was there before, or a whole new run."""
         if (found := snapshot(self.target)) == self.before:
             return True
-        status = None
-        with suppress(UsageError):  # no finished run
-            status = run_status(self.target)
-        return bool(found and status and status.intact and not status.changes.added)
+        return bool(found) and is_untouched(self.target)
 
     def lost(self) -> list[str]:
         """What the user has, and is nowhere to be found."""

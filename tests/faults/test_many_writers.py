@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from run_scenes import CASE, TARGET, snapshot, write_a_few_files
 
-from eigassign.output import Cache, run_status
+from eigassign.output import Cache, is_untouched
 
 WRITERS, KILLED = 16, 6
 KEY = 64 * "0"
@@ -69,7 +69,7 @@ def test_sixteen_runs_of_one_case_leave_one_whole_run(root: Path) -> None:
             write_a_few_files(root / CASE, root / TARGET, False)
 
     assert not any(side_by_side(run))
-    assert run_status(root / TARGET).intact
+    assert is_untouched(root / TARGET)
     pids = {
         text.split()[-1]
         for name, text in (snapshot(root / TARGET) or {}).items()

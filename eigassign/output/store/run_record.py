@@ -1,7 +1,7 @@
 """run.json: of which case and version a run is, and the hash of every file that it wrote.
 
-It is written last, so a folder that has it was finished; and by it anybody can tell later what was
-changed in the folder, and whether the run is still one of the case as it is now (`run_status`).
+It is written last, so a folder that has it was finished; and by it can be told later what was
+changed in the folder.
 """
 
 from __future__ import annotations
@@ -13,10 +13,8 @@ import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Literal
 
 from eigassign._version import __version__
-from eigassign.errors import StorageError, UsageError
 from eigassign.files import CASE, MATRIX, file_digest, json_value, name_of, read_bytes, seen_from
 from eigassign.output.store.atomic import write_synced
 
@@ -131,6 +129,12 @@ def changes(folder: Path, record: RunRecord) -> Changes:
     return Changes(*(tuple(sorted(names)) for names in lists))
 
 
+def is_untouched(folder: Path) -> bool:
+    """True where there is a finished run, as it was written: no file edited, added or deleted."""
+    record = read_record(folder)
+    return record is not None and changes(folder, record) == Changes((), (), ())
+
+
 def is_whole(folder: Path, record: RunRecord) -> bool:
     """True where every file of the run is there as it was written, whatever else there is.
 
@@ -159,66 +163,3 @@ def _is_as_marked(path: Path, mark: FileMark) -> bool:
     if not stat.S_ISREG(status.st_mode) or status.st_size != mark.bytes:
         return False
     return file_digest(path, MATRIX) == mark.sha256
-
-
-# --- A run folder, long after
-
-
-State = Literal["same", "changed", "missing"]
-
-
-@dataclass(frozen=True)
-class RunStatus:
-    """State of a run folder: is it as it was written, and still of its case, by this version?"""
-
-    case: str  # path of the case file
-    case_state: State
-    case_files: Mapping[str, State]  # that the case names, by name as seen from its folder
-    version: str
-    installed: str
-    files: int  # that the run wrote
-    changes: Changes
-
-    @property
-    def intact(self) -> bool:
-        """True where all files of the run are there and as they were written."""
-        return not self.changes.changed and not self.changes.missing
-
-    @property
-    def current(self) -> bool:
-        """The case, what it names and the version are those of the run."""
-        states = {self.case_state, *self.case_files.values()}
-        return states == {"same"} and self.version == self.installed
-
-
-def run_status(folder: str | Path) -> RunStatus:
-    """What is left of the run in ``folder``, and whether it still is one of its case.
-
-    Raises UsageError where there is no finished run, StorageError where it cannot be read.
-    """
-    folder = Path(os.path.realpath(folder))
-    try:
-        os.stat(folder / MARKER)
-    except (FileNotFoundError, NotADirectoryError):
-        raise UsageError(f"{folder} is not a run folder: it has no {MARKER}") from None
-    except OSError as error:
-        raise StorageError(f"{folder} cannot be read: {error.strerror}") from error
-    record = read_record(folder)
-    if record is None:
-        raise UsageError(f"{folder / MARKER} is damaged, or not of eigassign")
-    case = Path(os.path.normpath(folder / record.run.case_path))
-    named = record.run.case_files.items()
-    return RunStatus(
-        case=relative_path(case, Path.cwd()),
-        case_state=_state(case, record.run.case_sha256, CASE),
-        case_files={name: _state(case.parent / name, sha, MATRIX) for name, sha in named},
-        version=record.version,
-        installed=__version__,
-        files=len(record.files) + 1,
-        changes=changes(folder, record),
-    )
-
-
-def _state(path: Path, sha256: str, limit: int) -> State:
-    found = file_digest(path, limit)
-    return "missing" if found is None else "same" if found == sha256 else "changed"
