@@ -9,7 +9,6 @@ Reading order:
     limits    time and memory of a case
     work      what a worker does: check a variant, run it
     cases     the life of a case: its record, taking up a folder, giving cases out, summaries
-    merge     one batch of its shards
     workers   where tasks run: this process, or processes that are gone when the parent is
     cluster   the workers of a dask.distributed scheduler
     runner    all of it together: start there
@@ -24,7 +23,6 @@ __all__, __getattr__, __dir__ = face(
         "cases": "Batch summarise",
         "manifest": "Header InOrder Manifest read_header write_header",
         "plan": "Variant cases_in folder_names plan_of variant_problem",
-        "merge": "merge_shards",
         "runner": "run",
         "variants": "Variants variants_of",
         "work": "CaseOptions outcome_of run_cases",

@@ -44,7 +44,7 @@ from eigassign.batch.manifest import (
 from eigassign.batch.plan import BatchPlan, Variant
 from eigassign.batch.work import CaseOptions, outcome_of
 from eigassign.errors import StorageError
-from eigassign.files import CASE, quoted, read_bytes
+from eigassign.files import CASE, read_bytes
 from eigassign.output.batch.files import digest, write_files
 from eigassign.output.batch.outcome import OUTCOME, CaseOutcome, from_line, to_line
 from eigassign.output.store.atomic import replace_synced
@@ -61,7 +61,6 @@ class Batch:
     plan: BatchPlan
     folder: Path
     options: CaseOptions
-    shard: tuple[int, int] = (1, 1)  # (i, n): the cases with index % n == i − 1
 
     @cached_property
     def header(self) -> Header:
@@ -70,7 +69,7 @@ class Batch:
         files = tuple(relative_path(Path(f.path), folder) for f in self.plan.files)
         keys = tuple(dict.fromkeys(key for f in self.plan.files for key in f.variants.keys))
         plan, count = self.plan.digest, len(self.plan)
-        return Header(plan, count, self.shard, files, keys, self.options.columns)
+        return Header(plan, count, files, keys, self.options.columns)
 
     def is_done(self, found: Line | CaseOutcome) -> bool:
         """True where a case that ended so is not to be tried again.
@@ -132,7 +131,7 @@ def take_up(batch: Batch) -> None:
 
     Outcomes of cases that the plan has no more are kept: it may have them again. So are damaged
     folders of cases, under another name. Raises StorageError where the folder holds another batch,
-    which ``force`` moves aside, or another shard of this one.
+    which ``force`` moves aside.
     """
     before = read_header(batch.folder)
     if before != batch.header:
@@ -162,19 +161,12 @@ def _adopt(batch: Batch, before: Header | None) -> None:
     folder, header = batch.folder, batch.header
     kept, others = _current(batch, before)
     foreign = before is not None and not kept and not set(before.files) & set(header.files)
-    if before is not None and not batch.options.force:
-        if before.plan == header.plan and any(found.index >= 0 for found in others):
-            i, n = before.shard
-            raise StorageError(
-                f"{folder} holds shard {i}/{n} of this batch: give each shard a folder of its own "
-                "with --out"
-            )
-        if foreign:
+    if before is not None and foreign:
+        if not batch.options.force:
             raise StorageError(
                 f"{folder} holds another batch (of {', '.join(before.files[:3])}), which is left "
                 "alone. Choose another folder with --out, or use --force to move its list aside"
             )
-    if foreign:
         with contextlib.suppress(FileNotFoundError):
             os.rename(folder / LINES, _free(folder, LINES))
         others = []
@@ -290,19 +282,18 @@ def summarise(
     folder: Path,
     header: Header,
     *,
-    anew: bool = False,
     alone: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> InOrder:
     """Make the summaries from the rows of the index, in the order of the plan; the rows.
 
     Those that were made from the same rows, and are as they were made, stay; batch.json has a hash
-    of both. All are made ``anew`` if asked to be. ``alone``: entered meanwhile, where several
+    of both. ``alone``: entered meanwhile, where several
     processes do this.
     """
     with alone():
         rows = InOrder(folder, header)
         before = read_header(folder)
-        if not anew and before is not None and before.summarised == digest(folder, rows.digest):
+        if before is not None and before.summarised == digest(folder, rows.digest):
             return rows
         try:
             write_files(folder, rows, len(rows), header.keys, header.columns)
@@ -310,6 +301,6 @@ def summarise(
         except OSError as error:
             raise StorageError(
                 f"{folder}: the summaries cannot be written: {error.strerror}; "
-                f"eigassign merge {quoted(folder)} writes them again"
+                "the same command writes them again"
             ) from error
     return rows

@@ -42,8 +42,7 @@ class Header:
     """batch.json: which plan the folder is of. All variants in it were found to be valid."""
 
     plan: str  # its digest
-    cases: int  # of the whole plan
-    shard: tuple[int, int]  # (i, n): cases of the plan with index % n == i − 1
+    cases: int  # of the plan
     files: tuple[str, ...]  # the case files, as seen from the folder
     keys: tuple[str, ...] = ()  # that its variants have values of
     columns: bool = False  # the cases have no folders
@@ -52,9 +51,8 @@ class Header:
     summarised: str = field(default="", compare=False)  # `digest` of the summaries
 
     def indices(self) -> range:
-        """Indices of the cases that are this folder's."""
-        i, n = self.shard
-        return range(i - 1, self.cases, n)
+        """Indices of the cases."""
+        return range(self.cases)
 
 
 def read_header(folder: Path) -> Header | None:
@@ -66,12 +64,12 @@ def read_header(folder: Path) -> Header | None:
         found = json_value(read_bytes(folder / HEADER, TABLE))
         if found["format"] != FORMAT:
             raise UsageError(f"{folder / HEADER} is of another version: use another --out")
-        lists = {name: found[name] for name in ("shard", "files", "keys")}
+        lists = {name: found[name] for name in ("files", "keys")}
         header = Header(**{**found, **{name: tuple(given) for name, given in lists.items()}})
-        (i, n), texts = header.shard, (header.plan, header.version, header.summarised)
-        kinds = [header.columns], (header.cases, i, n), lists.values()
+        texts = (header.plan, header.version, header.summarised)
+        kinds = [header.columns], (header.cases,), lists.values()
         whole = [{*map(type, each)} for each in kinds] == [{bool}, {int}, {list}]
-        right = whole and 1 <= i <= n and 0 <= header.cases <= MOST * len(header.files)
+        right = whole and 0 <= header.cases <= MOST * len(header.files)
         names = {*map(type, (*texts, *header.files, *header.keys))} == {str}
         if not (right and names and header.plan.isascii() and all(map(name_of, header.files))):
             raise ValueError("no header of a batch")

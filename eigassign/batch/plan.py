@@ -123,14 +123,10 @@ class BatchPlan:
         n = bisect_right(self._ends, index) - 1
         return self.files[n], index - self._ends[n]
 
-    def swept(self, indices: range) -> list[range]:
-        """Those of ``indices`` that are variants of a file, of each file."""
-        step, spans = indices.step, zip(self.files, self._ends, self._ends[1:], strict=False)
-        return [
-            range(first + (indices.start - first) % step, end, step)
-            for file, first, end in spans
-            if file.variants.keys
-        ]
+    def swept(self) -> list[range]:
+        """The indices of the variants of each file that has some."""
+        spans = zip(self.files, self._ends, self._ends[1:], strict=False)
+        return [range(first, end) for file, first, end in spans if file.variants.keys]
 
     @cached_property
     def _ends(self) -> tuple[int, ...]:

@@ -75,7 +75,7 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
     if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
         return
     plan, stages = batch.plan, Stages(say)
-    spans = plan.swept(batch.header.indices())
+    spans = plan.swept()
     parts = (span[k : k + _CHECKED] for span in spans for k in range(0, len(span), _CHECKED))
     total, done, wrong, first = sum(map(len, spans)), 0, 0, list[tuple[int, Problem]]()
     if not total:

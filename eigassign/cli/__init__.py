@@ -10,7 +10,7 @@ Reading order:
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, schema
     start      init, docs
-    batch      batch, merge
+    batch      batch
     cache      cache path, list, clear
 """
 
@@ -26,7 +26,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign._version import __version__
-from eigassign.cli.batch import batch, merge
+from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
 from eigassign.cli.inspect import check, modes, schema
 from eigassign.cli.reporter import print_json
@@ -126,6 +126,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, validate, chart, merge, cache, schema)
+MORE = (modes, expand, validate, chart, cache, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -30,24 +30,6 @@ def examples(*commands: str, after: str = "") -> str:
     return "\n\n".join([*parts, *([f"\b\n{after}"] if after else [])])
 
 
-class Shard(click.ParamType):  # type: ignore[type-arg] # no generic one before click 8.4
-    """``2/8``: the second of eight parts."""
-
-    name = "shard"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        """``value`` as (i, n), or a usage error at its option."""
-        if isinstance(value, tuple):
-            return value
-        found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", value)
-        i, n = map(int, found.groups()) if found else (0, 0)
-        if not 1 <= i <= n:
-            self.fail(f"{value!r} is not I/N with 1 <= I <= N, as 2/8.", param, ctx)
-        return i, n
-
-
 class Age(click.ParamType):  # type: ignore[type-arg]
     """``30d``: so many seconds."""
 

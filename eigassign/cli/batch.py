@@ -1,4 +1,4 @@
-"""Many cases: `batch`, `merge`."""
+"""Many cases: `batch`."""
 
 from __future__ import annotations
 
@@ -49,14 +49,6 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     "--scheduler",
     metavar="ADDRESS",
     help="Run on the workers of this dask.distributed scheduler (default: this machine).",
-)
-@click.option(
-    "--shard",
-    type=arguments.Shard(),
-    metavar="I/N",
-    default="1/1",
-    show_default=True,
-    help="Run part I of N, in a folder of its own; join the parts with merge.",
 )
 @click.option("--join", is_flag=True, help="Help a batch that is already running in the folder.")
 @click.option(
@@ -156,32 +148,7 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
         seconds=how["case_time"],
         megabytes=how["case_memory"],
     )
-    return Batch(plan, folder, options, how["shard"])
-
-
-@click.command(
-    epilog=arguments.examples(
-        "eigassign merge results/night part-*",
-        "eigassign merge results/night",
-    )
-)
-@click.argument("folder", type=arguments.PATH)
-@click.argument("shards", nargs=-1, type=arguments.PATH)
-@arguments.against
-@arguments.common
-def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
-    """Join the parts of a batch that ran separately.
-
-    FOLDER is the folder of the result. SHARDS are the folders of the parts, written by batch
-    --shard; the folders of their cases stay where they are. Without SHARDS, the summaries in FOLDER
-    are written again, from the cases that it has. It is an error if a part is missing, unfinished
-    or of another batch. Exit code 1 if a case failed, or differs from --against.
-    """
-    from eigassign.batch.merge import merge_shards
-
-    with reporting(how) as reporter:
-        since = _comparison(how)
-        return _told(folder, merge_shards(folder, shards), since, reporter)
+    return Batch(plan, folder, options)
 
 
 def _comparison(how: Mapping[str, Any]) -> EarlierResult | None:

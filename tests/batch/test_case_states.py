@@ -20,8 +20,8 @@ import pytest
 from instant import batch_of, case, instant
 from stopping import can_stop, stopped_at
 
-from eigassign.batch import Batch, merge_shards, run
-from eigassign.errors import StorageError, UsageError
+from eigassign.batch import Batch, run
+from eigassign.errors import StorageError
 
 MASSES = "0,0.5,0.75,1"  # that of 0.75 has no answer, and so no folder
 DONE = ["mass=0", "mass=0.5", "mass=0.75", "mass=1"]
@@ -244,7 +244,6 @@ def test_a_case_file_may_have_a_name_that_is_no_text(tmp_path: Path, columns: bo
     row = json.loads((batch.folder / "summary.json").read_text())["cases"][0]
     assert row["path"] == str(tmp_path / f"{name}.yaml")
     assert r"caf\udce9.yaml" in (batch.folder / "summary.csv").read_text()
-    assert merge_shards(batch.folder, []).ends == {"ok": 3, "failed": 1}
 
 
 def test_without_batch_json_nothing_runs_again(batch: Batch) -> None:
@@ -277,31 +276,6 @@ def test_a_file_that_a_value_names_is_a_part_of_the_case(tmp_path: Path) -> None
     table.write_text("q1,q2\n0,0\n1,2\n")
     assert (tmp_path / "arm.yaml").read_text() == text
     assert ran(batch_of(tmp_path, setting=setting)) == ["title=q.csv"]
-
-
-def test_a_shard_with_a_damaged_case_is_not_finished(tmp_path: Path) -> None:
-    case(tmp_path)
-    whole = batch_of(tmp_path, MASSES)
-    parts = [
-        replace(whole, folder=tmp_path / f"part-{i}", shard=(i, 2), options=options)
-        for i in (1, 2)
-        for options in [replace(whole.options, out=str(tmp_path / f"part-{i}"))]
-    ]
-    for part in parts:
-        ran(part)
-    folders = [part.folder for part in parts]
-    merge_shards(whole.folder, folders)
-    before = summaries(whole.folder)
-    cut(folders[1] / "mass=0.5" / "results.json")
-    with pytest.raises(UsageError, match=r"shard 2/2, is not finished: 1 of 2 cases$"):
-        merge_shards(whole.folder, folders)
-    with pytest.raises(UsageError, match=r"files of mass=0\.5 were changed or lost: run the batch"):
-        merge_shards(whole.folder, [])
-    assert summaries(whole.folder) == before
-    (folders[0] / "manifest.jsonl").unlink()
-    assert [ran(part) for part in parts] == [["mass=0.75"], ["mass=0.5"]]
-    merge_shards(whole.folder, folders)
-    assert summaries(whole.folder) == before
 
 
 # --- Processes

@@ -142,17 +142,4 @@ def test_ranges_of_many_values_take_neither_time_nor_memory(tmp_path: Path, samp
         assert len(plan) == 9_999_999
         assert plan[4_999_999].values[MASS] == 0.5
         assert plan.digest != plan_of([case(tmp_path, "b.yaml", f"sweep: {{{sweep}}}}}\n")]).digest
-        (span,) = plan.swept(range(2, len(plan), 5))
-    assert (span[0], span[-1], len(span)) == (2, 9_999_997, 2_000_000)
-
-
-def test_the_variants_of_a_shard_are_those_of_swept_files(tmp_path: Path) -> None:
-    swept = [
-        case(tmp_path, f"{n}.yaml", f"sweep: {{parameters: {{{MASS}: [1, 2, 3, 4]}}}}\n")
-        for n in "bd"
-    ]
-    plan = plan_of([case(tmp_path, "a.yaml"), swept[0], case(tmp_path, "c.yaml"), swept[1]])
-    for i in range(3):
-        indices = range(i, len(plan), 3)
-        found = [k for span in plan.swept(indices) for k in span]
-        assert found == [k for k in indices if plan[k].values]
+    assert plan.swept() == [range(9_999_999)]

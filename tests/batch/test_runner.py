@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
-from eigassign.batch import Batch, Variant, Workers, merge_shards, run
+from eigassign.batch import Batch, Variant, Workers, run
 from eigassign.errors import CaseError, StorageError
 
 
@@ -72,29 +72,6 @@ def test_results_of_cases_that_are_gone_from_the_plan_are_kept_for_when_it_has_t
     again = batch_of(tmp_path, "2,1,0")
     assert ran(again) == []
     assert [*summary(again)] == ["mass=2", "mass=1", "mass=0"]
-
-
-def test_the_folder_of_a_shard_is_not_that_of_another_one(tmp_path: Path) -> None:
-    case(tmp_path)
-    first, second = (replace(batch_of(tmp_path, "0,1,2"), shard=(i, 2)) for i in (1, 2))
-    assert ran(first) == ["mass=0", "mass=2"]
-    with pytest.raises(StorageError, match="holds shard 1/2 of this batch"):
-        ran(second)
-    assert [*summary(first)] == ["mass=0", "mass=2"]
-    assert ran(batch_of(tmp_path, "0,1,2")) == ["mass=1"]
-
-
-def test_cases_of_merged_shards_are_done(tmp_path: Path) -> None:
-    case(tmp_path)
-    whole = batch_of(tmp_path, "0,1,2")
-    parts = [tmp_path / "part-1", tmp_path / "part-2"]
-    for i, part in enumerate(parts, 1):
-        ran(replace(whole, folder=part, shard=(i, 2)))
-    merge_shards(whole.folder, parts)
-    assert ran(whole) == []
-    shutil.rmtree(parts[1] / "mass=1")
-    assert ran(whole) == ["mass=1"]
-    assert (whole.folder / "mass=1").is_dir()
 
 
 def test_cases_without_the_report_that_is_asked_for_run_again(tmp_path: Path) -> None:

@@ -190,7 +190,6 @@ def test_the_help_of_every_command_has_examples_of_it(name: str, capsys: Capture
 LONG = (
     "chart",
     "batch",
-    "merge",
     "optimize",
     "expand",
     "update",
@@ -211,10 +210,6 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
         shutil.copy(TWO_LINK, "cases")
         for path in CASES.glob("arm_update.*"):
             shutil.copy(path, ".")
-        for part in ("1", "2") if name == "eigassign merge" else ():
-            swept = ["--set", "expansion.order=2,3", "--columns"]
-            swept += ["--shard", f"{part}/2", "--out", f"part-{part}"]
-            assert main(["batch", "planar_arm.yaml", *swept]) == 0
     for line in lines:
         command, _, kept = line.partition(" > ")
         words = shlex.split(command)[1:]

@@ -27,27 +27,21 @@ RUN = ("--out", "run", "--study", "none", "--figures", "none", "--report", "none
 SWEEP = ("batch", "beam.yaml", "--set", "targets.0.frequency=185 Hz,190 Hz,1 Hz", "--jobs", "1")
 SWEEP = (*SWEEP, "--reports", "none", "--out")
 AGAIN, COLUMNS = (*SWEEP, "out"), (*SWEEP, "columns", "--columns")
-DRY, MERGE = (*AGAIN, "--dry-run"), ("merge", "out")
-SHARD = (*SWEEP, "part-2", "--shard", "2/2")
-SHARDS = ("merge", "whole", "part-1", "part-2")
+DRY = (*AGAIN, "--dry-run")
 OPTIMIZE = ("optimize", "beam.yaml", *RUN)
-MADE = (AGAIN, COLUMNS, (*SWEEP, "part-1", "--shard", "1/2"), SHARD, OPTIMIZE)
+MADE = (AGAIN, COLUMNS, OPTIMIZE)
 ONE = "frequency=190Hz"  # a case of the sweep
 READ: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
-    ("out/batch.json", (AGAIN, DRY, MERGE)),
-    ("part-2/batch.json", (SHARDS,)),
-    ("out/manifest.jsonl", (AGAIN, DRY, MERGE)),
-    ("columns/manifest.jsonl", (COLUMNS, ("merge", "columns"))),
-    ("part-2/manifest.jsonl", (SHARDS, SHARD)),
-    (f"out/{ONE}/run.json", (AGAIN, DRY, MERGE)),
-    (f"part-2/{ONE}/run.json", (SHARDS,)),
+    ("out/batch.json", (AGAIN, DRY)),
+    ("out/manifest.jsonl", (AGAIN, DRY)),
+    ("columns/manifest.jsonl", (COLUMNS,)),
+    (f"out/{ONE}/run.json", (AGAIN, DRY)),
     ("run/run.json", (OPTIMIZE,)),
-    (f"out/{ONE}/outcome.json", (AGAIN, DRY, MERGE)),
-    (f"part-2/{ONE}/outcome.json", (SHARDS,)),
-    (f"out/{ONE}/results.json", (AGAIN, MERGE)),
+    (f"out/{ONE}/outcome.json", (AGAIN, DRY)),
+    (f"out/{ONE}/results.json", (AGAIN,)),
     ("run/results.json", (("validate", "beam.yaml", "--against", "run"), OPTIMIZE)),
-    ("columns/summary.json", ((*MERGE, "--against", "columns"), COLUMNS)),
-    ("columns/columns.h5", (COLUMNS, ("merge", "columns"))),
+    ("columns/summary.json", ((*AGAIN, "--against", "columns"), COLUMNS)),
+    ("columns/columns.h5", (COLUMNS,)),
 )
 
 
@@ -82,8 +76,6 @@ class Trial:
             now = made(self.root, self.damaged.endswith(".h5"))
         except (ValueError, RecursionError):
             return False
-        if self.command[0] == "merge" and self.damaged.endswith("manifest.jsonl"):
-            return all(row in self.before[name] for name in now for row in now[name])
         return now == self.before
 
     def __str__(self) -> str:
@@ -97,7 +89,7 @@ def made(root: Path, to_the_byte: bool = False) -> dict[str, Any]:
         return {
             name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "summary.csv")
         }
-    for name in ("out", "columns", "part-2", "whole"):
+    for name in ("out", "columns"):
         if (root / name / "summary.json").exists():
             rows = json.loads((root / name / "summary.json").read_text())["cases"]
             found[name] = [{**row, "seconds": 0} for row in rows]
@@ -105,7 +97,7 @@ def made(root: Path, to_the_byte: bool = False) -> dict[str, Any]:
 
 
 class Stage:
-    """Folders of a run, a batch, one in columns and one in shards; and damages drawn from them."""
+    """Folders of a run, a batch and one in columns; and damages drawn from them."""
 
     def __init__(self, folder: Path, worker: Worker) -> None:
         self._first, self._scene, self._worker = folder / "first", folder / "scene", worker

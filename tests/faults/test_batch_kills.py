@@ -1,32 +1,26 @@
 """A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
 
-So does one of which results are damaged between, one on a cluster of which the scheduler is killed,
-and the merging of shards, killed before each of its changes. Slow: forty kills, each followed by
+So does one of which results are damaged between, and one on a cluster of which the scheduler is
+killed. Slow: forty kills, each followed by
 the same command again, half of them after a file of a case was cut, emptied or deleted.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from itertools import count
 from pathlib import Path
 
 import pytest
 from schedulers import scheduler
-from stopping import can_stop, stopped_at
 
 import eigassign
-from eigassign.cli import main
 
 pytestmark = [
     pytest.mark.slow,
@@ -51,8 +45,7 @@ def note(event, args):
 
 sys.addaudithook(note)
 if __name__ == "__main__":
-    from eigassign.cli import main
-    sys.exit(main())
+        sys.exit(main())
 """
 COMMAND = (
     *("program.py", "batch", "arm.yaml", "--jobs", str(JOBS), "--out", "out"),
@@ -193,32 +186,3 @@ def test_sweeps_whose_scheduler_is_killed_end_as_if_it_had_not_been(tmp_path: Pa
     assert set(codes) == {1, 3, -signal.SIGKILL}
     said = f"{SCHEDULERS} kills on a cluster in {sweeps} sweeps, exit codes {dict(codes)}"
     sys.stdout.write(f"{said}\n")
-
-
-@pytest.mark.skipif(not can_stop(), reason="needs ptrace, on Linux")
-def test_a_merge_killed_before_any_change_of_a_file_ends_as_if_it_had_not_been(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(placed(tmp_path / "sweep"))
-    parts = [f"part-{i}" for i in (1, 2, 3)]
-    sweep = [*COMMAND[1:3], "--jobs", "1", *COMMAND[COMMAND.index("--set") :], "--figures", "none"]
-    for i, part in enumerate(parts, 1):
-        assert main([*sweep, "--out", part, "--shard", f"{i}/3", "--quiet"]) in (0, 1)
-
-    def merge() -> int:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            return main(["merge", "out", *parts])
-
-    assert merge() == 1
-    expected = made(Path.cwd())
-    assert len(expected) == CASES
-    for call in count(1):
-        shutil.rmtree("out")
-        stopped = stopped_at(merge, call, signal.SIGKILL)
-        assert merge() == 1, call
-        assert made(Path.cwd()) == expected, call
-        assert not [path for path in Path("out").glob(".*") if path.name != ".lock"], call
-        if not stopped.reached:
-            break
-    assert call > 20
-    sys.stdout.write(f"merging was killed {call - 1} times\n")

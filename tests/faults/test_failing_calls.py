@@ -52,10 +52,6 @@ COMMANDS: dict[str, tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]] = {
     "update": (UPDATE, (UPDATE,)),
     "batch": ((*THREE, "--out", "out"), ((*TWO, "--out", "out"),)),
     "columns": ((*THREE, *COLUMNS), ((*TWO, *COLUMNS),)),
-    "merge": (
-        ("merge", "out", "part-1", "part-2"),
-        tuple((*THREE, "--out", f"part-{i}", "--shard", f"{i}/2") for i in (1, 2)),
-    ),
 }
 
 
@@ -174,8 +170,7 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Scene]:
 
 def faults(scene: Scene, folder: Path, how: Ended) -> Iterator[str]:
     """What is wrong after a command of which a call failed, and after the next one."""
-    # of a shard that cannot be read, merge says that it is not whole
-    if how.code not in (scene.code, 1, 3, *([2] if "is not finished" in how.err else [])):
+    if how.code not in (scene.code, 1, 3):
         yield f"exit code {how.code}: {how.err}"
     if "internal error" in how.err or "Traceback" in how.err:
         yield how.err

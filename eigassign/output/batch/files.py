@@ -1,8 +1,4 @@
-"""All files of a batch in one pass over its rows, so that memory does not grow with them.
-
-So are those of a batch in shards, of its shards' rows: summaries of shards are not read, which
-would be files of others, and may say something else than the rows.
-"""
+"""All files of a batch in one pass over its rows, so that memory does not grow with them."""
 
 from __future__ import annotations
 
