@@ -9,13 +9,12 @@ the case as it is now if it has its key: what the file says, its values, the ver
 a folder, since it has no answer or the batch has columns, has its line of manifest.jsonl for a
 record, which ends with a hash of itself.
 
-manifest.jsonl is the index of these records. What comes after goes by it: the summaries are made of
-it, and processes that work together learn from it what others have done. So it is compared with the
-records when a batch takes up a folder (`take_up`), and may be cut, edited or deleted before: what
-it lacks is added to it, what it says against a record is withdrawn.
+manifest.jsonl is the index of these records: the summaries are made of it. So it is compared with
+the records when a batch takes up a folder (`take_up`), and may be cut, edited or deleted before:
+what it lacks is added to it, what it says against a record is withdrawn.
 
-A case is in flight while the process that has given it out holds its byte of the lock. There are no
-other states, and none of these comes from a clock.
+There are no other states, and none of these comes from a clock. One batch at a time is at work in a
+folder (`alone_in`).
 """
 
 from __future__ import annotations
@@ -25,12 +24,10 @@ import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from eigassign.batch.lock import FolderLock
 from eigassign.batch.manifest import (
     LINES,
     Header,
@@ -47,7 +44,7 @@ from eigassign.errors import StorageError
 from eigassign.files import CASE, read_bytes
 from eigassign.output.batch.files import digest, write_files
 from eigassign.output.batch.outcome import OUTCOME, CaseOutcome, from_line, to_line
-from eigassign.output.store.atomic import replace_synced
+from eigassign.output.store.atomic import lock, replace_synced
 from eigassign.output.store.run_record import is_whole, read_record, relative_path
 
 GONE = -1  # index of an outcome of a case that the plan has no more
@@ -124,6 +121,20 @@ def _differences(batch: Batch, rows: Mapping[int, CaseOutcome]) -> Iterator[Case
 
 
 # --- Taking up a folder
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Hold the lock of a batch's folder, which the system lets go of when its holder dies.
+
+    Raises StorageError where another batch is at work there.
+    """
+    with lock(folder) as held:
+        if held is False:
+            raise StorageError(
+                f"another batch is running in {folder}: wait for it, or use another --out"
+            )
+        yield
 
 
 def take_up(batch: Batch) -> None:
@@ -209,15 +220,15 @@ def seconds_of_done(batch: Batch) -> dict[int, float]:
 
 
 class Progress:
-    """Which cases of a batch are done, in this process or another one.
+    """Which cases of a batch are done.
 
     ``ends`` counts how they ended. A case that ended in an error before is not done.
     """
 
-    def __init__(self, batch: Batch, lock: FolderLock) -> None:
-        self._plan, self._indices, self._lock = batch.plan, batch.header.indices(), lock
+    def __init__(self, batch: Batch) -> None:
+        self._plan, self._indices = batch.plan, batch.header.indices()
         self._ends = [""] * len(self._indices)
-        self._manifest = Manifest(batch.folder, batch.header.plan, lock.line)
+        self._manifest = Manifest(batch.folder, batch.header.plan)
         self.ends: Counter[str] = Counter()
         for line in self._manifest.news():
             self._note(line.index, line.status if batch.is_done(line) else "")
@@ -233,14 +244,10 @@ class Progress:
         return self.ends.total()
 
     def tasks(self, size: Callable[[], int]) -> Iterator[Sequence[Variant]]:
-        """Yield what is neither done nor in flight elsewhere, ``size()`` cases at a time."""
+        """Yield what is not done, ``size()`` cases at a time."""
         task: list[Variant] = []
-        for k, index in enumerate(self._indices):
-            if self._ends[k] or not self._lock.claim(index):
-                continue
-            self.refresh()
-            if self._ends[k]:
-                self._lock.release(index)
+        for index in self._indices:
+            if self._ends[index]:
                 continue
             task.append(self._plan[index])
             if len(task) >= size():
@@ -249,16 +256,10 @@ class Progress:
         if task:
             yield task
 
-    def refresh(self) -> None:
-        """Take note of what other processes have done."""
-        for line in self._manifest.news():
-            self._note(line.index, line.status)
-
     def keep(self, found: CaseOutcome) -> None:
-        """Write down how a case ended, and let go of it."""
+        """Write down how a case ended."""
         self._manifest.append(found)
         self._note(found.index, found.status)
-        self._lock.release(found.index)
 
     def sync(self) -> None:
         """Wait until all that was written down is on disk."""
@@ -267,40 +268,32 @@ class Progress:
     def _note(self, index: int, status: str) -> None:
         """Take note of how a case ended; of "" that it is to do."""
         if index in self._indices:
-            k = self._indices.index(index)
-            if before := self._ends[k]:
+            if before := self._ends[index]:
                 self.ends[before] -= 1
             if status:
                 self.ends[status] += 1
-            self._ends[k] = status
+            self._ends[index] = status
 
 
 # --- Summaries
 
 
-def summarise(
-    folder: Path,
-    header: Header,
-    *,
-    alone: Callable[[], AbstractContextManager[object]] = nullcontext,
-) -> InOrder:
+def summarise(folder: Path, header: Header) -> InOrder:
     """Make the summaries from the rows of the index, in the order of the plan; the rows.
 
     Those that were made from the same rows, and are as they were made, stay; batch.json has a hash
-    of both. ``alone``: entered meanwhile, where several
-    processes do this.
+    of both.
     """
-    with alone():
-        rows = InOrder(folder, header)
-        before = read_header(folder)
-        if before is not None and before.summarised == digest(folder, rows.digest):
-            return rows
-        try:
-            write_files(folder, rows, len(rows), header.keys, header.columns)
-            write_header(folder, replace(header, summarised=digest(folder, rows.digest)))
-        except OSError as error:
-            raise StorageError(
-                f"{folder}: the summaries cannot be written: {error.strerror}; "
-                "the same command writes them again"
-            ) from error
+    rows = InOrder(folder, header)
+    before = read_header(folder)
+    if before is not None and before.summarised == digest(folder, rows.digest):
+        return rows
+    try:
+        write_files(folder, rows, len(rows), header.keys, header.columns)
+        write_header(folder, replace(header, summarised=digest(folder, rows.digest)))
+    except OSError as error:
+        raise StorageError(
+            f"{folder}: the summaries cannot be written: {error.strerror}; "
+            "the same command writes them again"
+        ) from error
     return rows

@@ -8,7 +8,6 @@ line. Of several lines of one case the last one counts.
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import hashlib
 import io
@@ -18,8 +17,7 @@ import sys
 import threading
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -134,15 +132,9 @@ class Line:
 class Manifest:
     """The lines of manifest.jsonl that are of one plan: read as they are added, and written."""
 
-    def __init__(
-        self,
-        folder: Path,
-        plan: str,
-        appending: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
-    ) -> None:
-        """``appending``: entered while a line is written, where several processes write."""
+    def __init__(self, folder: Path, plan: str) -> None:
         self.path = folder / LINES
-        self._plan, self._appending = plan, appending
+        self._plan = plan
         self._syncing: threading.Timer | None = None  # of the first line that may not be on disk
         self._failed: OSError | None = None  # why it could not be
         self._read = 0  # bytes that were read
@@ -187,7 +179,7 @@ class Manifest:
         """
         line = line_of(to_line(outcome), self._plan).encode()
         try:
-            with self._appending(), open(self.path, "ab+", buffering=0) as file:
+            with open(self.path, "ab+", buffering=0) as file:
                 end = _cut(file)
                 if file.write(line) != len(line):
                     file.truncate(end)

@@ -1,4 +1,4 @@
-"""A batch: every case of a plan once, whoever is killed meanwhile, here or in other processes.
+"""A batch: every case of a plan once, whoever is killed meanwhile.
 
     plan → check the variants → what the folder does not hold yet → tasks → a line of the manifest
     for each result as it comes in → summaries
@@ -11,14 +11,12 @@ write the folders of their cases, this process writes all else.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import NoReturn
 
-from eigassign.batch.cases import Batch, Progress, summarise, take_up
-from eigassign.batch.lock import folder_lock
+from eigassign.batch.cases import Batch, Progress, alone_in, summarise, take_up
 from eigassign.batch.manifest import InOrder, read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.work import check_cases, outcome_of, run_cases
@@ -37,7 +35,6 @@ def run(
     workers: Workers,
     on_start: Callable[[Progress], None],
     on_outcome: Callable[[CaseOutcome], None],
-    join: bool = False,
     say: Callable[[str], None] = silent,
 ) -> InOrder:
     """Run what is not done yet, and write the summaries; the rows of all cases.
@@ -45,7 +42,7 @@ def run(
     ``on_start`` hears what is done already, ``on_outcome`` of each case that is run. After an
     interrupt the summaries have what there is. Raises CaseError, before anything is written, where
     a variant is no valid case, and StorageError where the folder is of another batch, or another
-    process is at work in it and this one is not to ``join``.
+    one is at work in it.
     """
     folder = batch.folder
     if folder.exists() and not folder.is_dir():
@@ -54,19 +51,15 @@ def run(
         raise StorageError(f"{folder} is the folder of a run: choose another one with --out")
     require_valid(batch, workers, say)
     folder.mkdir(parents=True, exist_ok=True)
-    with folder_lock(folder) as lock:
-        if lock.enter(join):
-            take_up(batch)
-            lock.share()
-        elif read_header(folder) != batch.header:
-            raise StorageError(f"{folder}: a batch of other cases is running there")
-        progress = Progress(batch, lock)
+    with alone_in(folder):
+        take_up(batch)
+        progress = Progress(batch)
         on_start(progress)
         try:
             _run(batch, progress, workers, on_outcome)
         finally:
             progress.sync()
-            rows = summarise(folder, batch.header, alone=lock.summaries)
+            rows = summarise(folder, batch.header)
     return rows
 
 
@@ -106,7 +99,7 @@ def _lost_in_check(variant: Variant) -> NoReturn:
 def _run(
     batch: Batch, progress: Progress, workers: Workers, on_outcome: Callable[[CaseOutcome], None]
 ) -> None:
-    """Run cases until all are done, here or elsewhere."""
+    """Run all cases that are not done."""
     cases, seconds = 0, 0.0
 
     def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
@@ -126,9 +119,4 @@ def _run(
         keep([variant], [outcome_of(variant, "error", message=message)])
 
     work = partial(run_cases, options=batch.options)
-    while progress.done < progress.total:
-        done = progress.done
-        run_all(workers, progress.tasks(size), work, keep, lose)
-        if progress.done == done:
-            time.sleep(0.5)  # other processes have the rest in flight
-            progress.refresh()
+    run_all(workers, progress.tasks(size), work, keep, lose)

@@ -50,7 +50,6 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     metavar="ADDRESS",
     help="Run on the workers of this dask.distributed scheduler (default: this machine).",
 )
-@click.option("--join", is_flag=True, help="Help a batch that is already running in the folder.")
 @click.option(
     "--reports",
     type=click.Choice(["none", "failed", "all"]),
@@ -85,7 +84,6 @@ def batch(
     settings: tuple[str, ...],
     dry_run: bool,
     jobs: int | None,
-    join: bool,
     **how: Any,
 ) -> int:
     """Optimize many cases, and the variants of a sweep, in parallel.
@@ -110,7 +108,7 @@ def batch(
             if dry_run:
                 return _tell(asked, workers, reporter)
             since = _comparison(how)
-            rows = _watched(asked, workers, reporter, join)
+            rows = _watched(asked, workers, reporter)
         return _told(asked.folder, rows, since, reporter)
 
 
@@ -183,7 +181,7 @@ def _told(folder: Path, rows: InOrder, since: EarlierResult | None, reporter: Re
     return 1 if bad or (since is not None and since.moves) else 0
 
 
-def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> InOrder:
+def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> InOrder:
     """Run it with a line of progress for each case; the rows of all."""
     from eigassign.batch import runner
     from eigassign.output import console
@@ -201,7 +199,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> 
         def on_outcome(found: CaseOutcome) -> None:
             advance[0](f"{found.name}: {found.word}")
 
-        return runner.run(batch, workers, on_start, on_outcome, join, reporter.stage)
+        return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
 
 
 def _cases(count: int) -> str:

@@ -346,7 +346,7 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     folder = Path("results")
     left = {path.name for path in folder.iterdir()} if folder.exists() else set()
     summaries = {"summary.csv", "summary.json", "junit.xml", "index.html"}
-    kept = {".lock", "batch.json", "manifest.jsonl", *summaries}
+    kept = {"batch.json", "manifest.jsonl", *summaries}
     assert left == (kept if command == "batch" else set())
 
 

@@ -187,7 +187,7 @@ def faults(scene: Scene, folder: Path, how: Ended) -> Iterator[str]:
     after = ended(scene.command, folder)
     if (after.code, made(folder)) != (scene.code, scene.expected):
         yield f"the next command ends otherwise: {after.code} {after.err}"
-    hidden = {path.name for path in folder.rglob(".*")} - {".lock"}
+    hidden = {path.name for path in folder.rglob(".*")}
     if hidden:
         yield f"left is {hidden}"
 
