@@ -5,7 +5,7 @@ Reading order:
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
     manifest  the index of a folder: which plan it is of, and how each case ended
-    limits    time and memory of a case
+    limits    the time of a case
     work      what a worker does: check a variant, run it
     cases     the life of a case: its record, taking up a folder, giving cases out, summaries
     workers   where tasks run: this process, or processes that are gone when the parent is

@@ -1,4 +1,4 @@
-"""Time and memory that one case may take, enforced in the process that runs it."""
+"""Time that one case may take, enforced in the process that runs it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,10 @@ import ctypes
 import faulthandler
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Iterator
-from types import FrameType
 
-from eigassign.errors import UsageError
-
-_PATIENCE_S = 5.0  # until a process that does not listen is killed
+_PATIENCE_S = 5.0  # until a process that does not listen is ended
 _AGAIN_S = 0.5  # Python ignores what some callbacks raise: then the next one ends the case
 
 
@@ -22,37 +18,21 @@ class OutOfTimeError(BaseException):
     """The case took longer than it may; no Exception, so that nothing on the way catches it."""
 
 
-def require_limits_here(seconds: float | None, megabytes: float | None) -> None:
-    """Raise UsageError for a limit that this system cannot enforce."""
-    if seconds is not None and not hasattr(signal, "setitimer"):
-        raise UsageError("--case-time: this system has no timer that could end a case")
-    if megabytes is not None and not os.path.exists("/proc/self/statm"):
-        raise UsageError("--case-memory: only Linux can limit the memory of a case")
-
-
 @contextlib.contextmanager
-def limited(seconds: float | None, megabytes: float | None) -> Iterator[None]:
-    """Raise OutOfTimeError or MemoryError inside, as soon as more than that is taken.
+def limited(seconds: float | None) -> Iterator[None]:
+    """Raise OutOfTimeError inside as soon as so many seconds are over, in any thread.
 
-    The memory is what is taken beside what the process has already. A process of a pool or a
-    cluster that is deep in compiled code, and does not hear that its time is over, is ended some
-    seconds later.
+    A process of a pool or a cluster that is deep in compiled code, and does not hear that its time
+    is over, is ended some seconds later.
     """
-    with _in_time(seconds), _in_memory(megabytes):
-        yield
-
-
-@contextlib.contextmanager
-def _in_time(seconds: float | None) -> Iterator[None]:
     if seconds is None:
         yield
         return
-    in_main = threading.current_thread() is threading.main_thread()
     with open(os.devnull, "w") as nowhere:
         if is_worker := multiprocessing.parent_process() is not None:
             faulthandler.dump_traceback_later(seconds + _PATIENCE_S, exit=True, file=nowhere)
         try:
-            with (_alarm if in_main else _alarm_of_thread)(seconds):
+            with _alarm(seconds):
                 yield
         finally:
             if is_worker:
@@ -61,19 +41,7 @@ def _in_time(seconds: float | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _alarm(seconds: float) -> Iterator[None]:
-    signal.signal(signal.SIGALRM, _over)
-    signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN_S)
-    try:
-        yield
-    finally:
-        if signal.getsignal(signal.SIGALRM) is _over:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
-
-
-@contextlib.contextmanager
-def _alarm_of_thread(seconds: float) -> Iterator[None]:
-    """Signals reach the main thread alone; the tasks of a cluster's worker run in another one."""
+    """By a thread: signals reach the main one only, and a cluster's tasks run in another."""
     raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
     here = ctypes.c_ulong(threading.get_ident())
     ended, out_of_time = threading.Event(), ctypes.py_object(OutOfTimeError)
@@ -98,25 +66,3 @@ def _alarm_of_thread(seconds: float) -> Iterator[None]:
             stop()
         finally:
             stop()  # the last ring may have come while it stopped
-
-
-def _over(_number: int, _frame: FrameType | None) -> None:
-    raise OutOfTimeError
-
-
-@contextlib.contextmanager
-def _in_memory(megabytes: float | None) -> Iterator[None]:
-    if megabytes is None:
-        yield
-        return
-    import resource
-
-    with open("/proc/self/statm") as file:
-        pages = int(file.read().split()[0])
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    most = pages * resource.getpagesize() + int(1e6 * megabytes)
-    resource.setrlimit(resource.RLIMIT_AS, (most, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)

@@ -42,7 +42,6 @@ class CaseOptions:
     columns: bool = False  # the cases have no folders
     allow_outside: bool = False
     seconds: float | None = None  # that a case may take
-    megabytes: float | None = None
 
     def draws(self, status: str) -> bool:
         """True where a case that ended so has figures and a report."""
@@ -106,13 +105,12 @@ def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
         return outcome_of(variant, status, perf_counter() - start, message=message, **found)
 
     try:
-        with limited(options.seconds, options.megabytes):
+        with limited(options.seconds):
             return _solved(variant, options, ended)
     except OutOfTimeError:
         return ended("error", f"takes longer than the {options.seconds:g} s of --case-time")
     except MemoryError:
-        limit = f" (--case-memory is {options.megabytes:g} MB)" if options.megabytes else ""
-        return ended("error", f"out of memory{limit}")
+        return ended("error", "out of memory")
     except Exception as error:
         failure = failure_of(error)
         return ended("failed" if failure.exit_code == 1 else "error", failure.text)

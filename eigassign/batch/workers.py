@@ -47,14 +47,11 @@ class Workers:
     task_s: float = 0.0
 
 
-def this_machine(jobs: int | None, apart: bool = False) -> Workers:
-    """This process for one job, else a pool of processes; None is one for each core.
-
-    ``apart``: not in this process, since a case could end it.
-    """
+def this_machine(jobs: int | None) -> Workers:
+    """This process for one job, else a pool of processes; None is one for each core."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     slots = jobs or usable or 1
-    return Workers(slots, in_this_process if slots == 1 and not apart else process_pool)
+    return Workers(slots, in_this_process if slots == 1 else process_pool)
 
 
 class _AtOnce(Executor):
@@ -131,7 +128,6 @@ def _end_soon(number: int, frame: FrameType | None) -> None:
     ignores what a callback of a weak reference raises. A pool that ends its workers, because one of
     them was killed, would wait for such a worker for ever.
     """
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # it may be that of a case's time
     signal.alarm(int(_PATIENCE_S))  # ends the process
     raise_terminated(number, frame)
 

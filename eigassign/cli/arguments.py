@@ -78,7 +78,7 @@ def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tu
 
 PATH = click.Path(path_type=Path)
 POSITIVE = Number(0.0, min_open=True)
-LIMIT = Number(0.0, 1e9, min_open=True)  # s or MB; systems count them in 64 bits
+LIMIT = Number(0.0, 1e9, min_open=True)  # s, which systems count in 64 bits
 COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)

@@ -67,12 +67,6 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     metavar="SECONDS",
     help="Stop a case that takes longer (default: never).",
 )
-@click.option(
-    "--case-memory",
-    type=arguments.LIMIT,
-    metavar="MB",
-    help="Stop a case that needs more memory (default: never).",
-)
 @arguments.out("results, or results/<case>_sweep of one swept case")
 @arguments.against
 @arguments.caching
@@ -94,17 +88,15 @@ def batch(
     skipped: repeat the command to continue after an interruption. A failed case does not stop the
     others. Exit code 1 if a case failed, or differs from --against.
     """
-    from eigassign.batch.limits import require_limits_here
     from eigassign.batch.plan import cases_in, plan_of
 
-    require_limits_here(how["case_time"], how["case_memory"])
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
     swept = plan.is_swept and len(cases) == 1
     usual = Path("results", folder_name(f"{cases[0].stem}_sweep") if swept else "")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
-        with _workers(how["scheduler"], jobs, how["case_memory"] is not None) as workers:
+        with _workers(how["scheduler"], jobs) as workers:
             if dry_run:
                 return _tell(asked, workers, reporter)
             since = _comparison(how)
@@ -112,13 +104,11 @@ def batch(
         return _told(asked.folder, rows, since, reporter)
 
 
-def _workers(
-    scheduler: str | None, jobs: int | None, apart: bool
-) -> AbstractContextManager[Workers]:
+def _workers(scheduler: str | None, jobs: int | None) -> AbstractContextManager[Workers]:
     from eigassign.batch.workers import this_machine
 
     if scheduler is None:
-        return nullcontext(this_machine(jobs, apart))  # OpenBLAS without memory ends its process
+        return nullcontext(this_machine(jobs))
     from eigassign.batch.cluster import cluster
 
     if jobs is not None:
@@ -144,7 +134,6 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
         columns=columns,
         allow_outside=how["allow_outside"],
         seconds=how["case_time"],
-        megabytes=how["case_memory"],
     )
     return Batch(plan, folder, options)
 

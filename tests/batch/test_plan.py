@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from memory import within
 
-from eigassign.batch import folder_names, limited, plan_of, variant_problem
+from eigassign.batch import folder_names, plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -137,7 +138,7 @@ def test_ranges_of_many_values_take_neither_time_nor_memory(tmp_path: Path, samp
     sweep = f"sample: {sample}, parameters: {{{MASS}: {{min: 0, max: 1, count: 9999999}}"
     sweep += f", {other}" if sample == "list" else ""
     arm = case(tmp_path, end=f"sweep: {{{sweep}}}}}\n")
-    with limited(None, 100.0):
+    with within(100.0):
         plan = plan_of([arm])
         assert len(plan) == 9_999_999
         assert plan[4_999_999].values[MASS] == 0.5

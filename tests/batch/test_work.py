@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import resource
 import threading
 import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import scipy.sparse.linalg
 
@@ -130,7 +128,7 @@ def test_a_case_in_a_thread_is_ended_too() -> None:
         for limit in (0.01, 60.0):
             start = time.monotonic()
             try:
-                with limited(limit, None):
+                with limited(limit):
                     with suppress(OutOfTimeError):
                         work_until(limit, start + 10.0)
                         ended.append("not ended")
@@ -151,7 +149,7 @@ def test_a_time_that_is_over_at_once_ends_nothing_behind_it() -> None:
     def work() -> None:
         try:
             for _ in range(50):
-                with suppress(OutOfTimeError), limited(1e-6, None):
+                with suppress(OutOfTimeError), limited(1e-6):
                     time.sleep(0.01)
             for _ in range(70):  # longer than until the next ring
                 time.sleep(0.01)
@@ -164,25 +162,16 @@ def test_a_time_that_is_over_at_once_ends_nothing_behind_it() -> None:
     assert not late
 
 
-def test_limits_are_lifted_behind_a_case() -> None:
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    with pytest.raises(MemoryError), limited(None, 100.0):
-        np.ones(100_000_000)
-    assert resource.getrlimit(resource.RLIMIT_AS) == before
-    with pytest.raises(OutOfTimeError), limited(0.01, None):
-        time.sleep(10)
-    with limited(0.05, 1000.0):
+def test_the_limit_is_lifted_behind_a_case() -> None:
+    def wait(steps: int) -> None:
+        for _ in range(steps):
+            time.sleep(0.01)
+
+    with pytest.raises(OutOfTimeError), limited(0.01):
+        wait(1000)
+    with limited(0.05):
         pass
-    time.sleep(0.1)
-
-
-def test_a_case_that_takes_too_much_memory_is_ended(options: CaseOptions, tmp_path: Path) -> None:
-    file = tmp_path / "large.yaml"
-    file.write_text(SMALL.read_text().replace("elements: 2", "elements: 3000"))
-    small, large = plan_of([SMALL])[0], plan_of([file])[0]
-    run_cases([small], options)  # OpenBLAS, which would end this process, has its memory then
-    (found,) = run_cases([large], replace(options, megabytes=5.0))
-    assert (found.status, found.message) == ("error", "out of memory (--case-memory is 5 MB)")
+    wait(10)
 
 
 def test_memory_that_runs_out_inside_a_factorisation_is_no_limp_link(

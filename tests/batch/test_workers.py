@@ -24,7 +24,6 @@ from eigassign.batch import (
     plan_of,
     process_pool,
     run,
-    this_machine,
 )
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -121,8 +120,3 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     done = subprocess.run(parent, stdout=subprocess.PIPE, text=True, timeout=120)
     assert done.returncode == -signal.SIGKILL
     assert done.stdout.strip().isdigit()
-
-
-def test_a_case_that_may_end_its_process_does_not_run_in_ours() -> None:
-    assert this_machine(1).open is not process_pool
-    assert this_machine(1, apart=True).open is process_pool

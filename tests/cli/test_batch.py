@@ -67,14 +67,6 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "2", "1")
 
 
-@pytest.mark.slow
-def test_a_case_with_a_limit_of_memory_runs_in_a_process_of_its_own() -> None:
-    write("a.yaml")
-    asked = ["--jobs", "1", "--case-memory", "4000", "--reports", "none", "--quiet"]
-    assert main(["batch", "a.yaml", "--out", "runs", *asked]) == 0
-    assert Path("runs/a/results.json").exists()
-
-
 def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
     write("a.yaml")
     assert main(["batch", "a.yaml", "--jobs", "1", "--figures", "none"]) == 0

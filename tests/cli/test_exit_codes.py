@@ -329,11 +329,7 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     command: str, number: signal.Signals, code: int
 ) -> None:
     Path("slow.py").write_text(SLOW)
-    how = (
-        LITTLE
-        if command == "optimize"
-        else ("--reports", "none", "--jobs", "1", "--case-memory", "4000")
-    )
+    how = LITTLE if command == "optimize" else ("--reports", "none", "--jobs", "2")
     args = [sys.executable, "slow.py", command, "good.yaml", *how]
     with subprocess.Popen(
         args, env=environment(), stderr=subprocess.PIPE, text=True, preexec_fn=_heed_signals

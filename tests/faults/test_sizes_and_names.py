@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from beam import TEXT
 from fuzz_worker import CASES, Worker
+from memory import within
 
-from eigassign.batch import limited
 from eigassign.cli import main
 
 LENGTH = "mechanism.links.arm.length: {min: 0.4, max: 0.6"
@@ -93,7 +93,7 @@ def test_a_lattice_of_three_thousand_members_is_checked_within_memory(
     monkeypatch.chdir(tmp_path)
     Path("boom.yaml").write_text(lattice(600))
     assert Path("boom.yaml").read_text().count('"from"') == 2995
-    with limited(None, 1000.0):
+    with within(1000.0):
         assert main(["check", "boom.yaml"]) == 0
     assert "memory: about" in capsys.readouterr().out
 
