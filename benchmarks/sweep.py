@@ -2,11 +2,9 @@
 
 The bare loop is ``for case in cases: ea.assign(case)`` over some of the same variants in two
 processes at once, before and after the sweep; what a process takes to start is not counted there.
-The sweep is counted whole: checking the variants, run folders that are synced to disk, manifest,
-summaries. Memory is looked at every second, and compared between the first and the last tenth of
-the cases. Then the same command is run again, with everything done.
-
-    python benchmarks/sweep.py --count 2000 --columns    without folders, in one process too
+The sweep is counted whole: checking the variants, run folders that are synced to disk, summaries.
+Memory is looked at every second, and compared between the first and the last tenth of the cases.
+Then the same command is run again, with everything done.
 """
 
 from __future__ import annotations
@@ -96,10 +94,10 @@ def memory_mb(pid: int) -> dict[int, float]:
     return found
 
 
-def swept(case: Path, out: Path, count: int, jobs: int, columns: bool) -> dict[str, float]:
+def swept(case: Path, out: Path, count: int) -> dict[str, float]:
     """One whole command: wall-clock and processor time, and memory early and late."""
-    command = [sys.executable, "-m", "eigassign", "batch", str(case), "--jobs", str(jobs)]
-    command += ["--out", str(out), "--reports", "none", "--quiet", *["--columns"] * columns]
+    command = [sys.executable, "-m", "eigassign", "batch", str(case), "--jobs", "2"]
+    command += ["--out", str(out), "--reports", "none", "--quiet"]
     before, start = common.children_s(), time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     looks: list[tuple[int, float]] = []
@@ -107,8 +105,7 @@ def swept(case: Path, out: Path, count: int, jobs: int, columns: bool) -> dict[s
 
     def look() -> None:
         while not over.wait(1.0):
-            lines = out / "manifest.jsonl"
-            done = lines.read_bytes().count(b"\n") if lines.exists() else 0
+            done = len([*out.glob("*/run.json")])
             looks.append((done, max(memory_mb(process.pid).values(), default=0.0)))
 
     watcher = threading.Thread(target=look)
@@ -130,7 +127,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=5000)
     parser.add_argument("--loop", type=int, default=400, help="cases of each bare loop")
-    parser.add_argument("--columns", action="store_true", help="the cases have no folders")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -138,11 +134,9 @@ def main() -> None:
         case = write_case(folder, asked.count)
         some = list(range(0, asked.count, max(1, asked.count // (2 * asked.loop))))
         bare = loops(case, some[::2])
-        given = {"count": asked.count, "columns": asked.columns}
-        sweep = swept(case, folder / "sweep", jobs=2, **given)
+        sweep = swept(case, folder / "sweep", asked.count)
         bare += loops(case, some[1::2])
-        again = swept(case, folder / "sweep", jobs=2, **given)
-        alone = swept(case, folder / "alone", jobs=1, **given) if asked.columns else None
+        again = swept(case, folder / "sweep", asked.count)
     wall = sum(each for each, _ in bare) / len(bare)
     processor = sum(each for _, each in bare) / len(bare)
     rows = [
@@ -161,13 +155,8 @@ def main() -> None:
         {"": "sweep, whole", "wall clock": f"{sweep['wall']:.0f} s"},
         {"": "the same command again, all done", "wall clock": f"{again['wall']:.1f} s"},
     ]
-    if alone is not None:
-        cores = len(os.sched_getaffinity(0))
-        row = {"": f"sweep in one process; two on {cores} cores are so many times as fast"}
-        rows.append({**row, "wall clock": f"{alone['wall']:.0f} s"})
-        rows[-1]["ratio"] = alone["wall"] / sweep["wall"]
     common.report(
-        "sweep_columns" if asked.columns else "sweep",
+        "sweep",
         f"A sweep of {asked.count} small assignments in two processes",
         rows,
         [

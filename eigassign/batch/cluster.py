@@ -21,7 +21,6 @@ from eigassign.errors import EigassignError, StorageError, UsageError
 if TYPE_CHECKING:
     from distributed import Client
 
-_TASK_S = 5.0  # a scheduler bears some 1 000 tasks a second: 400 workers finish 80 of these
 _AHEAD = 2  # tasks for each worker, so that it need not wait for the next one
 
 
@@ -46,7 +45,7 @@ def cluster(address: str) -> Iterator[Workers]:
     with client:
         try:
             workers = _require_fit(client, folder)
-            yield Workers(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
+            yield Workers(_AHEAD * workers, partial(_executor, client, folder))
         except Exception as error:  # a task that is cancelled, a stream that is closed
             if isinstance(error, EigassignError) or client.status == "running":
                 raise

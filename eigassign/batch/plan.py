@@ -33,7 +33,6 @@ from eigassign.modal.storage import ALGORITHM
 from eigassign.output.batch.files import NAMES
 from eigassign.output.store.run_record import MARKER
 
-FILES = ("batch.json", "manifest.jsonl", *NAMES)  # of a batch, beside the folders of its cases
 STUDY = "cheap"  # of what an answer means; see pipeline.run.Options
 
 
@@ -58,16 +57,6 @@ class PlannedFile:
     variants: Variants = AS_IT_STANDS
     prefix: str = ""  # of the names of variants
     is_set: bool = False  # the variants are from --set
-
-    @property
-    def said(self) -> object:
-        """The identity of its variants; files that values name count by content."""
-        if not self.variants.keys:
-            return ""
-        texts = dict.fromkeys(_texts(self.variants.columns))
-        folder = Path(self.path).parent
-        named = {text: sha for text in texts if (sha := _digest(folder / text))}
-        return (self.variants.digest, *named.values())
 
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
@@ -123,19 +112,9 @@ class BatchPlan:
         n = bisect_right(self._ends, index) - 1
         return self.files[n], index - self._ends[n]
 
-    def swept(self) -> list[range]:
-        """The indices of the variants of each file that has some."""
-        spans = zip(self.files, self._ends, self._ends[1:], strict=False)
-        return [range(first, end) for file, first, end in spans if file.variants.keys]
-
     @cached_property
     def _ends(self) -> tuple[int, ...]:
         return tuple(accumulate((len(file.variants) for file in self.files), initial=0))
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of the plan: contents, values, names and order, not where the files are."""
-        return _hash([(file.name, file.content, file.said) for file in self.files])
 
     @property
     def is_swept(self) -> bool:
@@ -278,7 +257,7 @@ def folder_names(cases: Sequence[Path]) -> list[str]:
     """
     counts = Counter(case.stem.casefold() for case in cases)
     root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
-    taken = set(FILES)
+    taken = set(NAMES)
     names = []
     for case in cases:
         parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts

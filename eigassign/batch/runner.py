@@ -1,28 +1,26 @@
 """A batch: every case of a plan once, whoever is killed meanwhile.
 
-    plan → check the variants → what the folder does not hold yet → tasks → a line of the manifest
-    for each result as it comes in → summaries
+    plan → what is not done yet → check of variants → a task for each case → summaries of all
 
-`cases` says what a case goes through.
-
-Where tasks run is `workers.Workers`; they are `work.run_cases` of one or several variants. Workers
-write the folders of their cases, this process writes all else.
+Where tasks run is `workers.Workers`; each is `work.run_case`. Workers write the folders of their
+cases, this process writes the summaries.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import NoReturn
 
-from eigassign.batch.cases import Batch, Progress, alone_in, summarise, take_up
-from eigassign.batch.manifest import InOrder, read_header
 from eigassign.batch.plan import Variant, variant_problem
-from eigassign.batch.work import check_cases, outcome_of, run_cases
+from eigassign.batch.records import Batch, Rows, alone_in, done, summarise
+from eigassign.batch.work import check_cases, outcome_of, run_case
 from eigassign.batch.workers import Workers, run_all, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.store.run_folder import settle_killed
 from eigassign.output.store.run_record import MARKER
 from eigassign.pipeline.stages import Stages, silent
 
@@ -33,90 +31,92 @@ _SHOWN = 10  # problems of variants
 def run(
     batch: Batch,
     workers: Workers,
-    on_start: Callable[[Progress], None],
+    on_start: Callable[[int, int], None],
     on_outcome: Callable[[CaseOutcome], None],
     say: Callable[[str], None] = silent,
-) -> InOrder:
+) -> list[CaseOutcome]:
     """Run what is not done yet, and write the summaries; the rows of all cases.
 
-    ``on_start`` hears what is done already, ``on_outcome`` of each case that is run. After an
-    interrupt the summaries have what there is. Raises CaseError, before anything is written, where
-    a variant is no valid case, and StorageError where the folder is of another batch, or another
-    one is at work in it.
+    ``on_start`` hears how many cases there are and are done, ``on_outcome`` of each that is run.
+    After an interrupt the summaries have what there is. Raises CaseError, before anything is
+    written, where a variant is no valid case, and StorageError where another batch is at work in
+    the folder or nothing can be written there.
     """
     folder = batch.folder
     if folder.exists() and not folder.is_dir():
         raise StorageError(f"{folder} is a file: choose a folder with --out")
     if (folder / MARKER).exists():
         raise StorageError(f"{folder} is the folder of a run: choose another one with --out")
-    require_valid(batch, workers, say)
-    folder.mkdir(parents=True, exist_ok=True)
-    with alone_in(folder):
-        take_up(batch)
-        progress = Progress(batch)
-        on_start(progress)
+    with contextlib.ExitStack() as held:
+        if is_there := folder.is_dir():
+            held.enter_context(alone_in(folder))
+            settle_killed(folder)
+        rows = done(batch)
+        todo = require_valid(batch, rows, workers, say)
+        if not is_there:
+            folder.mkdir(parents=True, exist_ok=True)
+            held.enter_context(alone_in(folder))
+        on_start(len(batch.plan), len(rows))
         try:
-            _run(batch, progress, workers, on_outcome)
+            _run(batch, todo, rows, workers, on_outcome)
         finally:
-            progress.sync()
-            rows = summarise(folder, batch.header)
-    return rows
+            told = summarise(batch, rows)
+    return told
 
 
-def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = silent) -> None:
-    """Check every variant of a sweep, once for each folder; raises CaseError."""
-    if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
-        return
+def require_valid(
+    batch: Batch, rows: Rows, workers: Workers, say: Callable[[str], None] = silent
+) -> list[int]:
+    """The cases that are not in ``rows``; raises CaseError where a variant is no valid case."""
     plan, stages = batch.plan, Stages(say)
-    spans = plan.swept()
-    parts = (span[k : k + _CHECKED] for span in spans for k in range(0, len(span), _CHECKED))
-    total, done, wrong, first = sum(map(len, spans)), 0, 0, list[tuple[int, Problem]]()
+    todo = [index for index in range(len(plan)) if index not in rows]
+    variants = [index for index in todo if plan.whose(index)[0].variants.keys]
+    total, checked, wrong, first = len(variants), 0, 0, list[tuple[int, Problem]]()
     if not total:
-        return
+        return todo
 
     def keep(task: Sequence[Variant], found: Sequence[tuple[int, tuple[Problem, ...]]]) -> None:
-        nonlocal done, wrong
-        done, wrong = done + len(task), wrong + len(found)
-        stages.advance(done, total)
+        nonlocal checked, wrong
+        checked, wrong = checked + len(task), wrong + len(found)
+        stages.advance(checked, total)
         first.extend((index, problem) for index, problems in found for problem in problems)
         first[:] = sorted(first, key=itemgetter(0))[:_SHOWN]
 
     check, where = partial(check_cases, options=batch.options), this_machine(1)
     with stages("check", f"checking {total} variant{'s' if total > 1 else ''}"):
-        tasks = ([plan[k] for k in part] for part in parts)
+        parts = (variants[k : k + _CHECKED] for k in range(0, total, _CHECKED))
+        tasks = ([plan[index] for index in part] for part in parts)
         run_all(workers if total > _CHECKED else where, tasks, check, keep, _lost_in_check)
     if wrong:
         problems = [variant_problem(plan, *each) for each in first]
         many = f"{wrong} of {total} variants are not valid: nothing was run"
         raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
+    return todo
 
 
-def _lost_in_check(variant: Variant) -> NoReturn:
+def _lost_in_check(task: Sequence[Variant]) -> NoReturn:
+    which = task[0].name if len(task) == 1 else f"{task[0].name} to {task[-1].name}"
     what = "the process that checked it was killed, perhaps because memory ran out"
-    raise StorageError(f"{variant.path}: {variant.name}: {what}")
+    raise StorageError(f"{task[0].path}: {which}: {what}")
 
 
 def _run(
-    batch: Batch, progress: Progress, workers: Workers, on_outcome: Callable[[CaseOutcome], None]
+    batch: Batch,
+    todo: Sequence[int],
+    rows: Rows,
+    workers: Workers,
+    on_outcome: Callable[[CaseOutcome], None],
 ) -> None:
-    """Run all cases that are not done."""
-    cases, seconds = 0, 0.0
+    """Run the cases ``todo``; how each ended comes into ``rows``."""
 
-    def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
-        nonlocal cases, seconds
-        for outcome in found:
-            progress.keep(outcome)
-            cases, seconds = cases + 1, seconds + outcome.seconds
-            on_outcome(outcome)
-
-    def size() -> int:
-        """Cases of a task: one until a case is done."""
-        return int(max(1.0, workers.task_s * cases / max(seconds, 1e-9)))
+    def keep(_variant: Variant, found: CaseOutcome) -> None:
+        rows[found.index] = found
+        on_outcome(found)
 
     def lose(variant: Variant) -> None:
         why = "memory or time" if batch.options.seconds else "memory"
         message = f"the process that ran it was killed, perhaps because {why} ran out"
-        keep([variant], [outcome_of(variant, "error", message=message)])
+        keep(variant, outcome_of(variant, "error", message=message))
 
-    work = partial(run_cases, options=batch.options)
-    run_all(workers, progress.tasks(size), work, keep, lose)
+    work = partial(run_case, options=batch.options)
+    run_all(workers, (batch.plan[index] for index in todo), work, keep, lose)

@@ -7,19 +7,16 @@ A key is a dotted path into the file: `mechanism.bodies.tool.mass`, `targets.0.f
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
 from eigassign.case.schema.document import validated_sweep
-from eigassign.case.schema.sweep import MOST, Range, Steps, Sweep, text_of
+from eigassign.case.schema.sweep import MOST, Sweep, text_of
 from eigassign.case.table import read_words
 from eigassign.case.values import key_path, objection
 from eigassign.errors import CaseError, MechanismError, Problem
@@ -66,18 +63,6 @@ class Variants:
         else:
             row = [column[index] for column in self.columns]
         return dict(zip(self.keys, row, strict=True))
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of all keys and values in their order."""
-        said = json.dumps([self.keys, self.columns, self.grid], default=_said)
-        digest = hashlib.sha256(said.encode())
-        digest.update(b"" if self.shares is None else self.shares.tobytes())
-        return digest.hexdigest()
-
-
-def _said(span: Range | Steps) -> str:
-    return (span.span if isinstance(span, Steps) else span).said()
 
 
 AS_IT_STANDS = Variants((), (), grid=True)  # one, without values

@@ -1,7 +1,8 @@
-"""What a worker does: check a variant, or run it, into its folder or for its numbers only."""
+"""What a worker does: check a variant, or run it into its folder."""
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,18 +15,15 @@ from eigassign.batch.limits import OutOfTimeError, limited
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
 from eigassign.case.loading import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
-from eigassign.output.batch.outcome import (
-    OUTCOME,
-    CaseOutcome,
-    Status,
-    frequency_ranges,
-    to_line,
-)
+from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges, to_plain
+from eigassign.output.store.run_record import MARKER, read_record
 from eigassign.pipeline.run import Options, solve_case
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.process import failure_of
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.results import RunResults
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # not of one case only
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,6 @@ class CaseOptions:
     figures: tuple[str, ...] = ("png",)
     reports: str = "all"  # of which cases there are figures and a report: all, failed or none
     redraw: bool = False  # cases that were done without theirs run again
-    columns: bool = False  # the cases have no folders
     allow_outside: bool = False
     seconds: float | None = None  # that a case may take
 
@@ -93,12 +90,8 @@ def _parsed(path: str, _time: int, _size: int) -> Unchecked:
 # --- Running
 
 
-def run_cases(variants: Sequence[Variant], options: CaseOptions) -> list[CaseOutcome]:
-    """The outcome of each. Never raises an Exception."""
-    return [_run(variant, options) for variant in variants]
-
-
-def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
+def run_case(variant: Variant, options: CaseOptions) -> CaseOutcome:
+    """The outcome of a case; raises StorageError where the disk is full, else no Exception."""
     start = perf_counter()
 
     def ended(status: Status, message: str, **found: Any) -> CaseOutcome:
@@ -112,6 +105,8 @@ def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
     except MemoryError:
         return ended("error", "out of memory")
     except Exception as error:
+        if isinstance(error, StorageError) and getattr(error.__cause__, "errno", 0) in _FULL:
+            raise  # no case can be written any more
         failure = failure_of(error)
         return ended("failed" if failure.exit_code == 1 else "error", failure.text)
 
@@ -127,7 +122,10 @@ def outcome_of(
 def _solved(
     variant: Variant, options: CaseOptions, ended: Callable[..., CaseOutcome]
 ) -> CaseOutcome:
-    """The outcome of a case, which is the last file of its folder, if it has one."""
+    """The outcome of a case, which stands in run.json of its folder.
+
+    That no design meets the limits is an answer too: a folder without results.
+    """
     case, written = load(variant, options), _written(variant.path)
     if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
         raise UsageError(
@@ -135,24 +133,30 @@ def _solved(
         )
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(None, cache_dir, options.use_cache, report="none", study=STUDY)
-    if options.columns:
-        return ended(**_found(case, _uninterrupted(case, how)))
-    with new_run_folder(case.file, Path(options.out, variant.name), options.force) as folder:
-        results = _uninterrupted(case, how)
-        found = _found(case, results)
-        drawn = options.draws(found["status"])
-        folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
-        outcome = ended(**found, run_folder=variant.name)
-        (folder.hidden / OUTCOME).write_text(f"{to_line(outcome)}\n")
+    place, row = Path(options.out, variant.name), dict[str, Any]()
+    force = options.force or _is_damaged(place)
+    with new_run_folder(case.file, place, force, key=variant.key, outcome=row) as folder:
+        try:
+            results = solve_case(case, how).results
+        except EigassignError as error:
+            if error.exit_code != 1:
+                raise
+            outcome = ended("failed", failure_of(error).text)
+        else:
+            if results.interrupted:  # Ctrl-C ends a batch: the best design so far is no answer
+                raise KeyboardInterrupt
+            found = _found(case, results)
+            drawn = options.draws(found["status"])
+            folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
+            outcome = ended(**found, run_folder=variant.name)
+        row.update(to_plain(outcome))
     return outcome
 
 
-def _uninterrupted(case: BuiltCase, how: Options) -> RunResults:
-    """The answer; Ctrl-C ends a batch, and makes no answer of the best design so far."""
-    results = solve_case(case, how).results
-    if results.interrupted:
-        raise KeyboardInterrupt
-    return results
+def _is_damaged(place: Path) -> bool:
+    """True where a run has lost its record: what is left of it may be moved aside."""
+    left = any(os.path.lexists(place / name) for name in (MARKER, "results.json"))
+    return left and read_record(place) is None
 
 
 def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:

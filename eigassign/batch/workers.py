@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, TypeVar
 
+from eigassign.errors import EigassignError
 from eigassign.process import (
     ONE_THREAD,
     environment,
@@ -37,14 +38,10 @@ _PATIENCE_S = 5.0  # for workers to clean up after an interrupt
 
 @dataclass(frozen=True)
 class Workers:
-    """A place where tasks run: ``open(slots)`` gives an executor of so many at a time.
-
-    Cases are put together to tasks of about ``task_s`` seconds; of 0 each is a task of its own.
-    """
+    """A place where tasks run: ``open(slots)`` gives an executor of so many at a time."""
 
     slots: int
     open: Callable[[int], AbstractContextManager[Executor]]
-    task_s: float = 0.0
 
 
 def this_machine(jobs: int | None) -> Workers:
@@ -155,7 +152,7 @@ def run_tasks(
     """Work on tasks, at most ``slots`` in flight, and keep each result; the tasks that were lost.
 
     These are the ones in flight when a process of the pool died: it is not known which of them was
-    the cause. Tasks are taken one by one, and none is after that.
+    the cause. Tasks are taken one by one, and none is after that. Raises our errors of a task.
     """
     running: dict[Future[R], T] = {}
     slots = slots or workers.slots
@@ -174,6 +171,8 @@ def run_tasks(
                     task, error = running.pop(future), future.exception()
                     if error is None:
                         keep(task, future.result())
+                    elif isinstance(error, EigassignError):
+                        raise error
                     else:
                         lost.append(task)
                         broken = broken or isinstance(error, BrokenExecutor)
@@ -186,22 +185,17 @@ def run_tasks(
 
 def run_all(
     workers: Workers,
-    tasks: Iterator[Sequence[T]],
-    work: Callable[[Sequence[T]], R],
-    keep: Callable[[Sequence[T], R], None],
+    tasks: Iterator[T],
+    work: Callable[[T], R],
+    keep: Callable[[T, R], None],
     lose: Callable[[T], None],
 ) -> None:
-    """Work on all tasks; ``lose`` hears of the parts of which their process dies.
+    """Work on all tasks; ``lose`` hears of those of which their process dies.
 
-    What was in flight when a process died is run again, each task alone, then each half of it: so
-    the part at fault shows, and the others lose nothing.
+    What was in flight when a process died is run again, each task alone: so the one at fault shows,
+    and the others lose nothing.
     """
     while suspects := run_tasks(workers, tasks, work, keep):
-        while suspects:
-            task = suspects.pop(0)
+        for task in suspects:
             if run_tasks(workers, iter([task]), work, keep, slots=1):
-                half = len(task) // 2
-                if half:
-                    suspects[:0] = [task[:half], task[half:]]
-                else:
-                    lose(task[0])
+                lose(task)

@@ -213,7 +213,7 @@ def validate(
 
     rows: list[ValidationRow] = []
     failures: list[dict[str, object]] = []
-    tests: list[tuple[str, str, float, str, str]] = []
+    tests: list[tuple[str, str, float, str, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
         since = against and previous.EarlierResult(against, "validations", tolerance)
@@ -223,13 +223,15 @@ def validate(
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
-                tests.append((case.stem, str(case), 0.0, "error", process.failure_of(error).text))
+                tests.append(
+                    (case.stem, str(case), 0.0, "error", process.failure_of(error).text, "")
+                )
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
             moves = since.add(previous.Known.of_validation(case.stem, answer.rows)) if since else []
             codes.append(0 if answer.passed and not moves else 1)
-            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows, moves)))
+            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows, moves), ""))
         if junit:
             write_junit(junit, tests)
         moved = since.table() if since and rows else None

@@ -10,7 +10,7 @@ In reading order; each imports from those above it only:
     pages         HTML pages from their templates
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
-    batch         what a batch leaves: summaries, junit.xml, columns, index.html
+    batch         what a batch leaves: summaries, junit.xml, index.html
     previous      what an earlier result said, and what has moved since
     schema        JSON Schemas of the files of results
 """
@@ -20,11 +20,10 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "batch.columns": "Columns",
         "batch.files": "write_files",
-        "batch.index": "Index",
-        "batch.outcome": "CaseOutcome frequency_ranges from_line to_line",
-        "batch.summary": "batch_table",
+        "batch.index": "index_page",
+        "batch.outcome": "CaseOutcome frequency_ranges from_plain to_plain",
+        "batch.summary": "batch_table summary_json",
         "console": "markdown print_assignment print_tables print_verdict progress wrapped",
         "figures.front": "chart_figures",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
+from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import folder_name, printable
@@ -37,11 +42,17 @@ class RunFolder:
 
 @contextmanager
 def new_run_folder(
-    file: CaseFile, out: Path | None, force: bool, suffix: str = ""
+    file: CaseFile,
+    out: Path | None,
+    force: bool,
+    suffix: str = "",
+    key: str | None = None,
+    outcome: Mapping[str, Any] = MappingProxyType({}),
 ) -> Iterator[RunFolder]:
     """Yield the folder to fill: ``out``, or results/<stem of the case file><suffix>.
 
-    It has the case already, as case.yaml.
+    It has the case already, as case.yaml. ``key`` (default: of the bytes of the case and of the
+    files it names) and ``outcome``, as it is at the end, stand in run.json.
 
     Raises StorageError on entry already where the folder may not be replaced, UsageError where the
     file has no stem.
@@ -49,10 +60,12 @@ def new_run_folder(
     if out is None and not file.path.stem.strip("."):
         message = f"{file.path} has no name before its ending: say where the run goes, --out DIR"
         raise UsageError(message)
-    named = Path("results", folder_name(file.path.stem + suffix))
-    target = named if out is None else Path(out)
-    case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
-    with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
+    usual = Path("results", folder_name(file.path.stem + suffix))
+    target = usual if out is None else Path(out)
+    if key is None:
+        said = json.dumps([__version__, file.sha256, dict(file.files)])
+        key = hashlib.sha256(said.encode()).hexdigest()
+    with run_folder(target, case_path=file.path, key=key, outcome=outcome, force=force) as hidden:
         (hidden / "case.yaml").write_text(file.resolved(), encoding="utf-8")
         yield RunFolder(target, hidden)
 

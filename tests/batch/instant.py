@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from eigassign.batch import Batch, CaseOptions, Variant, Workers, outcome_of, plan_of
-from eigassign.output import CaseOutcome, run_folder, to_line
+from eigassign.output import CaseOutcome, run_folder, to_plain
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 MASS = "mechanism.bodies.tool_mass.mass"
@@ -35,10 +35,12 @@ def batch_of(
 
 def write_run(folder: Path, outcome: CaseOutcome) -> None:
     """The folder of a case that ended so, as a worker leaves it."""
-    with run_folder(folder, case_path=Path(outcome.path), case_sha256="a" * 64) as hidden:
-        (hidden / "results.json").write_text(f'{{"case": "{outcome.name}"}}\n')
+    row = to_plain(outcome)
+    left = {"case_path": Path(outcome.path), "key": outcome.key, "outcome": row}
+    with run_folder(folder, **left, force=True) as hidden:  # type: ignore[arg-type]
         (hidden / "case.yaml").write_text(f"title: {outcome.name}\n")
-        (hidden / "outcome.json").write_text(to_line(outcome))
+        if outcome.run_folder:
+            (hidden / "results.json").write_text(f'{{"case": "{outcome.name}"}}\n')
 
 
 class Instant(Executor):
@@ -52,7 +54,7 @@ class Instant(Executor):
         if fn.func.__name__ == "check_cases":
             future.set_result(fn(*args))
         else:
-            future.set_result([self.ended(variant) for variant in args[0]])
+            future.set_result(self.ended(args[0]))
         return future
 
     def ended(self, variant: Variant):  # type: ignore[no-untyped-def]
@@ -61,8 +63,9 @@ class Instant(Executor):
         if variant.values.get(MASS) == 0.25:
             return outcome_of(variant, "error", message="not this one")
         if variant.values.get(MASS) == 0.75:
-            return outcome_of(variant, "failed", message="no design meets it")
-        outcome = outcome_of(variant, "ok", run_folder=variant.name)
+            outcome = outcome_of(variant, "failed", message="no design meets it")
+        else:
+            outcome = outcome_of(variant, "ok", run_folder=variant.name)
         write_run(self.out / variant.name, outcome)
         return outcome
 

@@ -44,19 +44,18 @@ def test_a_cluster_with_a_worker_killed_half_way_gives_the_same_summary(started:
 
     with Client(started) as client:
         first = next(iter(client.run(os.getpid).values()))
-    manifest = Path("there/manifest.jsonl")
 
     def kill() -> None:
-        while not manifest.exists() or manifest.read_bytes().count(b"\n") < 5:
+        while len([*Path("there").glob("*/run.json")]) < 5:
             time.sleep(0.005)
         os.kill(first, signal.SIGKILL)
 
-    here = ["batch", "arm.yaml", "--jobs", "1", "--columns", "--out", "here"]
+    here = ["batch", "arm.yaml", "--jobs", "1", "--reports", "none", "--out", "here"]
     assert main(here) == 1  # some frequencies cannot be reached
     killing = threading.Thread(target=kill, daemon=True)
     killing.start()
     address = started.scheduler_address
-    there = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "there"]
+    there = ["batch", "arm.yaml", "--scheduler", address, "--reports", "none", "--out", "there"]
     assert main(there) == 1
     killing.join(timeout=10)
     assert len(summary("here")) == 60
@@ -73,7 +72,7 @@ def test_a_scheduler_that_is_killed_costs_nothing_that_is_done(
     sweep = SWEEP.replace("60", "240")  # more than one task checks
     Path("arm.yaml").write_text(beam.TEXT + sweep)
     with scheduler(tmp_path) as (address, (first, _worker)):
-        command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
+        command = ["batch", "arm.yaml", "--scheduler", address, "--reports", "none", "--out", "out"]
         batch = begun("eigassign", *command, stderr=subprocess.PIPE)
         assert batch.stderr is not None
         heard = [batch.stderr.readline()]
@@ -86,7 +85,7 @@ def test_a_scheduler_that_is_killed_costs_nothing_that_is_done(
     assert err.splitlines()[-1].startswith("eigassign: error: --scheduler: the scheduler was lost")
     assert "Traceback" not in err
     assert not lines or len(summary("out")) >= lines
-    assert main(["batch", "arm.yaml", "--jobs", "1", "--columns", "--out", "out"]) == 1
+    assert main(["batch", "arm.yaml", "--jobs", "1", "--reports", "none", "--out", "out"]) == 1
     assert len(summary("out")) == 240
 
 
@@ -103,7 +102,7 @@ def test_a_scheduler_with_tls_is_reached_by_the_configuration_of_dask(
     subprocess.run(made.split(), check=True, capture_output=True)
     tls = ("--tls-ca-file", "cert.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
     with scheduler(tmp_path, "--protocol", "tls", tls=tls) as (address, _):
-        command = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "out"]
+        command = ["batch", "arm.yaml", "--scheduler", address, "--reports", "none", "--out", "out"]
         assert main(command) == 3
         assert "TLS configuration" in capsys.readouterr().err
         for name, file in (("CA_FILE", "cert"), ("CLIENT__CERT", "cert"), ("CLIENT__KEY", "key")):
@@ -145,7 +144,7 @@ def test_a_case_that_takes_too_long_is_ended_and_its_worker_stays(started: Any) 
 
     with Client(started) as client:
         before = client.run(os.getpid)
-        there = ["batch", "arm.yaml", "--scheduler", started.scheduler_address, "--columns"]
+        there = ["batch", "arm.yaml", "--scheduler", started.scheduler_address, "--reports", "none"]
         assert main([*there, "--case-time", "0.01", "--out", "there"]) == 1
         assert client.run(os.getpid) == before
     said = [row["message"] for row in summary("there")]

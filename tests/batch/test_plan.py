@@ -96,7 +96,6 @@ def test_keys_are_those_of_the_content(tmp_path: Path) -> None:
     first = plan_of([case(tmp_path)], [f"{MASS}=0,100 g"])
     moved = plan_of([case(tmp_path / "other", end="# a comment\n")], [f"{MASS}=0,100 g,200 g"])
     assert keys(moved)[:2] == keys(first)
-    assert moved.digest != first.digest
     edited = plan_of([case(tmp_path, end="assignment: {starts: 2}\n")], [f"{MASS}=0,100 g"])
     assert not set(keys(edited)) & set(keys(first))
     assert len(set(keys(first))) == 2
@@ -142,5 +141,3 @@ def test_ranges_of_many_values_take_neither_time_nor_memory(tmp_path: Path, samp
         plan = plan_of([arm])
         assert len(plan) == 9_999_999
         assert plan[4_999_999].values[MASS] == 0.5
-        assert plan.digest != plan_of([case(tmp_path, "b.yaml", f"sweep: {{{sweep}}}}}\n")]).digest
-    assert plan.swept() == [range(9_999_999)]

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
-from eigassign.batch import Batch, Variant, Workers, run
+from eigassign.batch import Batch, Workers, run
 from eigassign.errors import CaseError, StorageError
 
 
@@ -25,7 +25,7 @@ def ran(batch: Batch, place: Workers | None = None) -> list[str]:
     """Run it; the names of the cases that were not done before."""
     heard: list[str] = []
     place = place or instant(batch.folder, lambda _name: None)
-    run(batch, place, lambda _progress: None, lambda found: heard.append(found.name))
+    run(batch, place, lambda _total, _done: None, lambda found: heard.append(found.name))
     return heard
 
 
@@ -57,7 +57,6 @@ def test_a_sweep_may_be_enlarged(tmp_path: Path) -> None:
     larger = batch_of(tmp_path, "0..1:5")
     assert ran(larger) == ["mass=0.25", "mass=0.75"]
     assert list(summary(larger)) == names(larger, range(5))
-    assert not list(larger.folder.glob("manifest.jsonl.*"))
 
 
 def test_results_of_cases_that_are_gone_from_the_plan_are_kept_for_when_it_has_them(
@@ -107,18 +106,6 @@ def test_an_edited_case_runs_again(tmp_path: Path) -> None:
     assert ran(batch_of(tmp_path, "0,1")) == ["mass=0", "mass=1"]
 
 
-def test_another_batch_is_refused_unless_it_is_forced(tmp_path: Path) -> None:
-    case(tmp_path)
-    ran(batch_of(tmp_path, "0,1"))
-    case(tmp_path, "other.yaml", "assignment: {starts: 2}\n")
-    before = (tmp_path / "out" / "manifest.jsonl").read_bytes()
-    with pytest.raises(StorageError, match="holds another batch"):
-        ran(batch_of(tmp_path, "0,1", file="other.yaml"))
-    assert (tmp_path / "out" / "manifest.jsonl").read_bytes() == before
-    assert len(ran(batch_of(tmp_path, "0,1", force=True, file="other.yaml"))) == 2
-    assert (tmp_path / "out" / "manifest.jsonl.1").read_bytes() == before
-
-
 def test_nothing_runs_where_one_variant_is_no_case(tmp_path: Path) -> None:
     case(tmp_path)
     batch = batch_of(tmp_path, "1,-1,-2")
@@ -138,7 +125,9 @@ class Failing(Instant):
         self.error, self.broken = error, False
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        (variant, *_), future = args[0], Future[object]()
+        if fn.func.__name__ == "check_cases":
+            return super().submit(fn, *args, **kwargs)
+        variant, future = args[0], Future[object]()
         hit = variant.values[MASS] == 0.5
         if hit and not isinstance(self.error, Exception):
             raise self.error
@@ -189,7 +178,7 @@ class Dying(Instant):
         return future
 
 
-@pytest.mark.parametrize("times", [2, 100])
+@pytest.mark.parametrize("times", [1, 100])
 def test_what_dies_while_it_checks_variants_is_tried_again(times: int, tmp_path: Path) -> None:
     case(tmp_path)
     batch = batch_of(tmp_path, "1..2:301")
@@ -200,12 +189,11 @@ def test_what_dies_while_it_checks_variants_is_tried_again(times: int, tmp_path:
         pool.broken = False
         yield pool
 
-    if times == 2:
+    if times == 1:
         assert len(ran(batch, Workers(3, opened))) == 301
         return
-    with pytest.raises(StorageError, match=r"mass=1\.5: the process that checked it was killed"):
+    with pytest.raises(StorageError, match=r"mass=1\.33333.* to mass=1\.66.*was killed"):
         ran(batch, Workers(3, opened))
-    assert pool.left > times - 15  # halves, not each variant alone
 
 
 def test_an_interrupt_leaves_a_summary_of_what_was_finished(tmp_path: Path) -> None:
@@ -214,28 +202,6 @@ def test_an_interrupt_leaves_a_summary_of_what_was_finished(tmp_path: Path) -> N
     with pytest.raises(KeyboardInterrupt):
         ran(batch, replace(failing(batch, KeyboardInterrupt()), slots=1))
     assert summary(batch) == {"mass=0": "ok"}
-
-
-def test_tasks_take_as_many_cases_as_fill_their_seconds(tmp_path: Path) -> None:
-    case(tmp_path)
-    batch = batch_of(tmp_path, "1..2:60")
-    sizes: list[int] = []
-
-    class Tasks(Instant):
-        def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-            if isinstance(args[0][0].values[MASS], (int, float)):
-                sizes.append(len(args[0]))
-            return super().submit(fn, *args, **kwargs)
-
-        def ended(self, variant: Variant):  # type: ignore[no-untyped-def]
-            return replace(super().ended(variant), seconds=0.4)
-
-    @contextmanager
-    def opened(_slots: int) -> Iterator[Executor]:
-        yield Tasks(batch.folder, lambda _name: None)
-
-    ran(batch, Workers(1, opened, task_s=5.0))
-    assert sizes == [1, 12, 12, 12, 12, 11]
 
 
 needs_locks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fcntl and fork")

@@ -66,7 +66,7 @@ def test_samples_fill_their_ranges_and_are_those_of_the_seed(tmp_path: Path, sam
     assert [int(16 * mass) for mass in masses] == list(range(16))  # one in each sixteenth
     assert rows(swept(tmp_path, text)) == rows(found)
     assert rows(swept(tmp_path, f"{text}  seed: 1\n")) != rows(found)
-    assert swept(tmp_path, f"{text}  seed: 1\n").digest != found.digest
+    assert swept(tmp_path, f"{text}  seed: 1\n")[0] != found[0]
 
 
 def test_the_rows_of_a_file_are_variants(tmp_path: Path) -> None:

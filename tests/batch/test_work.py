@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import shutil
 import threading
 import time
 from contextlib import suppress
@@ -13,12 +16,16 @@ import pytest
 import scipy.sparse.linalg
 
 from eigassign.batch import (
+    Batch,
     CaseOptions,
     OutOfTimeError,
     limited,
     plan_of,
-    run_cases,
+    run,
+    run_case,
+    this_machine,
 )
+from eigassign.errors import StorageError
 from eigassign.output import CaseOutcome
 
 SMALL = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
@@ -58,7 +65,7 @@ def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
     }
     settings = [f"{key}={value}" for key, (value, _) in swept.items()]
     plan = plan_of([case], [*settings, "title=x", "expansion.order=2"])
-    (found,) = run_cases([plan[0]], options)
+    found = run_case(plan[0], options)
     bare = {"title": "", "expansion.order": ""}
     assert found.units == {key: unit for key, (_, unit) in swept.items()} | bare | {"m": "kg"}
     results = json.loads((tmp_path / "out" / plan[0].name / "results.json").read_text())
@@ -69,9 +76,9 @@ def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
 
 def test_a_case_gives_the_same_numbers_in_any_order(options: CaseOptions, tmp_path: Path) -> None:
     plan = plan_of([SMALL], [f"{MASS}=0.1,0.3"])
-    first = run_cases([plan[0], plan[1]], options)
+    first = [run_case(plan[k], options) for k in (0, 1)]
     there = replace(options, out=str(tmp_path / "there"))
-    again = run_cases([plan[1], plan[0]], there)[::-1]
+    again = [run_case(plan[k], there) for k in (1, 0)][::-1]
     assert [*map(same, first)] == [*map(same, again)]
     for found in first:
         assert found.run_folder is not None
@@ -83,12 +90,6 @@ def test_a_case_gives_the_same_numbers_in_any_order(options: CaseOptions, tmp_pa
     assert f"variant: {MASS} = 0.3" in (tmp_path / "out" / "mass=0.3" / "log.txt").read_text()
 
 
-def test_columns_need_no_folder(options: CaseOptions, tmp_path: Path) -> None:
-    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, columns=True))
-    assert (found.status, found.run_folder) == ("ok", None)
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_case_that_was_changed_since_the_batch_began_does_not_run(
     options: CaseOptions, tmp_path: Path
 ) -> None:
@@ -96,19 +97,60 @@ def test_a_case_that_was_changed_since_the_batch_began_does_not_run(
     file.write_text(SMALL.read_text())
     variant = plan_of([file])[0]
     file.write_text(SMALL.read_text().replace("180 Hz", "181 Hz"))
-    (found,) = run_cases([variant], options)
+    found = run_case(variant, options)
     assert found.status == "error"
     assert "changed since the batch began" in found.message
 
 
+def test_a_run_that_lost_its_record_is_moved_aside_and_a_folder_of_the_user_s_is_left_alone(
+    options: CaseOptions, tmp_path: Path
+) -> None:
+    variant, out = plan_of([SMALL])[0], tmp_path / "out"
+    for k, damage in enumerate((Path.unlink, lambda path: path.write_bytes(b"{")), 1):
+        assert run_case(variant, options).status == "ok"
+        damage(out / variant.name / "run.json")
+        assert run_case(variant, options).status == "ok"
+        assert (out / f"{variant.name}.{k}" / "results.json").exists()
+    shutil.rmtree(out)
+    (out / variant.name).mkdir(parents=True)
+    (out / variant.name / "thesis.tex").write_text("mine")
+    found = run_case(variant, options)
+    assert (found.status, "it was left alone" in found.message) == ("error", True)
+    assert [path.name for path in out.iterdir()] == [variant.name]
+
+
+def test_a_case_without_an_answer_is_done_too(options: CaseOptions, tmp_path: Path) -> None:
+    file = tmp_path / "arm.yaml"
+    heavy = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
+    file.write_text(SMALL.read_text().replace("max: 1}", heavy))
+    batch = Batch(plan_of([file]), tmp_path / "out", options)
+    place, heard = this_machine(1), list[str]()
+    for names in (["arm"], []):
+        heard.clear()
+        (row,) = run(batch, place, lambda _total, _done: None, lambda row: heard.append(row.name))
+        assert (row.status, heard) == ("failed", names)
+
+
+def test_a_full_disk_ends_the_batch(
+    options: CaseOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_given: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    batch = Batch(plan_of([SMALL]), tmp_path / "out", options)
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StorageError, match="No space left on device"):
+        run(batch, this_machine(1), lambda _total, _done: None, lambda _row: None)
+
+
 def test_a_case_that_takes_too_long_is_ended(options: CaseOptions) -> None:
-    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, seconds=0.01))
+    found = run_case(plan_of([SMALL])[0], replace(options, seconds=0.01))
     assert (found.status, found.message) == ("error", "takes longer than the 0.01 s of --case-time")
     assert found.seconds < 10
 
 
 def test_a_bug_in_one_case_is_an_outcome_and_not_an_end(options: CaseOptions) -> None:
-    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, cache_dir=5, use_cache=True))
+    found = run_case(plan_of([SMALL])[0], replace(options, cache_dir=5, use_cache=True))
     assert found.status == "error"
     assert found.message.startswith("internal error: TypeError")
 
@@ -185,5 +227,5 @@ def test_memory_that_runs_out_inside_a_factorisation_is_no_limp_link(
     file = tmp_path / "large.yaml"
     file.write_text(SMALL.read_text().replace("elements: 2", "elements: 300"))
     monkeypatch.setattr(scipy.sparse.linalg, "splu", without_memory)
-    (found,) = run_cases(plan_of([file]), options)
+    found = run_case(plan_of([file])[0], options)
     assert (found.status, found.message) == ("error", "out of memory")

@@ -43,13 +43,13 @@ class Dying(Executor):
         self.pool = pool
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        (variant,), future = args[0], Future[Any]()
+        variant, future = args[0], Future[Any]()
 
         def answer(done: Future[Any]) -> None:
             if error := done.exception():
                 future.set_exception(error)
             else:
-                future.set_result([outcome_of(variant, "ok")])
+                future.set_result(outcome_of(variant, "ok"))
 
         work = WORK.get(variant.name.partition("_")[0], "None")
         self.pool.submit(eval, work).add_done_callback(answer)
@@ -69,9 +69,9 @@ def test_a_killed_worker_costs_its_own_case_only_and_what_was_at_work_runs_again
     cases = [tmp_path / f"{name}.yaml" for name in ("kill_1", "slow", "kill_2", "b")]
     for case in cases:
         case.write_text(TEXT)
-    batch = Batch(plan_of(cases), tmp_path / "out", CaseOptions("out", columns=True))
-    found = {}
-    run(batch, Workers(2, dying_pool), lambda _progress: None, lambda o: found.update({o.name: o}))
+    batch = Batch(plan_of(cases), tmp_path / "out", CaseOptions("out"))
+    rows = run(batch, Workers(2, dying_pool), lambda _total, _done: None, lambda _row: None)
+    found = {row.name: row for row in rows}
     assert {name: outcome.status for name, outcome in found.items()} == {
         "kill_1": "error",
         "slow": "ok",

@@ -74,7 +74,7 @@ def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
     assert not Path("results/a/figures").exists()
 
 
-def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
+def test_a_dry_run_lists_and_counts_what_would_run(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     write("a.yaml")
@@ -82,17 +82,13 @@ def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
     assert main([*sweep, "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert [line.split()[0] for line in out.splitlines()[3:11]] == list("12345…89")
-    assert "9 cases would run, 0 are done and still current\ntime     about " in out
-    assert "a case, estimated from the first\nmemory   about 150 MB in each of 1 process\n" in out
-    assert "files    198 more, about 6.58 MB, in results/a_sweep\n" in out
+    assert out.endswith("9 cases would run, 0 are done and still current\n")
     assert not Path("results").exists()
     one = ["--set", "targets.0.frequency=180 Hz", "--reports", "none", "--jobs", "1"]
     assert main(["batch", "a.yaml", *one]) == 0
     capsys.readouterr()
     assert main([*sweep, "--dry-run"]) == 0
-    out = capsys.readouterr().out
-    assert "8 cases would run, 1 are done and still current" in out
-    assert "a case, as measured so far" in out
+    assert "8 cases would run, 1 are done and still current" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -342,8 +342,7 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     folder = Path("results")
     left = {path.name for path in folder.iterdir()} if folder.exists() else set()
     summaries = {"summary.csv", "summary.json", "junit.xml", "index.html"}
-    kept = {"batch.json", "manifest.jsonl", *summaries}
-    assert left == (kept if command == "batch" else set())
+    assert left == (summaries if command == "batch" else set())
 
 
 def _heed_signals() -> None:

@@ -1,4 +1,4 @@
-"""Files that runs and batches have left, and what becomes of them: bytes, JSON and HDF5 mutated.
+"""Files that runs and batches have left, and what becomes of them: bytes and JSON mutated.
 
 `Stage` makes the folders once; `Stage.trial` damages one file of a copy of them and says which
 command reads it. A file that is vouched for by a hash has it made anew in half of the trials, as
@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
-import numpy as np
 from beam import TEXT
 from fuzz_mutations import places
 from fuzz_worker import Outcome, Worker
@@ -26,22 +24,17 @@ from fuzz_worker import Outcome, Worker
 RUN = ("--out", "run", "--study", "none", "--figures", "none", "--report", "none", "--no-cache")
 SWEEP = ("batch", "beam.yaml", "--set", "targets.0.frequency=185 Hz,190 Hz,1 Hz", "--jobs", "1")
 SWEEP = (*SWEEP, "--reports", "none", "--out")
-AGAIN, COLUMNS = (*SWEEP, "out"), (*SWEEP, "columns", "--columns")
-DRY = (*AGAIN, "--dry-run")
+AGAIN = (*SWEEP, "out")
+DRY, AGAINST = (*AGAIN, "--dry-run"), (*AGAIN, "--against", "out")
 OPTIMIZE = ("optimize", "beam.yaml", *RUN)
-MADE = (AGAIN, COLUMNS, OPTIMIZE)
+MADE = (AGAIN, OPTIMIZE)
 ONE = "frequency=190Hz"  # a case of the sweep
 READ: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
-    ("out/batch.json", (AGAIN, DRY)),
-    ("out/manifest.jsonl", (AGAIN, DRY)),
-    ("columns/manifest.jsonl", (COLUMNS,)),
     (f"out/{ONE}/run.json", (AGAIN, DRY)),
-    ("run/run.json", (OPTIMIZE,)),
-    (f"out/{ONE}/outcome.json", (AGAIN, DRY)),
     (f"out/{ONE}/results.json", (AGAIN,)),
+    ("out/summary.json", (AGAINST, AGAIN)),
+    ("run/run.json", (OPTIMIZE,)),
     ("run/results.json", (("validate", "beam.yaml", "--against", "run"), OPTIMIZE)),
-    ("columns/summary.json", ((*AGAIN, "--against", "columns"), COLUMNS)),
-    ("columns/columns.h5", (COLUMNS,)),
 )
 
 
@@ -73,31 +66,22 @@ class Trial:
 
     def _is_as_before(self) -> bool:
         try:
-            now = made(self.root, self.damaged.endswith(".h5"))
+            return made(self.root) == self.before
         except (ValueError, RecursionError):
             return False
-        return now == self.before
 
     def __str__(self) -> str:
         return f"{self.damaged}, {self.what}; {' '.join(self.command)}"
 
 
-def made(root: Path, to_the_byte: bool = False) -> dict[str, Any]:
-    """What the batches say, but for times; with those and columns.h5 where no case ran again."""
-    found: dict[str, Any] = {}
-    if to_the_byte:
-        return {
-            name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "summary.csv")
-        }
-    for name in ("out", "columns"):
-        if (root / name / "summary.json").exists():
-            rows = json.loads((root / name / "summary.json").read_text())["cases"]
-            found[name] = [{**row, "seconds": 0} for row in rows]
-    return found
+def made(root: Path) -> dict[str, Any]:
+    """What the batch says, but for times."""
+    rows = json.loads((root / "out" / "summary.json").read_text())["cases"]
+    return {"out": [{**row, "seconds": 0} for row in rows]}
 
 
 class Stage:
-    """Folders of a run, a batch and one in columns; and damages drawn from them."""
+    """Folders of a run and a batch; and damages drawn from them."""
 
     def __init__(self, folder: Path, worker: Worker) -> None:
         self._first, self._scene, self._worker = folder / "first", folder / "scene", worker
@@ -130,12 +114,10 @@ class Stage:
         command = draw.choice(commands)
         if (command, name) not in self._whole:
             self._ran(command, self._copied())
-            self._whole[command, name] = made(self._scene, name.endswith(".h5"))
+            self._whole[command, name] = made(self._scene)
         path, sealed = self._copied() / name, draw.random() < 0.5
         what, vouched = _damaged(path, draw, sealed)
-        # batch.json and summary.json have no hash; a batch finds out of itself what the first says
-        plain = path.name == "summary.json" and command != COLUMNS
-        plain = plain or (path.name == "batch.json" and command not in (AGAIN, DRY))
+        plain = path.name == "summary.json" and command == AGAINST  # it has no hash
         believed = vouched or plain or path.parent.name == "run"
         return Trial(self._scene, name, what, command, believed, self._whole[command, name])
 
@@ -145,8 +127,7 @@ class Stage:
 
 def _damaged(path: Path, draw: random.Random, sealed: bool) -> tuple[str, bool]:
     """Damage a file; what became of it, and whether it has a hash that goes with its content."""
-    kinds = (_replaced, _scribbled, _scribbled)
-    kinds += (_linked,) * 4 if path.suffix == ".h5" else (_reworded,) * 7
+    kinds = (_replaced, _scribbled, _scribbled, *[_reworded] * 7)
     kind = draw.choice(kinds)
     if kind is _reworded:
         return _reworded(path, draw, sealed)
@@ -232,13 +213,8 @@ _HERE = "@here@"
 
 
 def _reworded(path: Path, draw: random.Random, sealed: bool) -> tuple[str, bool]:
-    """JSON that says something else, in up to three places; of lines one of them."""
-    text = path.read_text()
-    lines = text.splitlines() if path.suffix == ".jsonl" else [text]
-    k = draw.randrange(len(lines))
-    tree, done = json.loads(lines[k]), []
-    tree.pop("seal", None)
-    whole = json.dumps(tree)
+    """JSON that says something else, in up to three places."""
+    whole, done = json.dumps(json.loads(path.read_text())), []
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         whole, what = _changed(json.loads(whole), draw)
         done.append(what)
@@ -246,17 +222,8 @@ def _reworded(path: Path, draw: random.Random, sealed: bool) -> tuple[str, bool]
             json.loads(whole)
         except (ValueError, RecursionError):
             break
-    vouched = False
-    if path.suffix == ".jsonl":
-        plan = json.loads((path.parent / "batch.json").read_text())["plan"]
-        digits = hashlib.sha256(f"{plan}{whole}".encode()).hexdigest()[:16]
-        vouched = sealed
-        lines[k] = f'{whole[:-1]}, "seal": "{digits if sealed else 16 * "0"}"}}'
-        path.write_text("".join(f"{line}\n" for line in lines))
-    else:
-        path.write_text(whole)
-        if sealed:
-            vouched = _sealed(path)
+    path.write_text(whole)
+    vouched = sealed and _sealed(path.parent)
     return f"{', '.join(done)}{', with its hash' if vouched else ''}", vouched
 
 
@@ -294,63 +261,16 @@ def _changed(tree: Any, draw: random.Random) -> tuple[str, str]:
     return text.replace(f'"{_HERE}"', token), f"{key} {how} {token:.30}"
 
 
-def _sealed(path: Path) -> bool:
-    """Make run.json say the hash of a file of its run; of itself that which goes with it."""
-    record = path.with_name("run.json")
+def _sealed(folder: Path) -> bool:
+    """Make run.json say the hash that goes with what it says and with the files it lists."""
+    record = folder / "run.json"
     try:
         content = json.loads(record.read_text())
-        if path != record:
-            data = path.read_bytes()
-            digest = hashlib.sha256(data).hexdigest()
-            content["files"][path.name] = {"bytes": len(data), "sha256": digest}
         content.pop("sha256", None)
-        own = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+        digests = [hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in content["files"]]
+        own = hashlib.sha256((json.dumps(content) + "".join(digests)).encode()).hexdigest()
         text = json.dumps({**content, "sha256": own}, indent=2)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError, OSError):
         return False
     record.write_text(text + "\n")
     return True
-
-
-def _linked(path: Path, draw: random.Random) -> str:
-    """What HDF5 may hold beside numbers."""
-    secret = path.with_name("secret")
-    secret.write_bytes(bytes(1000))
-
-    def external(file: h5py.File) -> None:
-        file.create_dataset("new", (3,), np.float64, external=[(str(secret), 0, 24)])
-
-    def virtual(file: h5py.File) -> None:
-        layout = h5py.VirtualLayout((3,), "f8")
-        layout[:] = h5py.VirtualSource("/etc/other.h5", "columns", (3,))
-        file.create_virtual_dataset("new", layout)
-
-    def bomb(file: h5py.File) -> None:
-        chunks = {"chunks": (10**6,), "compression": "gzip", "fillvalue": 1.0}
-        file.create_dataset("new", (10**11,), np.float64, **chunks)[: 2 * 10**6] = 0.0
-
-    def links(file: h5py.File) -> None:
-        file["new"] = h5py.SoftLink("/nowhere")
-        file["other"] = h5py.ExternalLink("/etc/other.h5", "/")
-        file["round"] = h5py.SoftLink("/round")
-        file["group"] = file["/"]
-
-    def deep(file: h5py.File) -> None:
-        file.create_group("/".join("g" * 500))
-
-    def kinds(file: h5py.File) -> None:
-        for name in [name for name in file if isinstance(file[name], h5py.Dataset)]:
-            del file[name]
-            file.create_dataset(name, data=np.array([b"x" * 10**5] * 3))
-
-    def attributes(file: h5py.File) -> None:
-        file.attrs["cases"] = 10**15
-
-    how = draw.choice((external, virtual, bomb, links, deep, kinds, attributes))
-    with h5py.File(path, "r+") as file:
-        column = draw.choice([name for name in file if isinstance(file[name], h5py.Dataset)])
-        how(file)
-        if draw.random() < 0.5 and "new" in file:
-            del file[column]
-            file.move("new", column)
-    return f"{how.__name__} in {column}"

@@ -20,7 +20,7 @@ NAMES = ("case.yaml", "results.json", "figures/modes.png")
 
 def write_a_few_files(case: Path, target: Path, force: bool) -> int:
     """A run that costs nothing but its files."""
-    with run_folder(target, case_path=case, case_sha256="a" * 64, force=force) as folder:
+    with run_folder(target, case_path=case, key="a" * 64, force=force) as folder:
         (folder / "figures").mkdir()
         for name in NAMES:
             (folder / name).write_text(f"{name} of {os.getpid()}")
@@ -81,7 +81,7 @@ class Scene:
 
     def start_in_vain(self) -> None:
         """A start that leaves no run, but sweeps up."""
-        how = {"case_path": self.root / CASE, "case_sha256": "a" * 64, "force": True}
+        how = {"case_path": self.root / CASE, "key": "a" * 64, "force": True}
         with suppress(KeyboardInterrupt), run_folder(self.target, **how):  # type: ignore[arg-type]
             raise KeyboardInterrupt
 

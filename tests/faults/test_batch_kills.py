@@ -1,8 +1,8 @@
 """A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
 
 So does one of which results are damaged between, and one on a cluster of which the scheduler is
-killed. Slow: forty kills, each followed by
-the same command again, half of them after a file of a case was cut, emptied or deleted.
+killed. Slow: sixty kills, each followed by the same command again, some of them after a file of a
+case was cut, emptied or deleted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,8 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux"),
 ]
-CASES, KILLS, DAMAGES, JOBS = 60, 40, 20, 2
+CASES, KILLS, DAMAGES, JOBS = 40, 60, 20, 2
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 SCHEDULERS = 9  # kills of a scheduler, the command and a worker, in turn
 ROOT = Path(eigassign.__file__).parents[1]
 SMALL = ROOT / "benchmarks" / "small_arm.yaml"
@@ -49,8 +51,8 @@ if __name__ == "__main__":
 """
 COMMAND = (
     *("program.py", "batch", "arm.yaml", "--jobs", str(JOBS), "--out", "out"),
-    *("--set", f"mechanism.bodies.tool.mass=0..0.5:{CASES // 3}"),
-    *("--set", "targets.0.frequency=170 Hz..190 Hz:3"),
+    *("--set", f"mechanism.bodies.tool.mass=0..0.5:{CASES // 4}"),
+    *("--set", "targets.0.frequency=170 Hz..190 Hz:4"),
 )
 
 
@@ -59,7 +61,12 @@ def begun(folder: Path, command: tuple[str, ...] = COMMAND) -> subprocess.Popen[
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     environment, nowhere = {**os.environ, "PYTHONPATH": path}, subprocess.DEVNULL
     return subprocess.Popen(
-        [sys.executable, *command], cwd=folder, env=environment, stdout=nowhere, stderr=nowhere
+        [sys.executable, *command],
+        cwd=folder,
+        env=environment,
+        stdout=nowhere,
+        stderr=nowhere,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
@@ -85,6 +92,11 @@ def made(folder: Path) -> dict[str, tuple[object, object]]:
     return found
 
 
+def done_in(out: Path) -> int:
+    """How many cases are done in a folder of results."""
+    return len([*out.glob("*/run.json")])
+
+
 def placed(folder: Path) -> Path:
     folder.mkdir()
     (folder / "arm.yaml").write_text(SMALL.read_text())
@@ -98,7 +110,7 @@ def damaged(out: Path, draw: random.Random) -> bool:
     whole = [each for each in done if not (out / each.name.rpartition(".")[0]).is_dir()]
     if not whole:
         return False
-    name = draw.choice(("results.json", "run.json", "outcome.json", "case.yaml"))
+    name = draw.choice(("results.json", "run.json", "case.yaml"))
     path = draw.choice(whole) / name
     if not path.exists():
         return False
@@ -110,8 +122,8 @@ def damaged(out: Path, draw: random.Random) -> bool:
 def disturbed(folder: Path, draw: random.Random, kills: int, damages: int) -> tuple[int, int]:
     """Run the command until it is done, with at most so many kills on the way; how many they were.
 
-    Every other one hits the parent, and the command is given again, perhaps after a damage; and
-    once the kills are used up, until the damages are.
+    Every other one hits the parent, by each signal in turn, and the command is given again, perhaps
+    after a damage; and once the kills are used up, until the damages are.
     """
     done = harmed = 0
     while True:
@@ -119,30 +131,36 @@ def disturbed(folder: Path, draw: random.Random, kills: int, damages: int) -> tu
             harmed += 1
         process = begun(folder)
         while process.poll() is None and done < kills:
-            if not _goes_on(process, folder / "begun"):
+            if not _goes_on(process, lambda: len(starts(folder))):
                 break
             time.sleep(draw.uniform(0.0, 1.0))
             victims = workers(process.pid) if done % 2 else [process.pid]
             if victims and process.poll() is None:
-                os.kill(draw.choice(victims), signal.SIGKILL)
+                how = signal.SIGKILL if done % 2 else SIGNALS[done // 2 % len(SIGNALS)]
+                os.kill(draw.choice(victims), how)
                 done += 1
-        if process.wait() >= 0 and (done < kills or harmed == damages):
+        if process.wait() in (0, 1) and (done < kills or harmed == damages):
             break
     assert begun(folder).wait() == 1  # what was killed twice was an error, and is tried again
     return done, harmed
 
 
-def _goes_on(process: subprocess.Popen[bytes], begun: Path) -> bool:
-    """Wait until another case is begun; False where the command ends before."""
-    before = begun.stat().st_size if begun.exists() else 0
+def starts(folder: Path) -> list[str]:
+    """The names of all cases that were begun."""
+    return (folder / "begun").read_text().splitlines() if (folder / "begun").exists() else []
+
+
+def _goes_on(process: subprocess.Popen[bytes], count: Callable[[], int]) -> bool:
+    """Wait until the count grows; False where the command ends before."""
+    before = count()
     while process.poll() is None:
-        if begun.exists() and begun.stat().st_size > before:
+        if count() > before:
             return True
         time.sleep(0.01)
     return False
 
 
-def test_sweeps_that_are_killed_forty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
+def test_sweeps_that_are_killed_sixty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
     undisturbed = placed(tmp_path / "undisturbed")
     assert begun(undisturbed).wait() == 1  # some miss their target
     expected, draw, sweeps, twice = made(undisturbed), random.Random(1), 0, 0
@@ -154,10 +172,10 @@ def test_sweeps_that_are_killed_forty_times_end_as_if_they_had_not_been(tmp_path
         done, harmed = disturbed(folder, draw, left, unharmed)
         left, unharmed = left - done, unharmed - harmed
         assert made(folder) == expected
-        starts = Counter((folder / "begun").read_text().splitlines())
-        assert len(starts) == CASES
-        assert starts.total() - CASES <= JOBS * done + harmed
-        twice += starts.total() - CASES
+        every = Counter(starts(folder))
+        assert len(every) == CASES
+        assert every.total() - CASES <= JOBS * done + harmed
+        twice += every.total() - CASES
     assert not unharmed
     said = f"{KILLS} kills and {DAMAGES} damages in {sweeps} sweeps"
     sys.stdout.write(f"{said}, {twice} cases begun again\n")
@@ -172,10 +190,11 @@ def test_sweeps_whose_scheduler_is_killed_end_as_if_it_had_not_been(tmp_path: Pa
     here = [each for each in COMMAND if each not in ("--jobs", str(JOBS))]
     while left:
         folder, sweeps, code = placed(tmp_path / f"killed {sweeps}"), sweeps + 1, 0
+        out = folder / "out"
         while code != 1:  # it is done, and some cases have missed their targets
             with scheduler(tmp_path, workers=JOBS) as (address, there):
                 batch = begun(folder, (*here, "--scheduler", address))
-                if left and _goes_on(batch, folder / "out" / "manifest.jsonl"):
+                if left and _goes_on(batch, lambda out=out: done_in(out)):
                     time.sleep(draw.uniform(0.0, 0.5))
                     if batch.poll() is None:
                         (there[0], there[1], batch)[left % 3].kill()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from eigassign.cli import main
-from eigassign.output import CaseOutcome, to_line, write_files
+from eigassign.output import CaseOutcome, write_files
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
 BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -306,13 +306,13 @@ def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         row = CaseOutcome(
             f"tool={k}", "arm.yaml", status, 0.1, "", run, verdict=verdict, values=values
         )
-        rows.append(to_line(replace(row, index=k)))
+        rows.append(replace(row, index=k))
     (folder / "run" / "figures").mkdir(parents=True)
     shutil.copy(Path(__file__).parents[2] / "cases" / "two_link.png", folder / "run" / "figures")
     (folder / "run" / "figures" / "two_link.png").rename(
         folder / "run" / "figures" / "frequencies.png"
     )
-    write_files(folder, rows, len(rows), ("mechanism.bodies.tool.mass",))
+    write_files(folder, rows, ("mechanism.bodies.tool.mass",))
     return folder / "index.html"
 
 
@@ -368,10 +368,10 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
             units={MASS: "kg", "width": "m"}, verdict=ended[1], index=k,
             values={MASS: mass / 7, WANTED: f"{hz} Hz"},
         )  # fmt: skip
-        rows.append(to_line(row))
+        rows.append(row)
         (folder / f"run {k}").mkdir()
         (folder / f"run {k}" / "report.html").write_text("<title>one</title>")
-    write_files(folder, rows, len(rows), (MASS, WANTED))
+    write_files(folder, rows, (MASS, WANTED))
     return folder / "index.html"
 
 

@@ -244,7 +244,7 @@ def test_what_a_killed_writer_of_a_file_left_is_swept_by_the_next_writer_of_it(t
     names = (".summary.csv.1-deadbeef.tmp", ".b.json.1-deadbeef.tmp", ".summary.csv.tmp")
     for name in names:
         (tmp_path / name).write_bytes(b"half")
-    write_files(tmp_path, [], 0)
+    write_files(tmp_path, [])
     hidden = {path.name for path in tmp_path.iterdir() if path.name.startswith(".")}
     assert hidden == set(names[1:])
     assert (tmp_path / "summary.csv").read_text().startswith("name,")

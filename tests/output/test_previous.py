@@ -17,8 +17,8 @@ from eigassign.output import (
     Known,
     frequency_ranges,
     print_tables,
+    summary_json,
     to_json,
-    to_line,
 )
 from eigassign.study import ValidationRow
 
@@ -30,8 +30,7 @@ UPDATED = b'{"schema": 1, "case": {"name": "arm"}, "parameters": {}, "not_identi
 
 
 def summary(path, *rows):
-    cases = ", ".join(map(to_line, rows))
-    path.write_text(f'{{"cases": [{cases}], "counts": {{}}}}')
+    path.write_text(summary_json(rows))
     return path
 
 
@@ -155,8 +154,8 @@ def test_files_of_earlier_versions_are_read(tmp_path, name):
         ('{"cases": []}', "has no frequencies to compare with"),
         ('{"cases": [{"name": 1}]}', "is not results.json"),
         ('{"case": {"name": ["arm"]}, "targets": [], "assignment": null}', "is not results.json"),
-        (f'{{"cases": [{to_line(ROW).replace("190.0", "null")}]}}', "is not results.json"),
-        (f'{{"cases": [{to_line(ROW).replace("190.0, ", "")}]}}', "is not results.json"),
+        (summary_json([ROW]).replace("190.0", "null"), "is not results.json"),
+        (summary_json([ROW]).replace("190.0, ", ""), "is not results.json"),
     ],
 )
 def test_what_is_no_earlier_result_is_refused(tmp_path, text, said):

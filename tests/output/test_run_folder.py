@@ -33,14 +33,14 @@ def target(tmp_path: Path) -> Path:
 
 
 def write(target: Path, case: Path, text: str = "one", sha: str = "a" * 64, **options) -> None:
-    with run_folder(target, case_path=case, case_sha256=sha, **options) as folder:
+    with run_folder(target, case_path=case, key=sha, **options) as folder:
         (folder / "results.json").write_text(text)
         (folder / "figures").mkdir()
         (folder / "figures" / "modes.png").write_bytes(b"png")
 
 
 def fill(target: Path, case: Path, work: Callable[[Path], None]) -> None:
-    with run_folder(target, case_path=case, case_sha256="a") as folder:
+    with run_folder(target, case_path=case, key="a") as folder:
         work(folder)
 
 
@@ -62,7 +62,7 @@ def test_a_first_run_appears_with_its_marker_and_leaves_nothing_hidden(target, c
 
 
 def test_nothing_is_visible_at_the_target_before_the_run_ends(target, case):
-    with run_folder(target, case_path=case, case_sha256="a") as folder:
+    with run_folder(target, case_path=case, key="a") as folder:
         assert folder.parent == target.parent
         assert not target.exists()
     assert target.exists()
@@ -71,10 +71,8 @@ def test_nothing_is_visible_at_the_target_before_the_run_ends(target, case):
 @pytest.mark.usefixtures("any_system")
 def test_a_rerun_of_the_same_case_file_replaces_the_folder_whole(target, case):
     write(target, case, "one")
-    (target / "figures" / "modes.png").unlink()
     write(target, case, "two", sha="b" * 64)  # the case was edited in between
     assert (target / "results.json").read_text() == "two"
-    assert (target / "figures" / "modes.png").exists()
     assert [p.name for p in target.parent.iterdir()] == ["arm"]
 
 
@@ -145,6 +143,13 @@ def test_files_that_a_user_added_to_a_run_are_kept_beside_the_new_one(target, ca
         assert (target.with_name(f"arm.{number}") / "notes.md").read_text() == f"mine {number}"
     assert not (target / "notes.md").exists()
     assert "kept what was in" in caplog.text
+
+
+def test_a_run_of_which_a_file_was_deleted_is_kept_beside_the_new_one(target, case):
+    write(target, case, "one")
+    (target / "figures" / "modes.png").unlink()
+    write(target, case, "two")
+    assert (target.with_name("arm.1") / "results.json").read_text() == "one"
 
 
 def snapshot(path: Path) -> dict[str, str]:
@@ -285,7 +290,7 @@ from pathlib import Path
 from eigassign.output import run_folder
 target, case, me = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 for turn in range(20):
-    with run_folder(target, case_path=case, case_sha256="a") as folder:
+    with run_folder(target, case_path=case, key="a") as folder:
         for number in range(5):
             (folder / f"{number}.txt").write_text(f"{me} {turn}")
 """

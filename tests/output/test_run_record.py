@@ -21,7 +21,7 @@ def run(tmp_path: Path) -> Path:
     case.parent.mkdir()
     case.write_text("title: arm\n")
     target = tmp_path / "results" / "arm"
-    with run_folder(target, case_path=case, case_sha256="a" * 64) as folder:
+    with run_folder(target, case_path=case, key="a" * 64) as folder:
         (folder / "figures").mkdir()
         for name, text in FILES.items():
             (folder / name).write_text(text)

@@ -14,7 +14,7 @@ from synthetic_results import as_limit, make_results, studied
 
 import eigassign as ea
 from eigassign.cli import main
-from eigassign.output import FILES, CaseOutcome, results_schema, to_json, to_line, write_files
+from eigassign.output import FILES, CaseOutcome, results_schema, to_json, write_files
 from eigassign.study import ErrorRow, RunResults
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -116,7 +116,7 @@ def test_an_update_is_as_its_schema_says(
 def test_a_summary_is_as_its_schema_says(tmp_path: Path) -> None:
     ranges = (("mode 1", 1.0, 2.0, 3.0),)
     row = CaseOutcome("arm", "arm.yaml", "ok", 1.0, design=(("m", 1.0),), frequencies=ranges)
-    write_files(tmp_path, [to_line(row), to_line(replace(row, name="b", seconds=2.0))], 2)
+    write_files(tmp_path, [row, replace(row, name="b", seconds=2.0)])
     assert mistakes((tmp_path / "summary.json").read_text(), "batch") == []
 
 

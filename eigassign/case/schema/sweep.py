@@ -80,10 +80,6 @@ class Range(Part):
         named = unit or other
         return f"{number!r} {named}" if named else number
 
-    def said(self) -> str:
-        """What tells it from other ranges."""
-        return f"{self.min}..{self.max}:{self.count}"
-
 
 @dataclass(frozen=True)
 class Steps(Sequence[object]):

@@ -3,9 +3,8 @@
 In reading order; each imports from those above it only:
 
     outcome  how one case ended: a row of every file below
-    summary  summary.json, and the table on the console
+    summary  summary.csv and summary.json, and the table on the console
     junit    junit.xml for CI servers
-    columns  summary.csv and columns.h5: a column for every number
     index    index.html: plots over what was swept, the rows to sort and filter
-    files    all of these in one pass over the rows
+    files    all of these
 """

@@ -18,9 +18,8 @@ from eigassign.brief import cut
 from eigassign.case.units import QuantityError, handy, handy_unit, number_and_unit
 from eigassign.case.values import short_keys
 from eigassign.facts import capital, fact
-from eigassign.output.batch.columns import quantity
-from eigassign.output.batch.outcome import NUMBERS, CaseOutcome, from_line
-from eigassign.output.batch.summary import bare_names
+from eigassign.output.batch.outcome import NUMBERS, CaseOutcome
+from eigassign.output.batch.summary import bare_names, quantity
 from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.reports.verdict import TONES
 
@@ -31,54 +30,40 @@ _LIKE = {"ok": "reached", "tolerance": "improved"}  # how cases without a verdic
 Column = tuple[tuple[str, str, str], Sequence[float | str | None]]
 
 
-class Index:
-    """The rows that the page shows; those that are not ok are the first to find a place.
+def index_page(
+    rows: Sequence[CaseOutcome], folder: Path, keys: Sequence[str] = (), most: int = 10_000
+) -> bytes:
+    """The page of the batch in ``folder``; ``keys`` are those of its sweep.
 
-    At most ``most``: a browser takes a second to sort so many.
+    It shows ``most`` rows at most, those that are not ok first of all: a browser takes a second to
+    sort so many.
     """
-
-    def __init__(self, most: int = 10_000) -> None:
-        self._most = most
-        self._good: list[str] = []
-        self._bad: list[str] = []
-        self._counts = Counter[tuple[str, str]]()
-
-    def add(self, row: CaseOutcome, line: str) -> None:
-        """Keep the line of a row while there is a place for it."""
-        self._counts[row.word, TONES.get(row.verdict or _LIKE.get(row.status, ""), "bad")] += 1
-        lines = self._good if row.status == "ok" else self._bad
-        if len(lines) < self._most:
-            lines.append(line)
-
-    def page(self, folder: Path, title: str, keys: Sequence[str] = ()) -> bytes:
-        """The page of the batch in ``folder``; ``keys`` are those of its sweep."""
-        lines = [*self._bad, *self._good][: self._most]
-        rows = sorted(map(from_line, lines), key=lambda row: row.index)
-        swept, stems = [*_swept(rows, keys)], {Path(row.path).stem for row in rows}
-        apart = len({*zip(*(cells for _, cells in swept), strict=True)}) == len(rows)
-        names = [str(row.index + 1) for row in rows] if apart else bare_names(rows)
-        columns = [(("case", "", "name"), names), *swept, *_columns(rows)]
-        shown = [
-            (head, cells) for head, cells in columns if any(c not in ("", None) for c in cells)
-        ]
-        data = {
-            "columns": [head for head, _ in shown],
-            "rows": [*zip(*(cells for _, cells in shown), strict=True)],
-            "links": [_links(row, folder) for row in rows],
-        }
-        return page_of(
-            "batch.html.j2",
-            title=f"Sweep of {', '.join(stems)}" if keys and len(stems) == 1 else title,
-            noun="variant" if keys else "case",
-            total=self._counts.total(),
-            met=sum(n for (_, tone), n in self._counts.items() if tone == "good"),
-            shown=len(rows),
-            counts=sorted((tone != "good", w, tone, n) for (w, tone), n in self._counts.items()),
-            files=[n for n in ("summary.json", "columns.h5") if (folder / n).exists()],
-            version=__version__,
-            data=inside(data),
-            script=(TEMPLATES / "batch.js").read_text("utf-8"),
-        )
+    tones = [TONES.get(row.verdict or _LIKE.get(row.status, ""), "bad") for row in rows]
+    counts = Counter((row.word, tone) for row, tone in zip(rows, tones, strict=True))
+    total, met = len(rows), tones.count("good")
+    rows = sorted(sorted(rows, key=lambda row: row.status == "ok")[:most], key=lambda r: r.index)
+    swept, stems = [*_swept(rows, keys)], {Path(row.path).stem for row in rows}
+    apart = len({*zip(*(cells for _, cells in swept), strict=True)}) == len(rows)
+    names = [str(row.index + 1) for row in rows] if apart else bare_names(rows)
+    columns = [(("case", "", "name"), names), *swept, *_columns(rows)]
+    shown = [(head, cells) for head, cells in columns if any(c not in ("", None) for c in cells)]
+    data = {
+        "columns": [head for head, _ in shown],
+        "rows": [*zip(*(cells for _, cells in shown), strict=True)],
+        "links": [_links(row, folder) for row in rows],
+    }
+    return page_of(
+        "batch.html.j2",
+        title=f"Sweep of {', '.join(stems)}" if keys and len(stems) == 1 else folder.resolve().name,
+        noun="variant" if keys else "case",
+        total=total,
+        met=met,
+        shown=len(rows),
+        counts=sorted((tone != "good", word, tone, n) for (word, tone), n in counts.items()),
+        version=__version__,
+        data=inside(data),
+        script=(TEMPLATES / "batch.js").read_text("utf-8"),
+    )
 
 
 def _swept(rows: Sequence[CaseOutcome], keys: Sequence[str]) -> Iterator[Column]:

@@ -1,73 +1,52 @@
-"""junit.xml as CI servers read it, written row by row."""
+"""junit.xml as CI servers read it."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TextIO
 
 from eigassign.errors import StorageError
-from eigassign.output.store.atomic import replacing
+from eigassign.output.store.atomic import replace_synced
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-_PLAIN = re.compile(r"[\w .,:;/%=+()\[\]-]*", re.ASCII)
 _MARKUP = re.compile('[&<>"\t\n\r]')
-_HEADER = 320  # characters: its text, and twice four counts of up to 20 digits
 SUITE = "eigassign"
-_NONE: dict[str, float] = {"tests": 0, "failures": 0, "errors": 0, "time": 0.0}
+# Name, path of the case file, seconds; ok, error or the kind of failure; message, and output
+Test = tuple[str, str, float, str, str, str]
 
 
-class Junit:
-    """Test cases of one suite, a line each; missed tolerances and unsolvable cases are failures.
-
-    How many there are stands in the first line, and is written there at the `end`.
-    """
-
-    def __init__(self, file: TextIO) -> None:
-        self._file, self.totals = file, _NONE.copy()
-        file.write(" " * _HEADER + "\n")
-
-    def add(
-        self, name: str, path: str, seconds: float, status: str, message: str, output: str = ""
-    ) -> None:
-        """One case: ``status`` is ok, error, or the kind of failure."""
+def junit_xml(tests: Iterable[Test]) -> bytes:
+    """One suite, a line for each test; missed tolerances and unsolvable cases are failures."""
+    lines, totals = list[str](), Counter({"tests": 0, "failures": 0, "errors": 0})
+    time_s = 0.0
+    for name, path, seconds, status, message, output in tests:
         line = f'<testcase name="{_escaped(name)}" classname="{SUITE}" '
         line += f'file="{_escaped(path)}" time="{seconds:.3f}">'
-        self.totals["tests"] += 1
-        self.totals["time"] += seconds
+        totals["tests"] += 1
+        time_s += seconds
         if status != "ok":
             tag = "error" if status == "error" else "failure"
-            self.totals[f"{tag}s"] += 1
+            totals[f"{tag}s"] += 1
             first = _escaped((message.splitlines() or [status])[0])
             line += (
                 f'<{tag} type="{_escaped(status)}" message="{first}">{_escaped(message)}</{tag}>'
             )
         if output:
             line += f"<system-out>{_escaped(output)}</system-out>"
-        self._file.write(f"{line}</testcase>\n")
-
-    def end(self) -> None:
-        """Close the suite, and write the counts at the beginning."""
-        self._file.write("</testsuite></testsuites>\n")
-        told = {k: f"{v:.3f}" if k == "time" else v for k, v in self.totals.items()}
-        counts = f'name="{SUITE}" ' + " ".join(f'{k}="{v}"' for k, v in told.items())
-        header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
-        self._file.seek(0)
-        self._file.write((header + 'skipped="0"').ljust(_HEADER - 1) + ">")
+        lines.append(f"{line}</testcase>\n")
+    counts = f'name="{SUITE}" ' + " ".join(f'{k}="{v}"' for k, v in totals.items())
+    counts += f' time="{time_s:.3f}"'
+    header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
+    end = "</testsuite></testsuites>\n"
+    return "".join([header, 'skipped="0">\n', *lines, end]).encode()
 
 
-def write_junit(path: Path, tests: Iterable[tuple[str, str, float, str, str]]) -> None:
-    """A file of all ``tests``: name, path, seconds, status and message of each.
-
-    Raises StorageError where it cannot be written.
-    """
+def write_junit(path: Path, tests: Iterable[Test]) -> None:
+    """A file of all ``tests``; raises StorageError where it cannot be written."""
     try:
-        with replacing(path) as made, open(made, "w", encoding="utf-8") as file:
-            suite = Junit(file)
-            for test in tests:
-                suite.add(*test)
-            suite.end()
+        replace_synced(path, junit_xml(tests))
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from error
 
@@ -77,7 +56,5 @@ def _escaped(text: str) -> str:
 
     Characters that XML cannot hold are shown as ``\\x1b``.
     """
-    if _PLAIN.fullmatch(text):
-        return text
     shown = _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
     return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", shown)

@@ -1,22 +1,18 @@
-"""How one case of a batch ended: a row of plain values, as text one line of JSON."""
+"""How one case of a batch ended: a row of plain values."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from eigassign.errors import StorageError
 from eigassign.facts import Fact, Seconds, Share
-from eigassign.files import json_value, name_of
+from eigassign.files import name_of
 from eigassign.output.reports.verdict import WORDS
 from eigassign.study.results import RunResults
 
-OUTCOME = "outcome.json"  # in the folder of a case
 Status = Literal["ok", "tolerance", "failed", "error"]
 Range = tuple[str, float, float, float]  # of what, lowest, mean, highest
 
@@ -74,30 +70,20 @@ _ORDER = (
 )  # fmt: skip
 
 
-def to_line(outcome: CaseOutcome) -> str:
-    """One line of JSON, ``index`` first; a number that is not finite is null."""
+def to_plain(outcome: CaseOutcome) -> dict[str, Any]:
+    """The outcome as JSON has it, ``index`` first; a number that is not finite is None."""
     plain = {name: getattr(outcome, name) for name in _ORDER}
-    for name, value in plain.items():
-        if isinstance(value, float) and not math.isfinite(value):
-            plain[name] = None
-    return json.dumps(plain, allow_nan=False)
-
-
-def from_line(line: str | bytes, folder: str | Path = "") -> CaseOutcome:
-    """The outcome that `to_line` wrote, with lists for tuples.
-
-    Raises StorageError, which names the manifest in ``folder``, for anything else.
-    """
-    try:
-        return from_plain(json_value(line))
-    except (ValueError, TypeError, OSError):
-        begin = line[:40].decode(errors="replace") if isinstance(line, bytes) else line[:40]
-        message = f"has a damaged line, {begin}…: delete it and run the batch again"
-        raise StorageError(f"{Path(folder, 'manifest.jsonl')} {message}") from None
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in plain.items()
+    }
 
 
 def from_plain(row: Any) -> CaseOutcome:
-    """The outcome that is written as these plain values; raises ValueError or TypeError else."""
+    """The outcome that `to_plain` wrote, with lists for tuples.
+
+    Raises ValueError or TypeError for anything else.
+    """
     found = CaseOutcome(**row)
     if {type(found.values), type(found.units)} != {dict}:
         raise ValueError("no outcome of a case")
@@ -116,11 +102,6 @@ def from_plain(row: Any) -> CaseOutcome:
     if not right or {*map(type, texts)} != {str} or not {*map(type, numbers)} <= {int, float}:
         raise ValueError("no outcome of a case")
     return found
-
-
-def status_of(line: str) -> str:
-    """The status in a line; quotes in what stands before it are escaped, so it is the first."""
-    return line.partition('"status": "')[2].partition('"')[0]
 
 
 def frequency_ranges(results: RunResults) -> tuple[Range, ...]:

@@ -1,19 +1,28 @@
-"""summary.json, and the same on the console."""
+"""The rows of a batch for programs, summary.json; for spreadsheets, summary.csv; on the console."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+from eigassign._version import __version__
+from eigassign.case.units import QuantityError, read_quantity
 from eigassign.facts import Fact
-from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.files import printable
+from eigassign.output.batch.outcome import NUMBERS, CaseOutcome, to_plain
 from eigassign.output.tables import Table, facts_table
 
 FORMAT = 1  # of summary.json
 _HASH = re.compile("~[0-9a-f]{10}$")  # of the name of a variant
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
+_AHEAD, _LAST = ("status", "verdict", "seconds", *NUMBERS), ("message", "path", "run_folder")
+Cell = float | str | None
 
 
 @dataclass(frozen=True)
@@ -24,6 +33,78 @@ class SummaryDocument:
     version: Annotated[str, Fact("of eigassign")]
     cases: Sequence[CaseOutcome]
     counts: Annotated[Mapping[str, int], Fact("by status")]
+
+
+def summary_json(rows: Sequence[CaseOutcome]) -> str:
+    """summary.json, a line for each case."""
+    lines = ",\n  ".join(json.dumps(to_plain(row), allow_nan=False) for row in rows)
+    counts = json.dumps(dict(sorted(Counter(row.status for row in rows).items())))
+    head = f'"format": {FORMAT}, "version": {json.dumps(__version__)}'
+    return f'{{{head}, "cases": [\n  {lines}\n], "counts": {counts}}}\n'
+
+
+def summary_csv(rows: Sequence[CaseOutcome]) -> str:
+    """summary.csv: a column for every number, in the SI unit that its header names.
+
+    A key that has words beside numbers has a column of each.
+    """
+    units = {name: unit for row in rows for name, unit in row.units.items()}
+    values, designs, ranges = ([*map(cells, rows)] for cells in (_values, _design, _ranges))
+    parts: list[tuple[str, Sequence[Mapping[str, Cell]]]] = [("", values)]
+    parts += [("design/", designs), ("frequencies/", ranges)]
+    columns: dict[str, list[Cell]] = {"name": [row.name for row in rows]}
+    for prefix, every in parts:
+        names = dict.fromkeys(name for row in every for name in row)
+        for name in names:
+            bare, unit = name.removesuffix(" (text)"), units.get(name) if prefix[:1] != "f" else ""
+            head = prefix + (name if bare in names else bare)
+            columns[f"{head} [{unit}]" if unit else head] = [row.get(name) for row in every]
+        if not prefix:
+            columns |= {name: [getattr(row, name) for row in rows] for name in _AHEAD}
+    columns |= {name: [getattr(row, name) for row in rows] for name in _LAST}
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(map(cell, columns))
+    told = ([cell(c) if isinstance(c, str) else c for c in column] for column in columns.values())
+    writer.writerows(zip(*told, strict=True))
+    return file.getvalue()
+
+
+def _values(row: CaseOutcome) -> dict[str, Cell]:
+    """What a sweep set: a number in SI units, else text."""
+    found: dict[str, Cell] = {}
+    for key, value in row.values.items():
+        number = quantity(value) if isinstance(value, (int, float, str)) else None
+        if number is not None:
+            found[key] = number
+        else:
+            found[f"{key} (text)"] = value if isinstance(value, str) else json.dumps(value)
+    return found
+
+
+def _design(row: CaseOutcome) -> dict[str, Cell]:
+    return dict(row.design)
+
+
+def _ranges(row: CaseOutcome) -> dict[str, Cell]:
+    statistics = ("lowest_hz", "mean_hz", "highest_hz")
+    pairs = ((name, zip(statistics, hz, strict=True)) for name, *hz in row.frequencies)
+    return {f"{name}/{what}": hz for name, numbers in pairs for what, hz in numbers}
+
+
+def quantity(value: float | str) -> float | None:
+    """``value`` in SI units; None where it is no number."""
+    try:
+        return read_quantity(value, None)
+    except QuantityError:
+        return None
+
+
+def cell(text: str) -> str:
+    """The text as a cell that stays on its line, and that no spreadsheet takes for a formula."""
+    if not text.isprintable():
+        text = printable(" ".join(text.split("\n")))
+    return "'" + text if text.startswith(_FORMULA) else text
 
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
@@ -40,7 +121,7 @@ def bare_names(outcomes: Sequence[CaseOutcome]) -> list[str]:
     return [name if many[name] == 1 else row.name for row, name in pairs]
 
 
-def said(counts: Counter[str]) -> str:
+def said(rows: Sequence[CaseOutcome]) -> str:
     """``58 ok, 2 error``."""
-    order = ("ok", "tolerance", "failed", "error")
+    counts, order = Counter[str](r.status for r in rows), ("ok", "tolerance", "failed", "error")
     return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])

@@ -4,9 +4,9 @@ A run is written into a hidden folder beside its target, synced, and exchanged w
 a single step. What may give way to it:
 
 - nothing there, or an empty folder;
-- a finished run of the same case file, of which no file was edited or added: it is deleted;
-- a finished run of the same case file that somebody edited or added files to: it is kept beside
-  the new one as ``<name>.1``;
+- a finished run of the same case file, which is as it was written: it is deleted;
+- a finished run of the same case file of which somebody edited, added or deleted a file: it is kept
+  beside the new one as ``<name>.1``;
 - anything else only with ``force``, and then it is kept as ``<name>.1`` too: nothing that a run
   did not write is ever deleted.
 
@@ -28,6 +28,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from eigassign.errors import StorageError
 from eigassign.output.store.atomic import (
@@ -42,7 +43,7 @@ from eigassign.output.store.atomic import (
 )
 from eigassign.output.store.run_record import (
     RunOf,
-    changes,
+    is_untouched,
     read_record,
     relative_path,
     write_record,
@@ -56,33 +57,40 @@ def run_folder(
     target: Path,
     *,
     case_path: Path,
-    case_sha256: str,
-    case_files: Mapping[str, str] = MappingProxyType({}),
+    key: str,
+    outcome: Mapping[str, Any] = MappingProxyType({}),
     force: bool = False,
 ) -> Iterator[Path]:
     """Yield an empty hidden folder to fill; on a clean exit it becomes ``target``.
 
+    ``key`` and ``outcome``, as it is at the exit, stand in run.json; see `run_record`.
     Any exception, interrupt or full disk inside leaves ``target`` as it was. Of two writers of
     one target the last one wins whole. Raises StorageError where ``target`` may not be replaced
     (checked on entry already) or cannot be written.
     """
     target = Path(os.path.realpath(target))
-    run = RunOf(relative_path(case_path, target), case_sha256, dict(case_files))
+    run = RunOf(relative_path(case_path, target), key)
     with _storage_errors(target):
-        for hidden, dead in abandoned(target.parent):  # what killed runs left
-            if hidden.is_dir() or hidden.suffix != ".tmp":
-                _settle(hidden, dead)
+        settle_killed(target.parent)
         require_replaceable(target, run, force=force, case_path=case_path)
         made = [path for path in (target.parent, *target.parent.parents) if not path.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
             with temporary(target, Path.mkdir) as folder:
                 yield folder
+                write_record(folder, run, token_of(folder), outcome)
                 _publish(folder, target, run, force=force)
         finally:
             for parent in made:  # of a run that failed they are empty
                 with contextlib.suppress(OSError):
                     parent.rmdir()
+
+
+def settle_killed(folder: Path) -> None:
+    """Delete, keep aside or put back what killed runs left in ``folder``."""
+    for hidden, target in abandoned(folder):
+        if hidden.is_dir() or hidden.suffix != ".tmp":
+            _settle(hidden, target)
 
 
 @contextlib.contextmanager
@@ -130,8 +138,7 @@ def _objection(target: Path, run: RunOf) -> str | None:
 
 
 def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
-    """Mark ``folder`` finished and exchange it with ``target``."""
-    write_record(folder, run, token_of(folder))
+    """Exchange the finished ``folder`` with ``target``."""
     sync_tree(folder)
     if (reason := _objection(target, run)) and not force:
         raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
@@ -185,9 +192,7 @@ def _is_replaced(old: Path, target: Path) -> bool:
     record, new = read_record(old), read_record(target)
     if record is None:
         return not any(old.iterdir())
-    found = changes(old, record)
-    of_same_case = new is not None and new.run.is_same_case(record.run)
-    return of_same_case and not found.changed and not found.added
+    return new is not None and new.run.is_same_case(record.run) and is_untouched(old)
 
 
 def _free_sibling(target: Path) -> Path:

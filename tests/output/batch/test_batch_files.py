@@ -1,4 +1,4 @@
-"""All files of a batch are made in one pass, of the rows' lines."""
+"""All files of a batch are made of its rows."""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
-import numpy as np
 import pytest
 
 from eigassign.output import (
     CaseOutcome,
-    Columns,
-    Index,
     batch_table,
-    to_line,
+    from_plain,
+    index_page,
+    to_plain,
     write_files,
 )
 
 KEYS = ("body.mass", "kind")
-NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.h5")
+NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html")
 
 
 def row(k: int) -> CaseOutcome:
@@ -50,8 +48,8 @@ def summary(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def lines(n: int) -> list[str]:
-    return [to_line(row(k)) for k in range(n)]
+def rows_of(n: int) -> list[CaseOutcome]:
+    return [row(k) for k in range(n)]
 
 
 def page_data(folder: Path) -> dict[str, list]:
@@ -64,67 +62,23 @@ def test_every_file_is_there_and_the_same_rows_give_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         folder = tmp_path / name / "batch"
         folder.mkdir(parents=True)
-        write_files(folder, lines(4), 4, KEYS, columns=True)
+        write_files(folder, rows_of(4), KEYS)
         made.append({file: (folder / file).read_bytes() for file in NAMES})
         assert {path.name for path in folder.iterdir()} == set(NAMES)
     assert made[0] == made[1]
-
-
-def test_columns_hold_every_number_in_si_and_nan_where_there_is_none(tmp_path):
-    made = Columns(tmp_path / "columns.h5", 8, rows=3)  # several pieces
-    for k in range(8):
-        made.add(row(k))
-    made.end()
-    with h5py.File(tmp_path / "columns.h5") as found:
-        mass, lowest = found["values/body.mass"][:], found["frequencies/mode 1|2/lowest_hz"][:]
-        assert found["message"].asstr()[2] == "no such link"
-        assert list(found["values/kind (text)"].asstr()[1:4]) == ["steel", "", "steel"]
-        assert found["design/m1"][7] == 7 / 3
-        assert found["design/m1"].attrs["unit"] == found["values/body.mass"].attrs["unit"] == "kg"
-    there = np.arange(8) != 2
-    np.testing.assert_array_equal(mass[there], [0.0, 0.001, 0.003, 0.004, 0.005, 0.006, 0.007])
-    np.testing.assert_array_equal(lowest[there], 180.0 + np.arange(8)[there])
-    assert np.isnan(mass[2])
-    assert np.isnan(lowest[2])
-
-
-def test_the_summary_is_the_columns_of_the_file_with_their_units(tmp_path):
-    write_files(tmp_path, lines(5), 5, KEYS, columns=True)
-    rows = summary(tmp_path)
-    with h5py.File(tmp_path / "columns.h5") as found:
-        for name, heading in (
-            ("seconds", "seconds"),
-            ("design/m1", "design/m1 [kg]"),
-            ("values/body.mass", "body.mass [kg]"),
-        ):
-            read = [float(each[heading] or "nan") for each in rows]
-            np.testing.assert_array_equal(read, found[name][:])
-    assert [each["status"] for each in rows] == ["ok", "ok", "error", "ok", "ok"]
-
-
-def test_columns_write_out_what_hdf5_cannot_hold(tmp_path):
-    names = ("", ".", "..", "a\0b", "\ud800", "\udce9", "x" * 10**5, "a/../b", "/")
-    rows = [replace(row(0), message=f"a\0{n}", design=((n, 1.0),), values={n: n}) for n in names]
-    write_files(tmp_path, map(to_line, rows), len(names), names, columns=True)
-    with h5py.File(tmp_path / "columns.h5") as found:
-        assert found["message"].asstr()[4:6].tolist() == [r"a\x00\ud800", r"a\x00\udce9"]
-        assert all(np.nansum(column[:]) == 1.0 for column in found["design"].values())
-        assert len(found["design"]) == len(found["values"]) == len(names)
-    assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + len(names)
 
 
 def test_links_of_the_page_are_those_of_folders_whose_names_are_no_text(tmp_path):
     name = os.fsdecode(b"caf\xe9")
     (tmp_path / name).mkdir()
     (tmp_path / name / "results.json").touch()
-    made = to_line(CaseOutcome("c", "arm.yaml", "ok", 0.5, run_folder=name))
-    write_files(tmp_path, [made], 1)
+    write_files(tmp_path, [CaseOutcome("c", "arm.yaml", "ok", 0.5, run_folder=name)])
     assert page_data(tmp_path)["links"] == [["caf%E9/results.json", ""]]
 
 
 @pytest.mark.parametrize("n", [0, 1])
-def test_a_shard_may_be_empty(tmp_path, n):
-    write_files(tmp_path, lines(n), n, KEYS, columns=True)
+def test_a_batch_may_be_empty(tmp_path, n):
+    write_files(tmp_path, rows_of(n), KEYS)
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + n
 
 
@@ -132,12 +86,9 @@ def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_
     (tmp_path / "run 1" / "figures").mkdir(parents=True)
     for name in ("report.html", "figures/frequencies.png"):
         (tmp_path / "run 1" / name).touch()
-    made = lines(6)
-    made[1] = to_line(CaseOutcome("c=1", "arm.yaml", "ok", 0.5, run_folder="run 1", index=1))
-    index = Index(most=3)
-    for k, line in enumerate(made):
-        index.add(replace(row(0), status="error" if k == 2 else "ok"), line)
-    (tmp_path / "index.html").write_bytes(index.page(tmp_path, "batch", KEYS))
+    made = rows_of(6)
+    made[1] = CaseOutcome("c=1", "arm.yaml", "ok", 0.5, run_folder="run 1", index=1)
+    (tmp_path / "index.html").write_bytes(index_page(made, tmp_path, KEYS, most=3))
     found = page_data(tmp_path)
     assert [each[0] for each in found["rows"]] == ["c=0", "c=1", "c=2"]
     assert found["links"][1] == ["run%201/report.html", "run%201/figures/frequencies.png"]
@@ -148,16 +99,9 @@ def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_
 
 def test_a_name_is_no_markup_in_the_page(tmp_path):
     hostile = CaseOutcome("</script><b>", "a.yaml", "error", 0.1, "<img onerror=x>")
-    write_files(tmp_path, [to_line(hostile)], 1)
+    write_files(tmp_path, [hostile])
     assert page_data(tmp_path)["rows"][0][0] == "</script><b>"
     assert "<img onerror" not in (tmp_path / "index.html").read_text("utf-8")
-
-
-def test_columns_of_a_batch_that_has_folders_now_do_not_stay(tmp_path):
-    write_files(tmp_path, lines(4), 4, KEYS, columns=True)
-    (tmp_path / "columns.csv").touch()  # of versions up to 0.3.0
-    write_files(tmp_path, lines(4), 4, KEYS)
-    assert not [*tmp_path.glob("columns.*")]
 
 
 # --- The page
@@ -182,7 +126,7 @@ SWEPT = tuple(GRID[0].values)
 
 def page_of(folder: Path, rows: list[CaseOutcome], keys: tuple[str, ...] = SWEPT) -> dict[str, Any]:
     """The data in the page of these rows, by column: its unit, its kind and its cells."""
-    write_files(folder, map(to_line, rows), len(rows), keys)
+    write_files(folder, rows, keys)
     data = page_data(folder)
     cells = zip(*data["rows"], strict=True)
     pairs = zip(data["columns"], cells, strict=True)
@@ -273,8 +217,8 @@ def test_the_page_of_a_thousand_variants_is_at_most_two_megabytes(tmp_path):
 
 def test_rows_of_earlier_versions_are_shown_without_the_units_that_they_lack(tmp_path):
     lacks = ("units", "mass", "price", "exact_rms_relative")
-    plain = {k: v for k, v in json.loads(to_line(GRID[5])).items() if k not in lacks}
-    write_files(tmp_path, [json.dumps(plain)], 1, SWEPT)
+    plain = {k: v for k, v in to_plain(GRID[5]).items() if k not in lacks}
+    write_files(tmp_path, [from_plain(plain)], SWEPT)
     columns = {name: unit for name, unit, _ in page_data(tmp_path)["columns"]}
     assert columns["width"] == ""
     assert columns["targets.0.frequency"] == "Hz"

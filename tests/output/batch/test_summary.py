@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.output import CaseOutcome, to_line, write_files
+from eigassign.output import CaseOutcome, to_plain, write_files
 
 AHEAD = [
     "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
@@ -41,7 +41,7 @@ ALL = (GOOD, LOOSE, STUCK, WRONG)
 
 def summary(folder: Path, rows: Sequence[CaseOutcome], keys: Sequence[str] = ()) -> list[dict]:
     """The rows of summary.csv; the other files are beside it."""
-    write_files(folder, map(to_line, rows), len(rows), keys)
+    write_files(folder, rows, keys)
     with open(folder / "summary.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
@@ -86,10 +86,10 @@ def test_a_summary_s_message_stays_on_its_line_and_is_no_formula(tmp_path):
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 3
 
 
-def test_the_summary_for_programs_has_the_rows_of_the_manifest_and_counts(tmp_path):
+def test_the_summary_for_programs_has_the_rows_and_counts(tmp_path):
     summary(tmp_path, ALL)
     found = json.loads((tmp_path / "summary.json").read_text())
-    assert found["cases"] == [json.loads(to_line(row)) for row in ALL]
+    assert found["cases"] == json.loads(json.dumps([to_plain(row) for row in ALL]))
     assert found["counts"] == {"error": 1, "failed": 1, "ok": 1, "tolerance": 1}
 
 
