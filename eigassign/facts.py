@@ -153,14 +153,6 @@ def time_in_words(value: float) -> str:
     return "0"
 
 
-def duration(value: float) -> str:
-    """Two digits, in the unit that people would take: ``50 s``, ``3.2 min``, ``27 h``."""
-    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if value >= 2.0 * size:
-            return f"{value / size:.2g} {unit}"
-    return f"{value:.2g} s"
-
-
 def positive_percent(fraction: float) -> str:
     """The same of what counts above round-off, 1e-8, only: a violation, or room."""
     return percent(fraction if fraction > 1e-8 else 0.0)

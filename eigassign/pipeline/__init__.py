@@ -7,7 +7,6 @@ Reading order:
     coefficient_files  expansion coefficients as files for other programs
     run_files          the run folder, and the log in it
     run                the paper's flowchart: case, model, expansion, assignment, verification
-    outlook            what a case of a batch will take
     queries            check a case, draw it; its frequencies at one point
     urdf               a robot from URDF as the content of a case
     update             measured frequencies to the parameters that explain them

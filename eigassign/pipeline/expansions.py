@@ -71,7 +71,7 @@ class ExpansionSize:
     order: int
     coefficients: int
     memory_mb: float
-    seconds: float
+    seconds: float  # by which the cache decides what to keep
 
 
 def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
