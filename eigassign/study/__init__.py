@@ -10,7 +10,8 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     weight      what gravity changes that is not in the frequencies
-    accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
+    accuracy    errors of mesh, reduction, expansion and round-off
+    checks      what is measured of an answer: whether the motion is slow
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
@@ -25,7 +26,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "accuracy": "least_gap",
+        "checks.slow_motion": "least_gap",
         "build": "build_model",
         "built_case": "BuiltCase load_case",
         "comparison": (

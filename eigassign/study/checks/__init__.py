@@ -1,0 +1,6 @@
+"""The checks of an answer: what is said about it, each from a scene and a design to rows and words.
+
+Reading order:
+
+    slow_motion  what the motion itself changes, which the frequencies of still poses do not contain
+"""
