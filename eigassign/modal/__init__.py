@@ -49,7 +49,7 @@ __all__, __getattr__, __dir__ = face(
         "reduced.reduce": "reduce",
         "reduced.residual": "half_solve residual_gram residual_terms",
         "slopes": "exact_slopes",
-        "slow_motion": "change_at motion_effect moving_modes stiffening theta_in_time",
+        "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "statics": "Flexibility compliances sags",
         "storage": "expansion_arrays stored_series tree_arrays",
         "surrogate": "Surrogate",

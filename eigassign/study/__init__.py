@@ -26,7 +26,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "checks.slow_motion": "least_gap",
+        "checks.slow_motion": "gap_along",
         "build": "build_model",
         "built_case": "BuiltCase load_case",
         "comparison": (

@@ -22,6 +22,7 @@ from eigassign.study.design.judgement import (
     SolvedDesigns,
     crossing_warnings,
     far_off,
+    judged_modes,
     soft_drives,
     swap_notes,
 )
@@ -110,12 +111,13 @@ def _with_answer(
 ) -> RunResults:
     """The results with those of the answer; ``reach`` matters to one that the expansion gave."""
     answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
+    judged = judged_modes(scene.file, targets)
+    motion = study_motion(scene, answer.y, assigned.solved.exact.hz, judged)
     row = assignment_row(
         *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
-        *(results.discretisation, results.weight, meaning.unreachable),
+        *(results.discretisation, results.weight, motion, meaning.unreachable),
     )
     reach = reach if answer.found is None else ()
-    motion = study_motion(scene, answer.y, assigned.solved.exact.hz)
     slow, fast = ("", None) if motion is None else (motion.note, motion.warning)
     weight = accuracy.weight.warnings
     warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, *weight, fast)

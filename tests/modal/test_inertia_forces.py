@@ -44,8 +44,8 @@ def change(case: ea.Case, share: float, wanted: tuple[int, ...]) -> tuple[np.nda
     omega = 2 * np.pi * model.frequencies([0.3], [], max(wanted))[0]
     speed = share * omega[0]
     terms = velocity_terms(case.file, model.poses.parameters, model.motion)
-    at = np.array([0.3]), np.array([speed]), np.zeros(1)
-    found = change_at(model.pencil, terms, *at, np.zeros(0), wanted, model.under_load)
+    at = np.array([[0.3]]), np.array([[speed]]), np.zeros((1, 1))
+    (found,) = change_at(model.pencil, terms, *at, np.zeros(0), wanted, model.under_load)
     return found, (speed / omega[np.array(wanted) - 1]) ** 2
 
 

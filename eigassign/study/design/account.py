@@ -18,6 +18,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
 from eigassign.study.accuracy import finer, model_errors, raised_by
+from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
@@ -59,6 +60,7 @@ def assignment_row(
     exact: Solved,
     mesh: MeshError | None,
     weight: WeightRow | None,
+    motion: MotionStudy | None,
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers.
@@ -97,6 +99,7 @@ def assignment_row(
     doubts = [] if trusted else [UNTRUSTED]
     judged = judged_modes(scene.file, targets)
     doubts += weight_doubt(scene.file, weight, judged, largest)
+    doubts += motion_doubt(motion, judged, largest)
     if undecided and (len(beyond) < len(unreachable) or set(conflicting) & set(undecided)):
         doubts += undecided.values() if not beyond else ()
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)

@@ -35,8 +35,8 @@ def coarse_loop() -> Built:
 
 def changes(model: Built, *motion: Any, wanted: tuple[int, ...] = (1,)) -> np.ndarray:
     terms = velocity_terms(model.case, model.numbers, model.motion)
-    q, rate, push = (np.atleast_1d(np.asarray(a, float)) for a in motion)
-    return change_at(model.pencil, terms, q, rate, push, model.y, wanted)
+    q, rate, push = (np.asarray(a, float).reshape(1, -1) for a in motion)
+    return change_at(model.pencil, terms, q, rate, push, model.y, wanted)[0]
 
 
 def estimated(motion: RestToRest, tau: np.ndarray, duration: float, mode: int) -> np.ndarray:
@@ -167,7 +167,7 @@ def whirling(width: float) -> Built:
     )
 
 
-@pytest.mark.parametrize("width", [0.02, 0.02005])
+@pytest.mark.parametrize("width", [0.02, 0.02005, 0.0201, 0.021])
 def test_equal_bending_modes_whirl_in_turning_axes(width: float) -> None:
     """Mode 1 and 2 of a mass m on springs k_1, k_2 in axes turning at Ω, Jeffcott's shaft:
 
@@ -180,13 +180,3 @@ def test_equal_bending_modes_whirl_in_turning_axes(width: float) -> None:
     expected = np.sort(turning.real) / np.sqrt([low, high]) - 1.0
     found = changes(model, 0.0, spin, 0.0, wanted=(1, 2))
     np.testing.assert_allclose(found, expected, rtol=1e-3)
-
-
-def test_modes_that_the_motion_mixes_are_told_apart_by_their_distance_at_least() -> None:
-    """Nearly equal springs, turned at once: the vibration is left in either mode."""
-    model = whirling(0.0201)
-    low, high = np.sqrt(model.lam([0.0], 2))
-    slow = changes(model, 0.0, 1e-6, 0.0)
-    fast = changes(model, 0.0, 0.5 * (high - low), 0.0)
-    assert abs(slow[0]) < 1e-9
-    assert fast[0] == pytest.approx(high / low - 1.0, rel=1e-9)
