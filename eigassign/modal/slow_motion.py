@@ -34,6 +34,7 @@ in which Λ is symmetric and ΦᵀMΦ̇ at t = 0 too: the modes of a cluster do 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,14 +48,17 @@ from eigassign.mechanism.trajectory.trajectory import Rates
 from eigassign.modal.exact.clusters import CLUSTER_GAP, LEAST_GAP, clusters, whole_clusters
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.taylor.coefficients import pencil_series
+from eigassign.modal.taylor.bordered import Solve
 from eigassign.modal.taylor.rayleigh import inverse_root, quadratics
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import lower_set, total_degree
 from eigassign.series.power_series import matrix_product
 
 Floats = NDArray[np.float64]
-NEAR = 0.5  # relative distance in λ below which modes are followed together
+# Relative distance in λ below which modes are followed together. Where two veered seven periods
+# apart, the change was 35 % above the phase by integration from 0.3 on if each is followed alone,
+# and 10 % from 0.5 on.
+NEAR = 0.5
 ABOVE = 4  # modes above the wanted ones among which near ones are sought
 
 
@@ -83,7 +87,8 @@ def motion_effect(
 ) -> MotionEffect:
     """Effect at the fastest instants of a motion at design y, with ``loads`` that of its forces.
 
-    ``gap`` (m,) is how near the modes are at each instant: those where they are near come first.
+    ``gap`` (m,) is how near the modes are at each instant: those where they are near come first. In
+    the shipped cases the worst of nine is within 17 % of that of 45, of three within a factor of 3.
     """
     at = _fastest(motion, instants, gap)
     own = motion.q[at], motion.rate[at], motion.acceleration[at]
@@ -152,11 +157,8 @@ def _small_problem(
     phi, phi_rate, phi_push = moving.phi
     M = pencil.sparse(pencil.mass @ theta[:, 0])
     c = C @ phi + 2.0 * (M @ phi_rate)
-    lam, series = np.diag(moving.lam[0]), pencil_series(pencil, theta, IN_TIME)
-    border = np.ascontiguousarray((M @ phi).T)
-    columns = zip(lam.tolist(), c.T, strict=True)
-    # Σ_j φ_j C_jk / (λ_j − λ_k)
-    z = [series.factor(one, border, phi.T)(column[None].copy())[0][0] for one, column in columns]
+    lam, solved = np.diag(moving.lam[0]), zip(moving.solvers, c.T, strict=True)
+    z = [solve(column[None].copy())[0][0] for solve, column in solved]  # Σ_j φ_j C_jk / (λ_j − λ_k)
     others = lam * (c.T @ np.array(z).T)
     own, W = phi.T @ c, _turning(moving)
     K = moving.lam[0] + phi.T @ (K_v @ phi + C @ phi_rate + M @ phi_push) + own @ W + W @ W
@@ -240,6 +242,7 @@ class MovingModes:
 
     phi: Floats  # (3, n_dof, r): Φ, Φ̇, Φ̈
     lam: Floats  # (3, r, r): Λ, Λ̇, Λ̈
+    solvers: Sequence[Solve]  # the bordered system of each
 
 
 def theta_in_time(
@@ -260,8 +263,8 @@ def moving_modes(pencil: Pencil, theta: Floats, lam: Floats, phi: Floats) -> Mov
     down = inverse_root(IN_TIME, N)
     up = matrix_product(IN_TIME, N, down)
     Lambda = matrix_product(IN_TIME, matrix_product(IN_TIME, up, L), down)
-    derivatives = (
+    phi_t, lam_t = (
         np.moveaxis(series * [1.0, 1.0, 2.0], 2, 0)
         for series in (matrix_product(IN_TIME, X, down), Lambda)
     )
-    return MovingModes(*derivatives)
+    return MovingModes(phi_t, lam_t, found.solvers)

@@ -11,6 +11,7 @@ right-hand side is formed in the memory of the result.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,11 +28,12 @@ BLOCK = 16  # right-hand sides solved at once: more fall out of the cache (dense
 
 @dataclass(frozen=True, eq=False)
 class SubspaceSeries:
-    """X (N, n, r) and Λ (N, r, r) over ``space``."""
+    """X (N, n, r) and Λ (N, r, r) over ``space``; of each column the bordered system, factored."""
 
     space: LowerSet
     vectors: Floats
     values: Floats
+    solvers: Sequence[Solve] = ()
 
 
 def expand_subspace(
@@ -42,11 +44,12 @@ def expand_subspace(
     n, r = phi0.shape
     X, L = np.empty((len(space), r, n)), np.zeros((len(space), r, r))
     X[0], L[0] = phi0.T, np.diag(lam0)
+    solvers: list[Solve] = []
     if space.order:
         border = series.mass_times(X[0])
         solvers = [series.factor(lam, border, X[0]) for lam in lam0.tolist()]
         _fill(series, space, solvers, X, L)
-    return SubspaceSeries(space, X.transpose(0, 2, 1), L)
+    return SubspaceSeries(space, X.transpose(0, 2, 1), L, solvers)
 
 
 def _fill(

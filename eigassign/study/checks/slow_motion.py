@@ -23,6 +23,8 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MOVED = 0.005  # of a frequency, from which on it is warned of where max_error is larger
+INSTANTS, INSTANTS_LARGE = 9, 3
+LARGE = 2_000  # degrees of freedom, from which on an instant takes 0.1 s and more
 EQUAL = 1e-6  # relative distance below which modes count as this far apart
 NEGLECTED = "the neglected velocity terms and forces of the motion change"
 
@@ -59,28 +61,27 @@ def study_motion(
 
     ``hz`` (n_t, n_modes) are exact frequencies of design y (n_y,). None without a timed trajectory.
     """
-    parts = () if scene.trajectory is None else scene.trajectory.parts
+    if scene.trajectory is None:
+        return None
+    parts = [part.trajectory for part in scene.trajectory.parts]
     given = np.flatnonzero(~scene.path.inserted)  # what targets ask between samples is no motion
-    starts = np.cumsum([0, *(len(part.trajectory.given.time_s) for part in parts)])
-    timed = [
-        (rates(part.trajectory), own)
-        for part, own in zip(parts, np.split(given, starts[1:-1]), strict=bool(parts))
-        if len(own) >= 3
-    ]
+    ends = np.cumsum([len(part.given.time_s) for part in parts])
+    samples = np.split(given, ends[:-1])
+    timed = [(rates(part), own) for part, own in zip(parts, samples, strict=True) if len(own) >= 3]
     if not timed:
         return None
     modes, limit = sorted({*scene.modes, *asked}), min(scene.file.validation.max_error, MOVED)
     gap = gap_along(hz, modes)
     if names := placeless(scene.file):
-        return _rough_study(
-            scene, [motion for motion, _ in timed], hz[given].min(), gap[given].min(), names, limit
-        )
+        motions = [motion for motion, _ in timed]
+        return _rough_study(scene, motions, hz[given].min(), gap[given].min(), names, limit)
     model, worst = scene.model, dict[int, tuple[float, int]]()
     terms = velocity_terms(model.poses.case, model.poses.parameters, model.motion)
     for motion, own in timed:
         near = gap[own[motion.samples]]
+        count = INSTANTS if model.n_dof < LARGE else INSTANTS_LARGE
         found = motion_effect(
-            model.pencil, terms, motion, y, tuple(modes), loads=model.under_load, gap=near
+            model.pencil, terms, motion, y, tuple(modes), count, model.under_load, near
         )
         for mode, change in zip(modes, found.change.T, strict=True):
             k = int(np.abs(change).argmax())

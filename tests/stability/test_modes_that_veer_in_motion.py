@@ -17,7 +17,7 @@ import eigassign as ea
 from eigassign.mechanism import velocity_terms
 from eigassign.modal import change_at
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 WIDE = np.linspace(0.1, 0.9, 17)
 BEFORE = np.linspace(0.1, 0.65, 12)  # modes 1 and 2 come within 0.7 % at τ = 0.70
 MOTIONS: dict[str, tuple[list[float], list[float], tuple[int, ...], np.ndarray]] = {
