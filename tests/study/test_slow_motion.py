@@ -120,7 +120,6 @@ def veering(duration: str) -> dict[str, Any]:
     [
         ("0.6 s", "do_not_use", 2.0, 5.0),
         ("6 s", "reached", 0.5, 1.0),
-        ("600 s", "reached", 0, 0.01),
     ],
 )
 def test_a_veering_is_said_by_mode_and_sample_and_the_verdict_follows(
