@@ -47,7 +47,8 @@ def note(event, args):
 
 sys.addaudithook(note)
 if __name__ == "__main__":
-        sys.exit(main())
+    from eigassign.cli import main
+    sys.exit(main())
 """
 COMMAND = (
     *("program.py", "batch", "arm.yaml", "--jobs", str(JOBS), "--out", "out"),
