@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from eigassign.output.previous import EarlierResult
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
-_FIRST, _LAST = 5, 2  # cases that a dry run lists
 
 
 @click.command(
@@ -41,7 +40,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
     help="Values of a key, as V1,V2 or MIN..MAX:COUNT; several --set make a grid (default: the "
     "sweep of the case).",
 )
-@click.option("--dry-run", is_flag=True, help="Say what would run; run nothing.")
+@click.option("--dry-run", is_flag=True, help="Count the cases that would run; run nothing.")
 @click.option("--jobs", type=click.IntRange(1), help="Number of processes (default: one per core).")
 @click.option(
     "--scheduler",
@@ -178,19 +177,11 @@ def _cases(count: int) -> str:
 
 
 def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
-    """List the cases that would run, and count them."""
+    """Count the cases that would run."""
     from eigassign.batch.records import done
     from eigassign.batch.runner import require_valid
-    from eigassign.output.console import print_tables
-    from eigassign.output.tables import Table
 
     there = done(batch)
     todo = require_valid(batch, there, workers, reporter.stage)
-    first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
-    rows = [(str(index + 1), batch.plan[index].name) for index in (*first, *last)]
-    if len(todo) > len(rows):
-        rows.insert(_FIRST, ("…", f"{len(todo) - len(rows)} more"))
-    if rows:
-        print_tables([Table("Cases that would run", ("case", "name"), tuple(rows))])
     show(f"{_cases(len(todo))} would run, {len(there)} are done and still current")
     return 0

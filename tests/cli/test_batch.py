@@ -74,15 +74,13 @@ def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
     assert not Path("results/a/figures").exists()
 
 
-def test_a_dry_run_lists_and_counts_what_would_run(
+def test_a_dry_run_counts_what_would_run(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     write("a.yaml")
     sweep = ["batch", "a.yaml", "--jobs", "1", "--set", "targets.0.frequency=176 Hz..184 Hz:9"]
     assert main([*sweep, "--dry-run"]) == 0
-    out = capsys.readouterr().out
-    assert [line.split()[0] for line in out.splitlines()[3:11]] == list("12345…89")
-    assert out.endswith("9 cases would run, 0 are done and still current\n")
+    assert capsys.readouterr().out == "9 cases would run, 0 are done and still current\n"
     assert not Path("results").exists()
     one = ["--set", "targets.0.frequency=180 Hz", "--reports", "none", "--jobs", "1"]
     assert main(["batch", "a.yaml", *one]) == 0
