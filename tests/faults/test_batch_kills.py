@@ -51,7 +51,7 @@ if __name__ == "__main__":
     sys.exit(main())
 """
 COMMAND = (
-    *("program.py", "batch", "arm.yaml", "--jobs", str(JOBS), "--out", "out"),
+    *("program.py", "batch", "arm.yaml", "--reports", "none", "--jobs", str(JOBS), "--out", "out"),
     *("--set", f"mechanism.bodies.tool.mass=0..0.5:{CASES // 4}"),
     *("--set", "targets.0.frequency=170 Hz..190 Hz:4"),
 )
