@@ -9,10 +9,10 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from collections.abc import Iterator
+from concurrent.futures import Executor
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from eigassign._version import __version__
 from eigassign.batch.workers import Workers
@@ -41,11 +41,10 @@ def cluster(address: str) -> Iterator[Workers]:
         client = Client(address, timeout=10.0)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # no TLS, no ucx
         raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
-    folder = os.getcwd()
     with client:
         try:
-            workers = _require_fit(client, folder)
-            yield Workers(_AHEAD * workers, partial(_executor, client, folder))
+            workers = _require_fit(client, os.getcwd())
+            yield Workers(_AHEAD * workers, partial(_executor, client))
         except Exception as error:  # a task that is cancelled, a stream that is closed
             if isinstance(error, EigassignError) or client.status == "running":
                 raise
@@ -80,23 +79,10 @@ def _seen(folder: str) -> tuple[str, bool]:
 
 
 @contextlib.contextmanager
-def _executor(client: Client, folder: str, _slots: int) -> Iterator[Executor]:
-    """One that runs every task in ``folder``; on an error inside, what is in flight is given up."""
+def _executor(client: Client, _slots: int) -> Iterator[Executor]:
+    """That of the client; on an error inside, what is in flight is given up."""
     pool = client.get_executor(pure=False)
     try:
-        yield _There(pool, folder)
+        yield pool
     finally:
         pool.shutdown(wait=False)  # and what is in flight is cancelled
-
-
-class _There(Executor):
-    def __init__(self, pool: Executor, folder: str) -> None:
-        self._pool, self._folder = pool, folder
-
-    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        return self._pool.submit(_in_folder, self._folder, fn, *args, **kwargs)
-
-
-def _in_folder(folder: str, work: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    os.chdir(folder)  # names of files are as seen from there
-    return work(*args, **kwargs)

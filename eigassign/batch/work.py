@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
@@ -31,6 +31,7 @@ class CaseOptions:
     """Options of each case's run, which can be sent to another process."""
 
     out: str  # the folder of the batch
+    here: str = field(default_factory=os.getcwd)  # from where names of files are seen
     cache_dir: str | None = None
     use_cache: bool = True
     force: bool = False
@@ -55,6 +56,7 @@ def check_cases(
 
     Raises StorageError where a file of one cannot be read.
     """
+    os.chdir(options.here)  # of a cluster's worker
     found = []
     for variant in variants:
         try:
@@ -98,6 +100,7 @@ def run_case(variant: Variant, options: CaseOptions) -> CaseOutcome:
         return outcome_of(variant, status, perf_counter() - start, message=message, **found)
 
     try:
+        os.chdir(options.here)  # of a cluster's worker
         with limited(options.seconds):
             return _solved(variant, options, ended)
     except OutOfTimeError:

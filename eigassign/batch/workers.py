@@ -152,34 +152,27 @@ def run_tasks(
     """Work on tasks, at most ``slots`` in flight, and keep each result; the tasks that were lost.
 
     These are the ones in flight when a process of the pool died: it is not known which of them was
-    the cause. Tasks are taken one by one, and none is after that. Raises our errors of a task.
+    the cause, and the pool takes no other. Raises our errors of a task.
     """
     running: dict[Future[R], T] = {}
-    slots = slots or workers.slots
-    lost: list[T] = []
-    broken = False
-    with workers.open(slots) as pool:
-        try:
-            while True:
-                while len(running) < slots and (taken := list(itertools.islice(tasks, 1))):
-                    lost += taken  # until it is in flight
-                    running[pool.submit(work, *taken)] = lost.pop()
-                if not running:
-                    break
-                wait(running, return_when=FIRST_COMPLETED)
-                for future in [future for future in running if future.done()]:
-                    task, error = running.pop(future), future.exception()
-                    if error is None:
-                        keep(task, future.result())
-                    elif isinstance(error, EigassignError):
-                        raise error
-                    else:
-                        lost.append(task)
-                        broken = broken or isinstance(error, BrokenExecutor)
-                if broken:
-                    break
-        except BrokenExecutor:
-            pass
+    slots, lost = slots or workers.slots, list[T]()
+    with workers.open(slots) as pool, contextlib.suppress(BrokenExecutor):
+        while True:
+            while len(running) < slots and (taken := list(itertools.islice(tasks, 1))):
+                lost += taken  # until it is in flight
+                future = pool.submit(work, *taken)
+                running[future] = lost.pop()
+            if not running:
+                break
+            wait(running, return_when=FIRST_COMPLETED)
+            for future in [future for future in running if future.done()]:
+                task, error = running.pop(future), future.exception()
+                if error is None:
+                    keep(task, future.result())
+                elif isinstance(error, EigassignError):
+                    raise error
+                else:
+                    lost.append(task)
     return [*lost, *running.values()]
 
 
