@@ -1,7 +1,7 @@
 """The question put to every method, and how the answers are timed.
 
-Frequencies are asked for at random samples of trajectory × design box, and along the trajectory at
-several designs.
+Frequencies are asked for between the samples of the trajectory and all over the design's box, and
+along the trajectory at several designs.
 
 Times are processor time, which on one thread is the time it takes where nothing else runs.
 """
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from eigassign.chart.results import Asked, Timing
 from eigassign.errors import CaseError
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.study.planning import SEED, at_corners, at_random, corners, joint_map
+from eigassign.study.planning import SEED, at_corners, corners, joint_map, scattered
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -102,9 +102,11 @@ class Bench:
     lower: Floats  # (n_y,); the same as upper where a parameter is kept
     upper: Floats
 
-    def points(self, samples: Ints, y: Floats) -> Points:
-        """Samples of the trajectory (n,) at designs (n, n_y)."""
-        return Points(self.scene.path.q[samples], y)
+    def points(self, samples: Floats | Ints, y: Floats) -> Points:
+        """Samples of the trajectory (n,) at designs (n, n_y); 1.5 is between second and third."""
+        every = np.arange(len(self.scene.path.q))
+        q = [np.interp(samples, every, own) for own in self.scene.path.q.T]
+        return Points(np.reshape(q, (-1, len(y))).T, y)
 
     def exact(self, points: Points) -> Floats:
         """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
@@ -156,7 +158,7 @@ class Question:
 
 
 def build_question(bench: Bench) -> Question:
-    """Random samples, half of them at corners of the box of designs, and runs at several designs.
+    """Points between samples and all over the box of designs, and runs at several designs.
 
     The runs are at the initial design and at corners, where approximations err most. The samples
     are fewer where an exact solve takes long.
@@ -168,7 +170,7 @@ def build_question(bench: Bench) -> Question:
         max(4, int(share * count)) for count in (effort.random_points, effort.samples_per_design)
     )
     case = scene.file, scene.trajectory, scene.q0, np.clip(scene.initial, *scene.bounds)
-    found = at_random(*case, n_random).joined(at_corners(*case, designs, along))
+    found = scattered(*case[:3], n_random).joined(at_corners(*case, designs, along))
     points = bench.points(found.samples, found.x[:, len(scene.q0) :])
     n, modes = len(scene.path.spread(along)), scene.expansions.modes
     runs = tuple(slice(k, k + n) for k in range(n_random, len(points), n))

@@ -27,7 +27,7 @@ __all__, __getattr__, __dir__ = face(
     {
         "adaptive.cheapest": "cheapest",
         "adaptive.mesh": "meshes",
-        "adaptive.order": "expansions",
+        "adaptive.order": "MARGIN raise_order",
         "adaptive.reduced_model": "reduce_adaptively",
         "discretisation": "discretisation_error",
         "exact.clusters": "clusters",

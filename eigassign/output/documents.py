@@ -137,7 +137,11 @@ class StudyDocument:
     y0: Floats
     max_relative: Annotated[
         Mapping[str, Mapping[str, Share] | None],
-        Fact("over_time, over_q, over_design; of each taylor and linearised", may_lack=True),
+        Fact(
+            "over_time, over_q, over_design, and with a margin everywhere; of each taylor and "
+            "linearised",
+            may_lack=True,
+        ),
     ]
 
 
@@ -304,14 +308,14 @@ def _modes(others: OtherModes | None) -> Sequence[ModeDocument]:
     return [ModeDocument(*column) for column in columns]
 
 
-def _worst(study: ModeStudy) -> dict[str, dict[str, float] | None]:
+def _worst(study: ModeStudy) -> dict[str, Mapping[str, float] | None]:
     """The largest errors of both expansions by where they were looked for."""
     maps = (("over_q", study.over_q), ("over_design", study.over_design))
     places = {"over_time": study.over_time, **{k: m.values if m else None for k, m in maps}}
     return {
         k: {"taylor": at.worst_taylor, "linearised": at.worst_linearised} if at else None
         for k, at in places.items()
-    }
+    } | {"everywhere": study.stated}
 
 
 # --- As JSON

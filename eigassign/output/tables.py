@@ -429,6 +429,10 @@ def approximation(results: RunResults) -> Table:
         for where, values in places:
             worst = (percent(values.worst_taylor), percent(values.worst_linearised))
             rows.append((f"mode {study.mode}", where, str(study.order), *worst))
+        if study.stated is not None:
+            worst = (percent(study.stated["taylor"]), percent(study.stated["linearised"]))
+            where = "between samples, all over the bounds, with a margin"
+            rows.append((f"mode {study.mode}", where, str(study.order), *worst))
     return Table("Approximation", columns, tuple(rows), caption)
 
 

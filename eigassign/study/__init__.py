@@ -10,8 +10,8 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     weight      what gravity changes that is not in the frequencies
-    accuracy    errors of mesh, reduction, expansion and round-off
-    checks      what is measured of an answer: whether the motion is slow
+    accuracy    errors of mesh, reduction and round-off
+    checks      what is measured of an answer: its expansions, whether the motion is slow
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
@@ -29,9 +29,10 @@ __all__, __getattr__, __dir__ = face(
         "checks.slow_motion": "gap_along",
         "build": "build_model",
         "built_case": "BuiltCase load_case",
+        "checks.expansions": "compare stated_error study_expansions unseen_points",
         "comparison": (
-            "COARSE DESIGN_BOX RANDOM_BOX TRAJECTORY box_points compare grid_over q_grid "
-            "random_q reach_warnings study_modes validate_expansions"
+            "BETWEEN COARSE DESIGN_BOX RANDOM_BOX TRAJECTORY box_points grid_over q_grid random_q "
+            "reach_warnings study_modes validate_expansions"
         ),
         "design.answer": "Answer find_answer",
         "design.clearance": "BandMotion",
@@ -48,8 +49,8 @@ __all__, __getattr__, __dir__ = face(
         "meaning.tolerance": "reduced_ranges study_tolerance",
         "planning": (
             "Plan at_corners at_random automatic_elements central_sample corners joint_map "
-            "mesh_share plan_expansion series_share shown_point truncation_share "
-            "with_middle_loads with_worse_designs"
+            "farthest mesh_share plan_expansion scattered series_share shown_point "
+            "truncation_share unseen with_middle_loads with_worse_designs"
         ),
         "results": (
             "ActiveRow AimRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "

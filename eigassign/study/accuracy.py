@@ -1,7 +1,7 @@
 """How far the numbers of a run can be trusted: errors stated side by side.
 
-`study_accuracy` states the errors of mesh, reduced links, expansion and round-off. It needs no
-exact solves but those at the few poses where mesh and reduced links are judged.
+`study_accuracy` states the errors of mesh, reduced links and round-off. It needs no exact solves
+but those at the few poses where mesh and reduced links are judged.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ POSES = 9  # at which the mesh is judged; each costs an exact solve
 POSES_LARGE = 3  # of a model of more than `LARGE` degrees of freedom, where one takes half a second
 LARGE = 10_000
 ROUNDED = 3  # at which round-off is measured by nine solves; of a large model one
-SAMPLES = 20  # at which the expansion's own estimate is evaluated
+SAMPLES = 20  # at which reduced links are judged
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,16 @@ class Accuracy:
 def study_accuracy(
     scene: Scene, optimum: Floats | None = None, more: Collection[int] = ()
 ) -> Accuracy:
-    """Errors of mesh, reduced links, expansion and round-off, and what gravity changes, per mode.
+    """Errors of mesh, reduced links and round-off, and what gravity changes, per mode.
 
     Those of mesh and links at the ``optimum`` (n_y,), of the mesh at the initial design without
-    one. Where there is one, the expansion is compared with exact solves at every sample, and its
-    error not estimated too. ``more`` modes than are expanded are asked for by targets.
+    one. ``more`` modes than are expanded are asked for by targets.
     """
-    q = scene.q0[None] if scene.trajectory is None else scene.path.q
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
     mesh = judged_mesh(scene.model, scene.modes, scene.trajectory, scene.q0, y, design)
     weight = weight_at(scene, y, design, more)
     lines = [*mesh_lines(mesh, scene.model), *weight.lines]
     lines += truncation_notes(scene, optimum)
-    if optimum is None:
-        lines += _estimated_lines(scene, spread(q, SAMPLES))
     return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y), *digits_lines(scene.file)))
 
 
@@ -172,22 +168,6 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
         f"design: {finer(model)}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
-
-
-def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
-    estimate = scene.expansions.fulls.error_estimate(q, scene.initial).max(axis=0)
-    several = scene.trajectory is not None and scene.trajectory.several
-    where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
-    where = "along all trajectories" if several else where
-    if scene.trajectory is not None and len(q) < len(scene.path.q):
-        where = f"at {len(q)} samples {where}"
-    lines = []
-    for mode, error in zip(scene.modes, estimate, strict=True):
-        stated = "not known" if not np.isfinite(error) else f"{100 * error:.2g} % at most"
-        lines.append(
-            f"mode {mode}: estimated error of the full expansion {where}, initial design: {stated}"
-        )
-    return lines
 
 
 def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:

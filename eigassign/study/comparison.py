@@ -10,13 +10,12 @@ trajectory
 box of y at q0
     all designs within their bounds at the expansion point: a grid with its corners for up to three
     parameters, corners and seeded random designs beyond;
+between samples
+    corners of the bounds, and points between the samples of the trajectory and all over the bounds
+    (`checks.expansions`): the worst there is stated with its margin;
 box of q and y
-    seeded random points (``validation.samples`` of them). In q the box is what the joint angles
-    travel along the trajectory, with the corners of the bounds too where they follow the design. It
-    is spanned in the joints' *relative* angles, on which the frequencies depend: the box of the
-    absolute angles would also hold poses far from any that the mechanism takes. With
-    ``validation.q_span`` it is instead q0 ± the span in the coordinates of the case, whatever poses
-    that gives. In y it is the bounds.
+    with ``validation.q_span`` instead, seeded random points (``validation.samples`` of them): q0 ±
+    the span in the coordinates of the case, whatever poses that gives, and the bounds of y.
 
 Errors are in frequency (Hz), relative; a point where a polynomial gives λ < 0 counts as infinitely
 wrong. Where the full set was too large for the order asked for, only the linearised error counts.
@@ -33,7 +32,14 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
+from eigassign.modal.adaptive.order import MARGIN
 from eigassign.modal.model import Model
+from eigassign.study.checks.expansions import (
+    compare,
+    expansion_lines,
+    study_expansions,
+    unseen_points,
+)
 from eigassign.study.planning import joint_map, travelled
 from eigassign.study.results import (
     Comparison,
@@ -52,26 +58,6 @@ Floats = NDArray[np.float64]
 # middle is one of them; fewer where a single exact solve takes milliseconds.
 AXES = {1: 61, 2: 13}
 COARSE = {1: 21, 2: 7}
-
-
-def compare(
-    model: Model,
-    expansions: Expansions,
-    x: Floats,
-    exact_hz: Floats | None = None,
-) -> tuple[Comparison, ...]:
-    """One comparison for each expanded mode at the points x (n, n_x), arrays (n,) in Hz.
-
-    ``exact_hz`` (n, at least the highest mode) are exact frequencies already known there.
-    """
-    q, y = np.split(x, [len(model.q_names)], axis=1)
-    if exact_hz is None:
-        exact_hz = model.frequencies(q, y, max(expansions.modes))
-    taylor, linearised = expansions.taylor_hz(q, y), expansions.linearised_hz(q, y)
-    return tuple(
-        Comparison(frozen(exact_hz[:, mode - 1]), frozen(taylor[:, k]), frozen(linearised[:, k]))
-        for k, mode in enumerate(expansions.modes)
-    )
 
 
 @dataclass(frozen=True)
@@ -162,6 +148,7 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
     if scene.expanded is None:
         return ModeStudies()
     model, expansions = scene.model, scene.expanded
+    everywhere, lines = _everywhere(scene)
     over_time: tuple[Comparison, ...] = ()
     if scene.trajectory is not None:
         x = model.x(scene.trajectory.q, scene.initial)
@@ -169,9 +156,18 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
     over_design, no_design = map_over(model, expansions, design_grid(scene))
     over_q, no_q = map_over(model, expansions, q_grid(scene))
     x0 = (expansions.full.q0, expansions.full.y0)
-    parts = zip_longest(expansions.modes, over_time, over_design, over_q)
-    rows = tuple(ModeStudy(m, expansions.order, *x0, time, y, q) for m, time, y, q in parts)
-    return ModeStudies(rows, no_design + no_q)
+    parts = zip_longest(expansions.modes, over_time, over_design, over_q, everywhere)
+    rows = tuple(ModeStudy(m, expansions.order, *x0, t, y, q, all_) for m, t, y, q, all_ in parts)
+    return ModeStudies(rows, (*lines, *no_design, *no_q))
+
+
+def _everywhere(scene: Scene) -> tuple[tuple[Comparison, ...], tuple[str, ...]]:
+    """`study_expansions` in numbers and words; no numbers where a design has no pose or modes."""
+    try:
+        found = study_expansions(scene)
+    except EigassignError as error:
+        return (), (f"the expansion is not measured all over the bounds: {error}",)
+    return found, expansion_lines(scene, found)
 
 
 def _counts(scene: Scene) -> Mapping[int, int]:
@@ -221,6 +217,7 @@ def q_grid(scene: Scene) -> Grid | None:
 # --- Validation: is the expansion good enough
 
 TRAJECTORY, DESIGN_BOX, RANDOM_BOX = "trajectory", "box of y at q0", "box of q and y"
+BETWEEN = "between samples, all over the bounds"
 SEED = 20211204  # any: the same points every time
 _GRID = {1: 61, 2: 13, 3: 7}  # points along each axis by the number of parameters
 _CORNERS = 256  # at most, of a box with many parameters
@@ -268,9 +265,11 @@ def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     if np.any(upper > lower):
         y = box_points(lower, upper, scene.file.validation.samples, random)
         yield DESIGN_BOX, model.x(scene.q0, y)
-    q = random_q(scene, random)
-    if q is not None:
+    if scene.file.validation.q_span is not None:
+        q = random_q(scene, random)
         yield RANDOM_BOX, model.x(q, random.uniform(lower, upper, (len(q), len(lower))))
+    elif scene.trajectory is not None:
+        yield BETWEEN, unseen_points(scene)
 
 
 def box_points(lower: Floats, upper: Floats, samples: int, random: np.random.Generator) -> Floats:
@@ -292,18 +291,10 @@ def _corners(d: int, random: np.random.Generator) -> Floats:
     return chosen
 
 
-def random_q(scene: Scene, random: np.random.Generator) -> Floats | None:
-    """Random poses (n, n_q) of the box in q; None if the box is a point or unknown."""
+def random_q(scene: Scene, random: np.random.Generator) -> Floats:
+    """Random poses (n, n_q) within ``validation.q_span`` of q0."""
     n, q0 = scene.file.validation.samples, scene.q0
-    if scene.file.validation.q_span is not None:
-        span = _spans(scene.file)
-        return q0 + random.uniform(-1.0, 1.0, (n, len(q0))) * span if span.any() else None
-    S = joint_map(scene.model)
-    if scene.trajectory is None or not len(S):
-        return None
-    along = travelled(scene.file, scene.trajectory) @ S.T
-    s = random.uniform(along.min(axis=0), along.max(axis=0), (n, len(S)))
-    return np.asarray(q0 + (s - S @ q0) @ np.linalg.pinv(S).T)
+    return np.asarray(q0 + random.uniform(-1.0, 1.0, (n, len(q0))) * _spans(scene.file))
 
 
 def _spans(file: CaseFile) -> Floats:
@@ -320,15 +311,17 @@ def _spans(file: CaseFile) -> Floats:
 def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
     expansions, limit = scene.expansions, scene.file.validation.max_error
     counts = expansions.full_order == expansions.order
-    counted = [values.worst_linearised, *([values.worst_taylor] if counts else [])]
+    margin = MARGIN if where == BETWEEN else 1.0
+    worst_taylor, worst_linearised = margin * values.worst_taylor, margin * values.worst_linearised
+    counted = [worst_linearised, *([worst_taylor] if counts else [])]
     return ValidationRow(
         case=scene.file.path.stem,
         mode=expansions.modes[k],
         order=expansions.order,
         where=where,
         points=values.exact_hz.size,
-        worst_taylor=values.worst_taylor,
-        worst_linearised=values.worst_linearised,
+        worst_taylor=worst_taylor,
+        worst_linearised=worst_linearised,
         rms_taylor=_rms(values.taylor_error),
         rms_linearised=_rms(values.linearised_error),
         limit=limit,

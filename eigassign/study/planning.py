@@ -28,12 +28,13 @@ from eigassign.errors import (
     TrajectoryError,
     UsageError,
 )
+from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.cheapest import R, cheapest
 from eigassign.modal.adaptive.link_reduction import POSES
 from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, meshes
-from eigassign.modal.adaptive.order import expansions
+from eigassign.modal.adaptive.order import raise_order
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
@@ -280,6 +281,7 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
 
 
 STANDS = 0.8  # of the load that buckles: nearer no mesh is fine enough
+ATTEMPTS = 3  # confirmations before the choice at all that was looked at is taken
 TRIAL = 2  # elements of a link left to auto, in the model that choices are first judged on
 
 
@@ -407,13 +409,8 @@ def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
 
 # --- Order and expansion points left to auto
 
-FEW, MANY = 200, 1000  # poses at corners that an order is chosen at, and confirmed at: see below
-RANDOM = 600  # further poses and designs that it is confirmed at
-ATTEMPTS = 3  # confirmations before the choice at all that was looked at is taken
-# Looks at samples, and coefficients, after which an expansion that is not needed is given up: as
-# many as the search for a design solves samples exactly, some 100 designs at 100 samples. Most of
-# the shipped cases at 1e-3 take under a third, a full turn of a crank without an answer 42 000.
-LOOKS = 10_000
+# Coefficients of both expansions after which one that is not needed is given up: 0.1 to 0.3 s
+GIVEN_UP = 20_000
 
 
 def expansion_needed(file: CaseFile) -> bool:
@@ -432,26 +429,18 @@ def choose_order(
 ) -> Plan:
     """Order and expansion points that meet the series' share, and which modes go together.
 
-    They are chosen at few poses and corners of the design's bounds, and `confirmed` at many more
-    and at random designs. (Choosing at all of them at once takes 1.6 times as long and chooses the
-    same for the shipped cases at 1e-3, 1e-5 and 1e-7.) Raises AccuracyError, naming the pose, where
-    no order and number of points will do; where they are not ``needed``, the order is then 0.
+    By exact solves between the samples and all over the bounds of the design. Raises AccuracyError,
+    naming the pose, where no order and number of points will do; where they are not ``needed``, the
+    order is then 0.
     """
-    at_upper = corners(len(y0))
-    few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
-    seen, every = (at_corners(file, trajectory, q0, y0, at_upper, each) for each in (few, many))
-    require_little_truncation(file, model, seen.x)
-    if len(y0):
-        every = every.joined(at_random(file, trajectory, q0, y0, RANDOM))
-    x0, accuracy = np.concatenate([q0, y0]), series_share(file)
     try:
-        found = confirmed(
-            lambda at, looks: expansions(
-                model.pencil, at.x, accuracy, modes, start=x0, place=at.place, most_looks=looks
-            ),
-            lambda found: lambda x: found.error_estimate(*np.split(x, [len(q0)], 1)).max(axis=1),
-            "error at most {:.1e}".format,
-            *(accuracy, file, seen, every, np.inf if needed else LOOKS),
+        at = unseen(file, model, trajectory, q0[None], y0)
+        require_little_truncation(file, model, at.x)
+        found = raise_order(
+            *(model.pencil, at.x, series_share(file), modes),
+            start=np.concatenate([q0, y0]),
+            place=at.place,
+            most=np.inf if needed else GIVEN_UP,
         )
     except EigassignError as error:  # an accuracy that is not met, or a design without a pose
         if needed:
@@ -466,23 +455,29 @@ def choose_order(
 
 ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
 SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
+SCATTERED = 128  # points between the samples and all over the bounds
+MOST_CORNERS = 64  # of the bounds, with so many poses in all
 SEED = 20211
 CLIMBERS = 8  # poses and designs from which worse designs are looked for
 
 
 @dataclass(frozen=True, eq=False)
 class DesignSamples:
-    """Poses and designs x (n, n_x), and which of the trajectory's samples each row is at."""
+    """Poses and designs x (n, n_x), and which of the trajectory's samples each row is at.
+
+    Between two of them where that is no whole number.
+    """
 
     x: Floats
-    samples: Ints
+    samples: Floats
     trajectory: Trajectories | None
 
     def place(self, row: int) -> str:
-        """A row in words: the sample, whatever the design."""
+        """A row in words: the nearest sample, whatever the design."""
         if self.trajectory is None:
             return "the expansion point"
-        return self.trajectory.sample(int(self.samples[row]))
+        at = float(self.samples[row])
+        return ("" if at.is_integer() else "a pose near ") + self.trajectory.sample(round(at))
 
     def joined(self, other: DesignSamples) -> DesignSamples:
         """The same samples with the rows of another at the end."""
@@ -515,19 +510,78 @@ def at_corners(
     q0: Floats,
     y0: Floats,
     at_upper: ArrayLike = ENDS,
-    samples: int = SAMPLES,
+    samples: int | Ints = SAMPLES,
 ) -> DesignSamples:
     """At y0 and corners of the bounds, one for each row of ``at_upper`` (k, n_y or 1).
 
-    Each at up to so many ``samples`` of the trajectory.
+    Each at these ``samples`` of the trajectory, or at up to so many.
     """
     lower, upper = _bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
     designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
-    rows = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
+    rows = np.zeros(1, dtype=np.intp)
+    if trajectory is not None:
+        rows = trajectory.spread(samples) if isinstance(samples, int) else samples
     q = [q0[None] if trajectory is None else poses_at(trajectory, y)[rows] for y in designs]
     x = np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
-    return DesignSamples(x, np.tile(rows, len(designs)), trajectory)
+    return DesignSamples(x, np.tile(rows, len(designs)).astype(np.float64), trajectory)
+
+
+def unseen(
+    file: CaseFile,
+    model: Model,
+    trajectory: Trajectories | None,
+    about: Floats,
+    y0: Floats,
+    first: int = 1,
+) -> DesignSamples:
+    """Where answers about poses ``about`` (k, n_q) and design y0 are judged: never there.
+
+    At corners of the bounds, at the poses that are farthest from these, and `scattered`.
+    """
+    at_upper = corners(len(y0), MOST_CORNERS)
+    at_upper = np.vstack([at_upper[: MOST_CORNERS - 1], at_upper[MOST_CORNERS - 1 :][-1:]])
+    rows = np.zeros(1, dtype=np.intp)
+    if trajectory is not None:
+        S = joint_map(model)
+        rows = farthest(trajectory.q @ S.T, about @ S.T, MOST_CORNERS // len(at_upper))
+    outer = at_corners(file, trajectory, about[0], y0, at_upper, rows)
+    return outer.joined(scattered(file, trajectory, about[0], SCATTERED, first))
+
+
+def farthest(points: Floats, about: Floats, count: int) -> Ints:
+    """Rows of ``points`` (n, d): each is the farthest from ``about`` (k, d) and those before it."""
+    width = np.ptp(points, axis=0)
+    width = np.where(width > 0.0, width, 1.0)
+    away = np.min([np.square((points - each) / width).sum(axis=1) for each in about], axis=0)
+    rows: list[int] = []
+    while len(rows) < min(count, len(points)):
+        rows.append(int(np.argmax(away)))
+        beside = np.square((points - points[rows[-1]]) / width).sum(axis=1)
+        away = np.minimum(away, beside)
+    return np.array(rows, dtype=np.intp)
+
+
+def scattered(
+    file: CaseFile, trajectory: Trajectories | None, q0: Floats, count: int, first: int = 1
+) -> DesignSamples:
+    """Points ``first``, … of a fixed sequence (`kronecker`) between samples and within the bounds.
+
+    SciPy's sequences would do as well, at half a second for their import.
+    """
+    lower, upper = _bounds(file)
+    u = kronecker(first + count, 1 + len(lower))[first:]
+    y = lower + u[:, 1:] * (upper - lower)
+    if trajectory is None:
+        return DesignSamples(np.hstack([np.tile(q0, (count, 1)), y]), np.zeros(count), None)
+    q, n = travelled(file, trajectory), len(trajectory.q)
+    starts = [np.arange(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows]
+    k, share = np.divmod(u[:, 0] * sum(map(len, starts)) * (len(q) // n), 1.0)
+    start = np.add.outer(np.arange(0, len(q), n), np.concatenate(starts)).ravel()[k.astype(int)]
+    ends = np.concatenate([np.full(r.stop - r.start, r.stop - 1) for r in trajectory.rows])
+    end = start - start % n + np.minimum(start % n + 1, ends[start % n])
+    between = q[start] + share[:, None] * (q[end] - q[start])
+    return DesignSamples(np.hstack([between, y]), start % n + share * (end - start), trajectory)
 
 
 def at_random(
@@ -541,7 +595,8 @@ def at_random(
     q = q0[None] if trajectory is None else travelled(file, trajectory)
     rows = random.integers(0, len(q), count)
     x = np.hstack([q[rows], lower + share * (upper - lower)])
-    return DesignSamples(x, rows % (1 if trajectory is None else len(trajectory.q)), trajectory)
+    at = rows % (1 if trajectory is None else len(trajectory.q))
+    return DesignSamples(x, at.astype(np.float64), trajectory)
 
 
 def with_worse_designs(
@@ -599,14 +654,14 @@ def _bounds(file: CaseFile) -> tuple[Floats, Floats]:
     return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
 
-def corners(n: int) -> NDArray[np.bool_]:
+def corners(n: int, most: int = 16) -> NDArray[np.bool_]:
     """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
 
-    All of up to 16. Of more, columns 15, 14, … 1 of the Hadamard matrix of order 16, in which any
-    two of 15 parameters take all four combinations and any three of the first eight all eight; and
-    all parameters at their upper bounds.
+    All of up to ``most``, 16 or 64. Of more, columns 15, 14, … 1 of the Hadamard matrix of order
+    16, in which any two of 15 parameters take all four combinations and any three of the first
+    eight all eight; and all parameters at their upper bounds. With 64 likewise.
     """
-    if n <= 4:
+    if 2**n <= most:
         return np.asarray((np.arange(2**n)[:, None] >> np.arange(n)) % 2 == 1)
-    upper = hadamard(16)[:, 15 - np.arange(n) % 15] < 0
+    upper = hadamard(most)[:, most - 1 - np.arange(n) % (most - 1)] < 0
     return np.vstack([upper, np.ones((1, n), dtype=bool)])

@@ -34,6 +34,7 @@ from eigassign.facts import (
     percent,
     positive_percent,
 )
+from eigassign.modal.adaptive.order import MARGIN
 
 _DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
@@ -132,6 +133,15 @@ class ModeStudy(Brief):
     over_time: Comparison | None  # (n_t,) along the trajectory, at the initial design
     over_design: DesignMap | None  # at q0
     over_q: DesignMap | None = None  # at y0, over the range the trajectory travels
+    everywhere: Comparison | None = None  # between the samples and all over the bounds
+
+    @property
+    def stated(self) -> Mapping[str, float] | None:
+        """The errors of both expansions that are stated: the worst ``everywhere``, with margin."""
+        if (found := self.everywhere) is None:
+            return None
+        worst = {"taylor": found.worst_taylor, "linearised": found.worst_linearised}
+        return {name: MARGIN * error for name, error in worst.items()}
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
 def test_the_reasons_are_among_the_notes(tmp_path: Path) -> None:
     notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).results.notes
     assert any(note.startswith("2 elements: mode 1 at most") for note in notes)
-    assert any(note.startswith("order 2: error at most") for note in notes)
+    assert any(note.startswith("order 2: about") for note in notes)
 
 
 def test_a_looser_accuracy_takes_a_lower_order_and_a_coarser_mesh(tmp_path: Path) -> None:
@@ -89,7 +89,6 @@ def test_python_is_handed_all_of_several_points(tmp_path: Path) -> None:
     assert isinstance(result.linearised, NearestExpansion)
     np.testing.assert_allclose(result.expansion.frequencies(q, y)[:, 0], study.taylor_hz)
     np.testing.assert_allclose(result.linearised.frequencies(q, y)[:, 0], study.linearised_hz)
-    assert result.expansion.error_estimate(q, y).max() <= 0.01
     first = result.expansion.parts[0].frequencies(q, y)[:, 0]
     assert np.abs(first / study.exact_hz - 1.0).max() > 0.025
 

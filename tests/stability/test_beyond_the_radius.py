@@ -7,7 +7,7 @@ import pytest
 from stress import answered, case, judged
 
 from eigassign.errors import AccuracyError
-from eigassign.modal import cheapest, expand, expansions, radius_share, reduce_adaptively
+from eigassign.modal import expand, radius_share, raise_order, reduce_adaptively
 
 ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))
 Q = np.column_stack([np.zeros(61), ELBOW])
@@ -35,12 +35,12 @@ def test_the_coefficients_show_where_the_series_ends():
 
 def test_several_points_reach_over_it():
     model = case("wide_motion").model()
-    chosen = cheapest(expansions(model.pencil, X, 1e-3, (1, 2)), 1e-3)
+    chosen = raise_order(model.pencil, X, 1e-3, (1, 2))
     exact = model.frequencies(Q, [0.1], 2)
     assert np.abs(chosen.frequencies(Q, [0.1]) / exact - 1.0).max() <= 1e-3
     assert len(chosen.parts) > 1
     with pytest.raises(AccuracyError, match="at sample"):
-        cheapest(expansions(model.pencil, X, 1e-7, (1, 2), orders=(2,)), 1e-7)
+        raise_order(model.pencil, X, 1e-7, (1, 2), orders=(2,))
 
 
 def test_one_reduced_model_reaches_over_it():

@@ -28,7 +28,7 @@ def test_random_poses_are_samples_and_designs_in_the_box_half_of_them_corners(
     (low, high), full = scene.bounds, scene.expansions.full
     seen = at_random(scene.file, scene.trajectory, full.q0, full.y0, 200)
     assert scene.trajectory is not None
-    np.testing.assert_array_equal(seen.x[:, :2], scene.trajectory.q[seen.samples])
+    np.testing.assert_array_equal(seen.x[:, :2], scene.trajectory.q[seen.samples.astype(int)])
     y = seen.x[:, 2:]
     assert ((y >= low) & (y <= high)).all()
     at_a_corner = ((y == low) | (y == high)).all(axis=1)

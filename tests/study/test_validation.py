@@ -9,12 +9,15 @@ from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign.errors import CaseError
 from eigassign.study import (
+    BETWEEN,
     DESIGN_BOX,
     RANDOM_BOX,
     TRAJECTORY,
     box_points,
     random_q,
     reach_warnings,
+    study_modes,
+    unseen_points,
     validate_expansions,
 )
 
@@ -37,14 +40,33 @@ def test_the_trajectory_row_is_the_exact_comparison_at_the_initial_design(tmp_pa
     assert row.rms_linearised == pytest.approx(np.sqrt(np.mean(linear**2)), rel=1e-12)
 
 
-def test_the_default_box_in_q_is_what_the_elbow_travels(tmp_path: Path) -> None:
+def test_what_is_stated_is_the_worst_where_nothing_was_expanded_with_a_margin(
+    tmp_path: Path,
+) -> None:
     scene = scene_of(tmp_path, SHIPPED)
-    q = random_q(scene, random())
-    assert q is not None
-    assert q.shape == (200, 2)
-    elbow, travelled = q[:, 1] - q[:, 0], scene.path.q[:, 1] - scene.path.q[:, 0]
-    assert travelled.min() <= elbow.min() < elbow.max() <= travelled.max()
-    assert np.ptp(elbow) > 0.9 * np.ptp(travelled)
+    row, x = validate_expansions(scene)[-1], unseen_points(scene)
+    exact = scene.model.frequencies(x[:, :2], x[:, 2:], 1)
+    taylor = np.abs(scene.expansions.full.frequencies(x[:, :2], x[:, 2:]) / exact - 1.0)
+    assert (row.where, row.points) == (BETWEEN, len(x))
+    assert row.worst_taylor == pytest.approx(1.25 * taylor.max(), rel=1e-12)
+    (study,) = study_modes(scene).rows
+    assert study.stated == {"taylor": row.worst_taylor, "linearised": row.worst_linearised}
+
+
+def test_it_is_judged_at_corners_and_between_samples_all_over_the_bounds(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    (low, high), x = scene.bounds, unseen_points(scene)
+    q, y = x[:, :2], x[:, 2:]
+    corner = ((y == low) | (y == high)).all(axis=1)
+    assert len(np.unique(y[corner], axis=0)) == 4
+    assert (~corner).sum() >= 100
+    assert np.ptp(y[~corner], axis=0) == pytest.approx(high - low, rel=0.05)
+    sampled = {pose.tobytes() for pose in scene.path.q}
+    assert all(pose.tobytes() in sampled for pose in q[corner])
+    others = q[128 - len(q) :]
+    assert not any(pose.tobytes() in sampled for pose in others)
+    assert others.min() >= scene.path.q.min()
+    assert others.max() <= scene.path.q.max()
 
 
 def test_a_span_is_a_box_around_the_expansion_point(tmp_path: Path) -> None:
@@ -85,7 +107,7 @@ def test_a_tolerance_that_is_not_met_fails_only_its_rows(tmp_path: Path) -> None
     assert {row.where: row.passed for row in rows} == {
         TRAJECTORY: False,
         DESIGN_BOX: True,
-        RANDOM_BOX: True,
+        BETWEEN: False,
     }
 
 
@@ -100,7 +122,7 @@ def test_a_negative_eigenvalue_is_infinitely_wrong(tmp_path: Path) -> None:
 def test_every_expanded_mode_has_its_rows(tmp_path: Path) -> None:
     rows = validate_expansions(scene_of(tmp_path, changed(("modes: [1]", "modes: [1, 2]"))))
     assert [(row.where, row.mode) for row in rows] == [
-        (where, mode) for where in (TRAJECTORY, DESIGN_BOX, RANDOM_BOX) for mode in (1, 2)
+        (where, mode) for where in (TRAJECTORY, DESIGN_BOX, BETWEEN) for mode in (1, 2)
     ]
 
 
@@ -108,11 +130,11 @@ def test_without_a_design_only_the_poses_count(tmp_path: Path) -> None:
     start, end = SHIPPED.index("design:"), SHIPPED.index("expansion:")
     text = (SHIPPED[:start] + SHIPPED[end:]).replace("  y: [0.125, 0.125]", "  y: []")
     rows = validate_expansions(scene_of(tmp_path, text))
-    assert [row.where for row in rows] == [TRAJECTORY, RANDOM_BOX]
+    assert [row.where for row in rows] == [TRAJECTORY, BETWEEN]
     assert all(row.worst_taylor == pytest.approx(row.worst_linearised, rel=1e-6) for row in rows)
 
 
-def test_a_single_link_has_no_box_in_q(tmp_path: Path) -> None:
+def test_a_single_link_has_frequencies_that_no_pose_changes(tmp_path: Path) -> None:
     text = """
 title: Pendulum
 mechanism:
@@ -127,7 +149,7 @@ trajectory: {duration: 1 s, q: [[0], [0.5], [1]]}
 design: {m: {parameter: bodies.tip.mass, min: 0, max: 0.1}}
 """
     rows = validate_expansions(scene_of(tmp_path, text))
-    assert [row.where for row in rows] == [TRAJECTORY, DESIGN_BOX]
+    assert [row.where for row in rows] == [TRAJECTORY, DESIGN_BOX, BETWEEN]
     assert rows[0].worst_taylor < rows[1].worst_taylor  # the pose changes nothing, the mass does
 
 

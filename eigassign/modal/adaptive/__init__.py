@@ -6,5 +6,5 @@ Reading order:
     mesh            elements of each link, judged by what their mesh leaves out
     link_reduction  the frequency up to which links keep their fixed-interface modes
     reduced_model   the smallest reduced model that meets an accuracy
-    order           order and expansion points of the Taylor polynomial, judged by its estimate
+    order           order and expansion points of the Taylor polynomial, judged by exact solves
 """

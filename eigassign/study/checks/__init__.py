@@ -2,5 +2,6 @@
 
 Reading order:
 
+    expansions   how far both expansions are off, by exact solves between the samples
     slow_motion  what the motion itself changes, which the frequencies of still poses do not contain
 """

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import monotonic
 
 import numpy as np
@@ -42,8 +42,7 @@ LOST = (
 )
 DRAWS = 10_000  # random deviations
 AT = 6  # samples at which they are solved
-ESTIMATED = 64  # of the draws, for which the reduced model's error is estimated; of followed modes
-#                 as many are drawn
+AT_ONCE = 64  # of the draws, solved together; of followed modes so many are drawn
 
 
 @dataclass(frozen=True)
@@ -139,7 +138,7 @@ class _Deviations:
         own = found.variant.problem.measure(found.best.seen.residual)
         self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
-        self.draws = ESTIMATED if self.task.followers else DRAWS
+        self.draws = AT_ONCE if self.task.followers else DRAWS
 
     def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
         """What is missed where rows have some values, and the slopes of that in these."""
@@ -213,38 +212,50 @@ class _Deviations:
         """The worst of random deviations by name, and the error of the frequencies, relative.
 
         At those samples where what is asked of frequencies has least room; of followed modes, which
-        are followed all along, at all samples.
+        are followed all along, at all samples. Where a reduced model names the worst, these are
+        solved exactly, which says how far it is off.
         """
-        scene, path, n, count = self.scene, self.scene.path, self.draws, self.asked.modes
+        scene, path, count = self.scene, self.scene.path, self.asked.modes
         least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
         at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
-        drawn = np.random.default_rng(0).uniform(self.lower, self.upper, (n, len(self.y)))
-        reduced = None if scene.model.pencil.is_dense else reduced_about(scene, self.y, count)
-        found: dict[str, float] = {}
-        error = 0.0
-        for k in range(0, n if len(at) else 0, ESTIMATED):
-            designs = drawn[k : k + ESTIMATED]
+        drawn = np.random.default_rng(0).uniform(self.lower, self.upper, (self.draws, len(self.y)))
+        exact = partial(scene.model.frequencies, count=count)
+
+        def solved(designs: Floats, answer: Callable[[Floats, Floats], Floats]) -> Floats:
+            """(n, n_t, count) in Hz; not a number elsewhere than at those samples."""
             if self.task.followers:
-                hz = np.array([self.response(y).hz for y in designs])
-            else:
-                follows = path.follows_design
-                q = np.array([(path.at(y)[0] if follows else path.q)[at] for y in designs])
-                x = q.reshape(-1, q.shape[2]), np.repeat(designs, len(at), axis=0)
-                few = scene.model.frequencies(*x, count) if reduced is None else (
-                    reduced.frequencies(*x)
-                )  # fmt: skip
-                if reduced is not None and k == 0:
-                    error = float(reduced.error_estimate(*x).max())
-                hz = np.full((len(designs), len(path.q), count), np.nan)
-                hz[:, at] = few.reshape(len(designs), len(at), count)
-            for rows in self.edges:
-                of = rows.of
-                if of.mode_terms:
-                    own = (c * hz[:, of.rows, m - 1 if m > 0 else m] for m, c in of.mode_terms)
-                    missed, _ = self.missed(rows, rows.scale * (sum(own) - rows.edge))
-                    most = float(np.nanmax(missed, initial=0.0))
-                    found[of.name] = max(found.get(of.name, 0.0), most)
-        return found, error
+                return np.array([self.response(y).hz for y in designs])
+            q = np.array([(path.at(y)[0] if path.follows_design else path.q)[at] for y in designs])
+            few = answer(q.reshape(-1, q.shape[2]), np.repeat(designs, len(at), axis=0))
+            hz = np.full((len(designs), len(path.q), count), np.nan)
+            hz[:, at] = few.reshape(len(designs), len(at), count)
+            return hz
+
+        large = not scene.model.pencil.is_dense and not self.task.followers
+        answer = reduced_about(scene, self.y, count).frequencies if large else exact
+        found, designs = dict[str, float](), dict[str, Floats]()
+        for k in range(0, self.draws if len(at) else 0, AT_ONCE):
+            some = drawn[k : k + AT_ONCE]
+            for name, missed in self._missed_by(solved(some, answer)):
+                each = np.nanmax(missed, axis=1, initial=0.0)
+                if each.max() >= found.get(name, 0.0):
+                    found[name], designs[name] = float(each.max()), some[each.argmax()]
+        if not large or not designs:
+            return found, 0.0
+        few = np.array([*designs.values()])
+        true = solved(few, exact)
+        for name, missed in self._missed_by(true):
+            k = [*designs].index(name)
+            found[name] = float(np.nanmax(missed[k], initial=0.0))
+        return found, float(np.nanmax(np.abs(solved(few, answer) / true - 1.0)))
+
+    def _missed_by(self, hz: Floats) -> Iterator[tuple[str, Floats]]:
+        """Yield what designs miss of each edge, (n, rows), by frequencies hz (n, n_t, count)."""
+        for rows in self.edges:
+            of = rows.of
+            if of.mode_terms:
+                own = (c * hz[:, of.rows, m - 1 if m > 0 else m] for m, c in of.mode_terms)
+                yield of.name, self.missed(rows, rows.scale * (sum(own) - rows.edge))[0]
 
     def rows(
         self,

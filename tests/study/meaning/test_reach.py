@@ -11,7 +11,6 @@ from scenes import changed, scene_of
 
 from eigassign import load_case
 from eigassign.assignment import requirements_of
-from eigassign.errors import AccuracyError
 from eigassign.pipeline import Options, solve_case
 from eigassign.study import (
     Scene,
@@ -142,19 +141,13 @@ def test_other_tolerances_are_drawn_beside_the_corners_of_the_masses(tmp_path: P
 
 def test_ranges_of_a_reduced_model_hold_the_exact_frequencies(tmp_path: Path) -> None:
     scene, y = scene_of(tmp_path, changed(SHORT)), np.array([0.2, 0.1])
-    ranges = reduced_ranges(scene, y, 3)
-    for design in (y, y * 1.05):
+    ranges = reduced_ranges(scene, y, 3, np.array([y, 1.05 * y]))
+    for design in (y, y * 1.02, y * 1.05):
         low, high = (end.hz for end in ranges(design))
         exact = scene.exact(design)[:, :3]
         assert np.all(low <= exact * (1.0 + 1e-12))
         assert np.all(exact * (1.0 - 1e-12) <= high)
         assert np.all(high / low - 1.0 < 1e-3)
-
-
-def test_a_reduced_model_that_doubts_itself_bounds_nothing(tmp_path: Path) -> None:
-    ranges = reduced_ranges(scene_of(tmp_path, changed(SHORT, SECTION)), np.array([0.2, 7e-4]), 3)
-    with pytest.raises(AccuracyError, match="too wide for the reduced model that judges them"):
-        ranges(np.array([0.2, 1e-6]))  # m²: a rod that is soft in tension
 
 
 def test_without_tolerances_there_is_nothing_to_say(tmp_path: Path) -> None:
