@@ -128,7 +128,7 @@ def scipy_search(kind: type[Timed], case: ea.Case) -> dict[str, Any]:
 
 
 class FirstSolve:
-    """When the first exact solve was asked for, and of which design: all before is reduced."""
+    """When a design was first solved at all samples, and which: reduced models led there."""
 
     def __init__(self) -> None:
         self.begun = time.process_time()
@@ -140,7 +140,8 @@ class FirstSolve:
         def noted(response: DesignResponse, y: np.ndarray) -> Any:
             seconds, before = time.process_time() - self.begun, response.exact_solves
             found = solve(response, y)
-            if response.exact_solves > before and not len(self.y):
+            every = response.exact_solves - before >= len(response.path.q)
+            if every and not len(self.y):
                 self.seconds, self.y = seconds, y.copy()
             return found
 

@@ -73,7 +73,7 @@ def _library(what: str, path: Path) -> None:
         ea.expand(model, q0, y0, (1,), 4).frequencies(q, y0)
     else:
         reduced = ea.reduce(model, q0, y0, (1,), 2)
-        reduced.frequencies(q, y0), reduced.error_estimate(q, y0)
+        reduced.frequencies(q, y0)
 
 
 def one(what: str, path: Path) -> list[Profile]:
@@ -121,7 +121,7 @@ def main() -> None:
             "largest function: of ours, with most time outside linear algebra, imports and what"
             " libraries read, draw or write for us; wanted: none over 20 %",
             "output: laying out and drawing figures, the report, files, the cache",
-            "expand and reduce: from the case file on, with frequencies (and error estimates) along"
+            "expand and reduce: from the case file on, with frequencies along"
             " the trajectory; optimize: the whole command in this process",
         ],
     )

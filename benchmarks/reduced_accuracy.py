@@ -12,7 +12,6 @@ import common  # first: settles the threads
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal import reduce
 
 SAMPLES = 2_000
 
@@ -38,8 +37,7 @@ def main() -> None:
         ),
     }
     models = {
-        "reduced, mode 1 alone, m = 2": reduce(model.pencil, q0, y0, (1,), 2, guard=False),
-        "reduced, mode 1, m = 2 (guarded)": ea.reduce(model, q0, y0, (1,), 2),
+        "reduced, mode 1, m = 2": ea.reduce(model, q0, y0, (1,), 2),
         "reduced, modes 1-3, m = 2": ea.reduce(model, q0, y0, (1, 2, 3), 2),
         "polynomial, order 4": ea.expand(model, q0, y0, (1,), 4),
         "polynomial, order 5": ea.expand(model, q0, y0, (1,), 5, vector_order=2),

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 
 from eigassign.errors import EigassignError, UsageError
 from eigassign.modal import expansion as modal_expansion
+from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model, as_model
-from eigassign.modal.reduced import compression
-from eigassign.modal.reduced import reduce as modal_reduced
-from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced import ReducedModel
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
@@ -115,9 +114,9 @@ def expand(
     q0 (n_q,) in rad or m, y0 (n_y,) in SI units; ``modes`` counts elastic modes from 1.
     ``linear_in_y`` keeps the terms of at most first order in y, eq. (9); ``space`` chooses the set
     of γ itself; ``vector_order`` is how far the eigenvectors are expanded (what λ needs if None).
-    ``.frequencies(q, y)`` (n, n_modes) are in Hz, ``.error_estimate(q, y)`` is relative, and
-    ``.indices``, ``.coefficients`` are γ and λ_γ in rad²/s². Raises UsageError for wrong shapes,
-    orders and modes.
+    ``.frequencies(q, y)`` (n, n_modes) are in Hz, ``.indices``, ``.coefficients`` are γ and λ_γ in
+    rad²/s², ``.last_degree_share(q, y)`` is a guide to the error; ``model.frequencies`` at a few
+    places measures it. Raises UsageError for wrong shapes, orders and modes.
     """
     return modal_expansion.expand(
         as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order
@@ -130,23 +129,17 @@ def reduce(
     y0: ArrayLike,
     modes: Sequence[int] = (1,),
     half_order: int = 2,
-    span: tuple[ArrayLike, ArrayLike] | None = None,
-    accuracy: float = compression.ACCURACY,
 ) -> ReducedModel:
-    """Reduced model on the Taylor vectors at one or several expansion points, with its own error.
+    """Reduced model on the Taylor vectors at one or several expansion points.
 
         K̂(q, y) = Vᵀ K(q, y) V,  M̂ likewise,  V = [φ_γ : |γ| ≤ ``half_order``]
 
     q0 (n_q,) or (n_points, n_q) in rad or m, y0 likewise in SI units; ``modes`` counts elastic
-    modes from 1. ``span``, half-widths of q (n_q,) and y (n_y,) about the points, makes it as small
-    as changes no frequency in there by more than ``accuracy`` (relative). ``.frequencies(q, y)``
-    (n, n_modes) are in Hz, ``.error_estimate(q, y)`` is relative and infinite where the model does
-    not vouch for the mode. Raises UsageError for impossible arguments, AccuracyError where no basis
-    can be made.
+    modes from 1. ``.frequencies(q, y)`` (n, n_modes) are in Hz; how far they are off only
+    ``model.frequencies`` at a few places says. Raises UsageError for impossible arguments,
+    AccuracyError where no basis can be made.
     """
-    return modal_reduced.reduce(
-        as_model(model).pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
-    )
+    return modal_reduced.reduce(as_model(model).pencil, q0, y0, modes, half_order)
 
 
 def assign(case: Case) -> Result:

@@ -21,7 +21,7 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.model import Model
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal.reduced import reduce
 from eigassign.modal.surrogate import Surrogate
 from eigassign.study.pictures.drawing import spread_samples
 from eigassign.study.planning import choose_order
@@ -166,25 +166,19 @@ def _expanded(bench: Bench, told: Mapping[str, Any], inverse: bool) -> Built:
 
 
 def _reduced_models(bench: Bench) -> Iterator[Method]:
-    """Reduced models of each half order m at one or several points; at one without guards too."""
-    kinds = [*((count, True) for count in bench.effort.expansion_points), (1, False)]
-    for (count, guard), m in product(kinds, bench.effort.half_orders):
+    """Reduced models of each half order m at one or several points."""
+    for count, m in product(bench.effort.expansion_points, bench.effort.half_orders):
         q, y, where = _about(bench, count)
-        name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
         use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
-        if not guard:
-            name, family = f"{name}, no guard", "reduced, no guard"
-            inner = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
-            use = _call(bench, inner, "model.pencil, q0, y0", half_order=m, guard=False)
-        told = {"half_order": m, "guard": guard, "q": q, "y": y}
-        yield Method(name, family, told, partial(_reduced, bench, told), use)
+        told = {"half_order": m, "q": q, "y": y}
+        build = partial(_reduced, bench, told)
+        yield Method(f"reduced m = {m}, {where}", f"reduced, {where}", told, build, use)
 
 
 def _reduced(bench: Bench, told: Mapping[str, Any]) -> Built:
     """A reduced model about one or several points."""
     pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
-    m, guard = told["half_order"], told["guard"]
-    reduced = reduce(pencil, told["q"], told["y"], modes, m, guard)
+    reduced = reduce(pencil, told["q"], told["y"], modes, told["half_order"])
     # for modes, wanted vectors, and vectors of guards
     others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
-    return _answering(reduced, (3 if guard and others and m >= 2 else 2) * len(told["q"]))
+    return _answering(reduced, (3 if others and told["half_order"] >= 2 else 2) * len(told["q"]))

@@ -8,8 +8,8 @@ In reading order:
     slopes       slopes of exact eigenvalues in coordinates and design
     projection   the pencil's terms projected on a basis
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
-    reduced      Ritz on the Taylor vectors, with an error estimate
-    expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9)), judged by a reduced model
+    reduced      Ritz on the Taylor vectors
+    expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9))
     storage      expansions as plain arrays
     truncation   what the reduction of links leaves out, bounded
     discretisation  what a mesh leaves out, bounded
@@ -28,7 +28,6 @@ __all__, __getattr__, __dir__ = face(
         "adaptive.cheapest": "cheapest",
         "adaptive.mesh": "meshes",
         "adaptive.order": "MARGIN raise_order",
-        "adaptive.reduced_model": "reduce_adaptively",
         "discretisation": "discretisation_error",
         "exact.clusters": "clusters",
         "exact.following": "FollowedShape ModesAtPoint MoreModesError follow places",
@@ -38,16 +37,10 @@ __all__, __getattr__, __dir__ = face(
         "exact.sparse": "solve_sparse",
         "exact.substructure": "Inner proved solve_large solve_together",
         "exact.tracking": "overlaps track",
-        "expansion": ("Expansion NearestExpansion companion_order expand radius_share"),
+        "expansion": "Expansion NearestExpansion expand radius_share",
         "model": "Model",
         "projection": "project project_at project_terms",
-        "reduced.added_mass": "added_mass",
-        "reduced.basis": "ritz_basis",
-        "reduced.error_estimate": "error_beside frequency_error largest_outside mode_missing",
-        "reduced.model": "ReducedModel",
-        "reduced.pencil": "ritz_pairs",
-        "reduced.reduce": "reduce",
-        "reduced.residual": "half_solve residual_gram residual_terms",
+        "reduced": "ReducedModel reduce ritz_pairs",
         "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "statics": "Flexibility compliances sags",

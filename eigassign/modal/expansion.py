@@ -4,9 +4,7 @@ The expansion is carried out in local variables w: the relative joint coordinate
 parameters on which anything depends, with w = V (x − x0). A coordinate that nothing depends on is
 dropped by construction; coefficients over (q, y) follow by substituting V (x − x0).
 
-Error estimate: with f̂ of the reduced model on the same Taylor vectors and its own estimate e,
-
-    |f_T/f − 1| ≤ |f_T/f̂ − 1| (1 + e) + e .
+How far off it is only exact solves say; `last_degree_share` is a guide.
 """
 
 from __future__ import annotations
@@ -14,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +21,6 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
 from eigassign.modal.exact.clusters import CLUSTER_GAP
-from eigassign.modal.reduced.error_estimate import error_beside
-from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.taylor.local_coordinates import (
     LocalSpace,
     local_space,
@@ -34,13 +28,12 @@ from eigassign.modal.taylor.local_coordinates import (
     vector_set,
 )
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
-from eigassign.modal.taylor.vectors import as_columns, taylor_vectors
+from eigassign.modal.taylor.vectors import taylor_vectors
 from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import Polynomials, monomials, polynomials, reciprocal
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
-MOST_VECTORS = 150  # Taylor vectors of one mode in the reduced model beside an expansion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,9 +53,9 @@ class Expansion:
 
     ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s², with ∂λ/∂x
     ``slopes(q, y)``; ``indices`` γ (N, n_q + n_y), ``coefficients`` λ_γ (n_modes, N);
-    ``error_estimate(q, y)`` relative in Hz, without an exact solve; ``linear_in_design(q)`` is
-    eq. (9), ``inverse`` the same with the series of 1/λ. Neighbouring modes are expanded together,
-    as the matrices of ``clusters``.
+    ``last_degree_share(q, y)`` is a guide to the error; ``linear_in_design(q)`` is eq. (9),
+    ``inverse`` the same with the series of 1/λ. Neighbouring modes are expanded together, as the
+    matrices of ``clusters``.
     """
 
     modes: tuple[int, ...]
@@ -74,7 +67,6 @@ class Expansion:
     n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
     vector_space: LowerSet
     notes: tuple[str, ...]
-    pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
     inverted: bool = False  # the coefficients are those of 1/λ
 
     def __repr__(self) -> str:
@@ -112,33 +104,20 @@ class Expansion:
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(self.eigenvalues(q, y)) / (2.0 * np.pi))
 
-    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """Estimate of the relative error of ``frequencies``, (n_samples, n_modes); no exact solve.
+    def last_degree_share(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """‖terms of the last degree‖ / 2λ (n_samples, n_modes): a guide to the error in frequency.
 
-        Measured against a reduced model on the same Taylor vectors, made at the first call.
-        Infinite where λ < 0, or where not even the reduced model vouches for the mode.
+        It costs as much as the frequencies. Beyond the radius of convergence, beside a mode that
+        crosses, and in a symmetric pose, where every other degree vanishes, it says too little.
         """
-        f = self.frequencies(q, y)
-        beside = self.reduced
-        return error_beside(f, beside.frequencies(q, y), beside.error_estimate(q, y))
-
-    @cached_property
-    def reduced(self) -> ReducedModel:
-        """The reduced model on these Taylor vectors; UsageError without the pencil.
-
-        Vectors to second order at least, to first order in very many variables.
-        """
-        if self.pencil is None:
-            raise UsageError(
-                "this expansion was read from arrays without its model: no error estimate"
-            )
-        space = self.vector_space
-        order = companion_order(space.n_variables, space.order)
-        keep = space.degrees <= order
-        given = None
-        if keep.sum() == comb(space.n_variables + order, order):
-            given = as_columns([c.vectors[keep] for c in self.clusters])
-        return reduce(self.pencil, self.q0, self.y0, self.modes, order, given=given)
+        w, last = self.local(q, y), slice(self.space.degree_starts[self.order], None)
+        powers = monomials(self.space, w)[:, last]
+        sizes = [
+            np.repeat(_sizes(c, powers, last)[:, None], len(set(c.modes) & set(self.modes)), axis=1)
+            for c in self.clusters
+        ]
+        lam = self.eigenvalues(q, y)
+        return np.hstack(sizes) / (2.0 * np.abs(1.0 / lam if self.inverted else lam))
 
     @cached_property
     def inverse(self) -> Expansion:
@@ -288,7 +267,6 @@ def expand(
         n_linear=local.n_linear,
         vector_space=half,
         notes=_notes(groups, local, pencil),
-        pencil=pencil,
     )
 
 
@@ -311,16 +289,6 @@ def _frozen(a: Floats) -> Floats:
     a = np.ascontiguousarray(a)
     a.setflags(write=False)
     return a
-
-
-# --- The reduced model beside an expansion
-
-
-def companion_order(n_variables: int, known: int) -> int:
-    """Order m of the vectors: as known, but 2 at least and no more vectors than MOST_VECTORS."""
-    orders = range(max(known, 2), 1, -1)
-    fitting = [m for m in orders if comb(n_variables + m, m) <= MOST_VECTORS]
-    return fitting[0] if fitting else 1
 
 
 # --- How far the series reaches: its radius of convergence, seen from the coefficients
@@ -346,12 +314,17 @@ def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     for cluster in expansion.clusters:
         size = []  # ‖t_k(w)‖ of the cluster's matrix for k = p, p − 1, p − 2, p − 3
         for here in (slice(starts[k], starts[k + 1]) for k in range(p, p - 4, -1)):
-            term = np.tensordot(powers[:, here], cluster.coefficients[:, :, here], axes=(1, 2))
-            size.append(np.linalg.norm(term, axis=(1, 2)))
+            size.append(_sizes(cluster, powers[:, here], here))
         late, early = size[0] + size[1], size[2] + size[3]
         tiny = np.finfo(float).eps * np.abs(cluster.coefficients[:, :, 0]).max()
         shares.append(np.sqrt(np.maximum(late - tiny, 0.0) / np.maximum(early, tiny)))
     return np.column_stack(shares)
+
+
+def _sizes(cluster: Cluster, powers: Floats, here: slice) -> Floats:
+    """‖Σ Λ_γ w^γ‖ (n,) of some members γ of the set, from their w^γ (n, N)."""
+    term = np.tensordot(powers, cluster.coefficients[:, :, here], axes=(1, 2))
+    return np.asarray(np.linalg.norm(term, axis=(1, 2)))
 
 
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one
@@ -390,9 +363,9 @@ class NearestExpansion:
         """f (n_samples, n_modes) in Hz; see `Expansion.frequencies`."""
         return self.pick(q, [part.frequencies(q, y) for part in self.parts])
 
-    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """Relative error (n_samples, n_modes); see `Expansion.error_estimate`."""
-        return self.pick(q, [part.error_estimate(q, y) for part in self.parts])
+    def last_degree_share(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """(n_samples, n_modes), a guide; see `Expansion.last_degree_share`."""
+        return self.pick(q, [part.last_degree_share(q, y) for part in self.parts])
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 and l of eq. (9); see `Expansion.linear_in_design`."""

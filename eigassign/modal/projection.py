@@ -26,14 +26,10 @@ class ProjectedTerms:
     values: Floats
 
 
-def project(pencil: Pencil, basis: Floats, left: Floats | None = None) -> tuple[Floats, Floats]:
-    """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k).
-
-    With ``left`` (n_dof, j) those on it from the left, (n_theta, j, k).
-    """
-    rows = (basis if left is None else left).T
-    out = np.zeros((2, pencil.n_theta, len(rows), basis.shape[1]))
-    for part in project_terms(pencil, rows, basis.T, np.arange(pencil.n_theta)):
+def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
+    """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
+    out = np.zeros((2, pencil.n_theta, basis.shape[1], basis.shape[1]))
+    for part in project_terms(pencil, basis.T, basis.T, np.arange(pencil.n_theta)):
         out[part.matrices, part.terms] = part.values
     return out[0], out[1]
 
@@ -70,13 +66,6 @@ def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
         for i in range(0, len(V), CHUNK):
             square += V[i : i + CHUNK].T @ (matrix[i : i + CHUNK] @ V)
     return out
-
-
-def entries(pencil: Pencil, terms: sparse.csc_array, term: int) -> tuple[Ints, Ints, Floats]:
-    """Rows, columns and values of the non-zeros of one of the ``terms`` of K or of M."""
-    at = slice(terms.indptr[term], terms.indptr[term + 1])
-    places = terms.indices[at]
-    return pencil.rows[places], pencil.columns[places], terms.data[at]
 
 
 def _project(

@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 class Surrogate(Protocol):
-    """Frequencies of ``modes`` without an exact solve, and how far they are off.
+    """Frequencies of ``modes`` without an exact solve.
 
     Series of λ or of 1/λ, in full or linearised, about one point or several (`expansion`), and
     reduced models (`reduced`). Exact solves (`model`) answer in the same words, but the lowest
@@ -27,6 +27,3 @@ class Surrogate(Protocol):
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n, n_modes) in rad²/s² and ∂λ/∂x (n, n_modes, n_x), x = (q, y)."""
-
-    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """The relative error of ``frequencies``, (n, n_modes); infinite where it is refused."""

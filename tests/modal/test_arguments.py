@@ -108,9 +108,8 @@ def test_samples_that_are_none_are_refused(model, wrong, words):
         model.tracked,
         series.frequencies,
         series.eigenvalues,
-        series.error_estimate,
+        series.last_degree_share,
         reduced.frequencies,
-        reduced.error_estimate,
         lambda q, y: expand(model, q, y),
         lambda q, y: reduce(model, q, y),
     ):
@@ -130,7 +129,7 @@ def test_an_expansion_has_one_point(model):
 def test_no_samples_have_no_frequencies(model):
     none = np.zeros((0, 2))
     reduced = reduce(model, Q0, Y0, half_order=1)
-    for ask in (model.frequencies, reduced.frequencies, reduced.error_estimate):
+    for ask in (model.frequencies, reduced.frequencies):
         assert len(ask(none, Y0)) == 0
 
 

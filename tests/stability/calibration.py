@@ -1,16 +1,14 @@
-"""Random (mechanism, q, y): what an error estimate says beside the true error."""
+"""Random planar mechanisms, each with a design box and poses around one point."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from chains import Tree, model_of, random_chain
 
-from eigassign.errors import EigassignError, MechanismError
-from eigassign.modal import Model, rounding_error
+from eigassign.errors import MechanismError
+from eigassign.modal import Model
 
 SPAN = np.pi / 3.0  # rad: q is drawn within this of q0, coordinate by coordinate
 Floats = np.ndarray
@@ -28,39 +26,6 @@ class Drawn:
     y: Floats
     modes: tuple[int, ...]
     half_order: int
-
-
-@dataclass(frozen=True)
-class Tally:
-    """Estimates and true relative errors in Hz, with the floor that rounding sets, all flat."""
-
-    estimate: Floats
-    error: Floats
-    floor: Floats
-    seeds: Floats
-    half_orders: Floats
-
-    @property
-    def refused(self) -> Floats:
-        return ~np.isfinite(self.estimate)
-
-    @property
-    def covered(self) -> float:
-        """Share of the answers given whose estimate is not below the error."""
-        given = ~self.refused
-        return float((self.estimate >= self.error)[given].mean())
-
-    @property
-    def above_rounding(self) -> Floats:
-        """Which of the answers given err by more than ten times the round-off of an exact solve."""
-        given = ~self.refused
-        return self.error[given] > 10.0 * self.floor[given]
-
-    @property
-    def overestimate(self) -> Floats:
-        """estimate / max(error, floor) of the answers given."""
-        given = ~self.refused
-        return self.estimate[given] / np.maximum(self.error, self.floor)[given]
 
 
 def draw(seed: int, samples: int) -> Drawn | None:
@@ -123,36 +88,3 @@ def _candidates(tree: Tree) -> list[tuple[str, float]]:
         if isinstance(c["drive"], dict):
             found.append((f"coordinates.{n}.drive.stiffness", c["drive"]["stiffness"]))
     return found
-
-
-def tally(
-    seeds: range,
-    samples: int,
-    judge: Callable[[Drawn], tuple[Floats, Floats]],
-    draw: Callable[[int, int], Drawn | None] = draw,
-) -> Tally:
-    """``judge`` gives frequencies and estimates (samples, n_modes) of one drawn mechanism."""
-    parts: list[list[Any]] = []
-    for seed in seeds:
-        drawn = draw(seed, samples)
-        if drawn is not None and len(drawn.q):
-            part = _judged(drawn, judge)
-            if part is not None:
-                parts.append(part)
-    return Tally(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _judged(drawn: Drawn, judge: Callable[[Drawn], tuple[Floats, Floats]]) -> list[Any] | None:
-    pick = np.array(drawn.modes) - 1
-    try:
-        exact = drawn.model.frequencies(drawn.q, drawn.y, max(drawn.modes))[:, pick]
-    except EigassignError:
-        return None
-    f, estimate = judge(drawn)
-    x = drawn.model.x(drawn.q, drawn.y)
-    floor = [rounding_error(drawn.model.pencil, row, max(drawn.modes)) for row in x]
-    floor = np.broadcast_to(np.array(floor)[:, None], f.shape)
-    error = np.abs(f / exact - 1.0)
-    seeds = np.full(f.shape, drawn.seed)
-    half_orders = np.full(f.shape, drawn.half_order)
-    return [a.ravel() for a in (estimate, error, floor, seeds, half_orders)]

@@ -1,9 +1,9 @@
-"""First derivatives of one mode only: over 100 % wrong on the paper's arm, and never believed."""
+"""The modes of one pose alone: tens of percent wrong on the paper's arm, which is measured."""
 
 from __future__ import annotations
 
 import numpy as np
-from stress import answered, judged
+from stress import judged, stated
 
 from eigassign import load_case
 from eigassign.modal import reduce
@@ -11,16 +11,13 @@ from eigassign.modal import reduce
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
 
 
-def test_where_the_error_exceeds_100_percent_the_answer_is_refused():
+def test_without_derivatives_the_basis_loses_a_mode_and_that_is_measured():
     model = load_case("cases/two_link.yaml").model()
-    reduced = reduce(model.pencil, Q0, Y0, (1,), 1, guard=False)
+    reduced = reduce(model.pencil, Q0, Y0, (1,), 0)
     q = np.array(Q0) + np.column_stack([np.zeros(61), np.linspace(-1.05, 1.05, 61)])
-    exact = model.frequencies(q, [0.0, 0.0], 1)
-    error = np.abs(reduced.frequencies(q, [0.0, 0.0]) / exact - 1.0)
-    assert error.max() > 1.0
-    believed = judged(model, reduced, q, [0.0, 0.0])
-    assert np.nanmax(believed) < 0.05
-    assert answered(reduced, q, [0.0, 0.0]) < 0.5
+    error = judged(model, reduced, q, [0.0, 0.0])
+    assert error.max() > 0.1
+    assert stated(model, reduced, q, [0.0, 0.0])[0] >= error.max()
 
 
 def test_second_derivatives_answer_everywhere():
@@ -28,4 +25,3 @@ def test_second_derivatives_answer_everywhere():
     model, q = case.model(), case.trajectory.q
     reduced = reduce(model.pencil, Q0, Y0, (1,), 2)
     assert judged(model, reduced, q, [0.0, 0.0]).max() < 1e-9
-    assert answered(reduced, q, [0.0, 0.0]) == 1.0

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from chains import model_of, two_link
-from stress import judged
+from stress import judged, stated
 
 from eigassign.modal import expand
 
@@ -38,6 +38,5 @@ def test_far_away_a_high_order_is_wild_and_says_so():
     model = model_of(two_link())
     expansion = expand(model.pencil, Q0, Y0, (1,), order=20)
     q = Q0 + np.column_stack([np.zeros(41), np.linspace(-1.5, 1.5, 41)])
-    error = judged(model, expansion, q, [0.0, 0.0])
-    refused = np.isnan(error)
-    assert refused.any() or np.nanmax(error) > 1.0
+    assert judged(model, expansion, q, [0.0, 0.0]).max() > 1.0
+    assert stated(model, expansion, q, [0.0, 0.0])[0] > 1.0

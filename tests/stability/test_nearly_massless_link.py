@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from chains import bar, model_of
-from stress import answered, case, judged
+from stress import case, judged
 
 from eigassign.errors import MechanismError
 from eigassign.modal import expand, reduce
@@ -20,7 +20,6 @@ def test_expansion_and_reduced_model_know_their_errors():
     reduced = reduce(model.pencil, POSE, [20.0], (1, 2), 2)
     judged(model, expansion, POSE, M)
     assert judged(model, reduced, POSE, M).max() < 1e-7
-    assert answered(reduced, POSE, M) == 1.0
 
 
 def test_a_cantilever_of_almost_no_mass_is_a_spring_with_a_mass():
@@ -44,4 +43,4 @@ def test_more_modes_than_have_mass_are_refused_by_name():
     assert model.frequencies([], [], 2).shape == (1, 2)
     with pytest.raises(MechanismError, match="only 2 modes whose mass is more"):
         model.frequencies([], [], 3)
-    assert reduce(model.pencil, [], [], (1,)).error_estimate([], [])[0, 0] < 1e-10
+    assert judged(model, reduce(model.pencil, [], [], (1,)), [], []).max() < 1e-10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from stress import answered, case, judged
+from stress import case, judged
 
 from eigassign.modal import expand, reduce
 
@@ -15,14 +15,12 @@ def test_the_four_are_found_together_and_stay_together():
     expansion = expand(model.pencil, [], [0.01], (1,), order=8)
     assert [c.modes for c in expansion.clusters] == [(1, 2, 3, 4)]
     assert judged(model, expansion, [], D).max() < 1e-9
-    assert answered(expansion, [], D) == 1.0
 
 
 def test_the_reduced_model_has_all_four():
     model = case("repeated_modes").model()
     reduced = reduce(model.pencil, [], [0.01], (1, 2, 3, 4, 5), 1)
     assert judged(model, reduced, [], D).max() < 1e-9
-    assert answered(reduced, [], D) == 1.0
     f = reduced.frequencies([], D)
     np.testing.assert_allclose(f[:, 1:4], f[:, :1] * np.ones(3), rtol=1e-10)
 

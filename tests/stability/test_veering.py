@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from chains import model_of
-from stress import answered, case, judged
+from stress import case, judged
 
 from eigassign.modal import Model, expand, reduce
 
@@ -77,7 +77,6 @@ def test_both_modes_as_a_cluster_are_right_across_it(gap):
     expansion = expand(model.pencil, [], [E0], (1, 2), order=8, cluster_gap=together)
     assert [c.modes for c in expansion.clusters] == [(1, 2)]
     assert judged(model, expansion, [], E).max() < 1e-8
-    assert answered(expansion, [], E) == 1.0
 
 
 @pytest.mark.parametrize("gap", GAPS)
@@ -86,7 +85,6 @@ def test_the_reduced_model_is_right_across_it(gap):
     E = np.linspace(6e10, 8e10, 41)[:, None]
     reduced = reduce(model.pencil, [], [6.7e10], (1, 2), 3)
     assert judged(model, reduced, [], E).max() < 1e-8
-    assert answered(reduced, [], E) == 1.0
 
 
 def test_the_shipped_case_veers_by_a_tenth_of_a_percent():

@@ -130,9 +130,7 @@ def test_sparse_algebra_gives_what_dense_algebra_gives(name: str) -> None:
 
 
 @in_every_case
-def test_the_estimates_cover_the_error_along_the_trajectory_and_over_the_design_box(
-    name: str,
-) -> None:
+def test_a_reduced_model_answers_along_the_trajectory_and_over_the_design_box(name: str) -> None:
     s = scene(name)
     rng = np.random.default_rng(1)
     q = s.case.trajectory.q
@@ -143,16 +141,7 @@ def test_the_estimates_cover_the_error_along_the_trajectory_and_over_the_design_
     y = rng.uniform(low, high, (len(q), len(low)))[:, s.pencil.n_q :]
     exact = s.model.frequencies(q, y, 1)
     reduced = reduce(s.model, points, np.tile(y0, (3, 1)), (1,), 2)
-    for approximation in (reduced, s.expand(3)):
-        error = np.abs(approximation.frequencies(q, y) / exact - 1.0)
-        estimate = approximation.error_estimate(q, y)
-        assert (estimate >= np.nan_to_num(error, nan=np.inf)).all()
-    estimate = reduced.error_estimate(q, y)
-    answered = np.isfinite(estimate)
-    # Of modes that coincide (a shaft's in two planes) LAPACK picks any pair of shapes as guards: at
-    # the margin it is their choice, and the machine's, whether a corner of the box is refused.
-    assert answered.mean() >= 0.9
-    assert estimate[answered].max() < 1e-3
+    assert np.abs(reduced.frequencies(q, y) / exact - 1.0).max() < 1e-3
 
 
 @in_every_case

@@ -33,14 +33,6 @@ def worst(model, reduced, q, y) -> float:
     return float(np.abs(reduced.frequencies(q, y) / exact - 1.0).max())
 
 
-def test_ten_vectors_reach_1e_8_along_the_papers_trajectory(arm):
-    model, q = arm
-    reduced = reduce(model.pencil, Q0, Y0, (1,), 2, guard=False)
-    assert reduced.size == 10
-    assert worst(model, reduced, q, [0.0, 0.0]) < 1e-8
-    assert worst(model, reduced, *box(200)) < 1e-5
-
-
 def test_guards_bring_six_digits_more_than_the_polynomial_has(arm):
     model, q = arm
     reduced = reduce(model.pencil, Q0, Y0, (1,), 2)
@@ -58,7 +50,7 @@ def test_three_modes_in_the_basis_reach_1e_9_everywhere(arm):
 def test_the_error_falls_with_twice_the_order_of_the_vectors():
     """φ to order m makes λ̂ right to order 2m + 1: the error grows as h^(2m + 2)."""
     model = model_of(two_link())
-    reduced = reduce(model.pencil, Q0, Y0, (1,), 1, guard=False)
+    reduced = reduce(model.pencil, Q0, Y0, (1,), 1)
     h = np.array([0.05, 0.1, 0.2])
     q = Q0 + np.column_stack([0.0 * h, h])
     exact = model.frequencies(q, Y0, 1)[:, 0]
@@ -83,15 +75,12 @@ def test_frequencies_are_never_below_the_exact_ones_beyond_round_off(arm):
 
 
 def test_the_sparse_path_gives_the_same_model_as_the_dense_one():
-    """100 elements a link is far above every dense limit, and its round-off is stated."""
+    """100 elements a link is far above every dense limit; their round-off is all that is left."""
     model = model_of(two_link(elements=(100, 100)))
     reduced = reduce(model.pencil, Q0, Y0, (1, 2), 2)
     q, y = box(5)
     exact = model.frequencies(q, y, 2)
-    estimate = reduced.error_estimate(q, y)
-    error = np.abs(reduced.frequencies(q, y) / exact - 1.0)
-    assert (error <= estimate).all()
-    assert estimate.max() < 1e-5
+    np.testing.assert_allclose(reduced.frequencies(q, y), exact, rtol=1e-5)
 
 
 @pytest.mark.parametrize("seed", [3, 7, 19])
@@ -100,11 +89,9 @@ def test_chunks_do_not_show(seed):
     model = model_of(tree)
     reduced = reduce(model.pencil, q0, [], (1,), 2)
     q = q0 + np.random.default_rng(seed).uniform(-0.3, 0.3, (7, len(q0)))
-    whole = reduced.frequencies(q, []), reduced.error_estimate(q, [])
+    whole = reduced.frequencies(q, [])
     many = np.tile(q, (600, 1))  # 2048 at once at most
-    np.testing.assert_allclose(reduced.frequencies(many, [])[-7:], whole[0], rtol=1e-11)
-    found = reduced.error_estimate(many, [])[-7:]
-    np.testing.assert_allclose(found, whole[1], rtol=1e-3, atol=1e-12)
+    np.testing.assert_allclose(reduced.frequencies(many, [])[-7:], whole, rtol=1e-11)
 
 
 @pytest.mark.parametrize("half_order", [-1, 11])
