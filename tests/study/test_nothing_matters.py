@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from eigassign.case import parse
-from eigassign.modal import cheapest, discretisation_error, expansions
+from eigassign.modal import discretisation_error, raise_order
 from eigassign.study import BuiltCase
 
 TEXT = """
@@ -30,7 +30,7 @@ def test_the_order_is_at_least_one() -> None:
     case = BuiltCase(parse(TEXT.encode(), "case.yaml"))
     model = case.model()
     x = model.x(case.trajectory.q, case.initial_design)
-    chosen = cheapest(expansions(model.pencil, x, 1e-3), 1e-3)
+    chosen = raise_order(model.pencil, x, 1e-3)
     assert not model.pencil.active.any()
     assert chosen.order == 1
 

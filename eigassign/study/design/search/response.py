@@ -60,8 +60,9 @@ class DesignResponse:
         """
         reduced = None
         if self.models is not None and y.tobytes() not in self.known:
+            before = self.models.exact_solves
             reduced = self.models.at(y, self.count)
-            self.exact_solves += len(self.models.watched)
+            self.exact_solves += self.models.exact_solves - before
         if reduced is not None:
             q, of_design = self.path.at(y)
             hz, slopes = in_hz(*reduced.slopes(q, y, self.wanted))
@@ -248,12 +249,15 @@ class ReducedModels:
     path: Trajectories
     left: int = 8  # that may still be tried in one search
     made: list[ReducedModel] = field(default_factory=list)  # the last used one last
+    exact_solves: int = 0  # so far
 
     def at(self, y: Floats, count: int) -> ReducedModel | None:
         """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
-        q = self.path.chosen(self.watched).at(y)[0]
-        exact_hz = self.model.frequencies(q, y, count)
+        q, exact_hz = self.path.chosen(self.watched).at(y)[0], None
         for one in self._rungs(y, count):
+            if exact_hz is None:
+                exact_hz = self.model.frequencies(q, y, count)
+                self.exact_solves += len(q)
             off = one.frequencies(q, y)[:, :count] / exact_hz - 1.0
             if np.abs(off).max() <= TRUSTED:
                 self.made = [*(each for each in self.made if each is not one), one]
