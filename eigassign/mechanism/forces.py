@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import gravity, local_links
-from eigassign.mechanism.assembly.congruence import weighed
+from eigassign.mechanism.assembly.congruence import pulled, scattered
 from eigassign.mechanism.assembly.node_motion import MotionRow, combined
 from eigassign.mechanism.assembly.springs import SpringEnds
 from eigassign.mechanism.kinematics.forward import Kinematics
@@ -75,7 +75,7 @@ def forces(
             pull = np.zeros(6, dtype=object)
             pull[:3] = multiply(placement.world_rotation.T, g[:, None].astype(object))[:, 0]
             kept = list(DOFS[case.mechanism.space])
-            total = combined(total, weighed(link, pull[kept]), 1.0)
+            total = combined(total, scattered(link, pulled(link, pull[kept])), 1.0)
         rows.append(total)
     arrays = [np.array(list(row.values()), dtype=object) for row in rows]
     unknowns = [np.array(list(row), dtype=np.intp) for row in rows]

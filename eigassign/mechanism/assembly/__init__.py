@@ -10,7 +10,7 @@ Read in this order; each imports only from those above it:
     rigid_loops       loops between rigid links: passive joints follow elastically
     springs           springs between nodes
     rigid_body_modes  free motions that no spring or weight resists, made columns of their own
-    gravity           the stiffness that the weight adds in a pose
+    loads             the stiffness that loads add in a pose, above all the weight
     total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
     energies          energies of a mode in links, drives, springs, weight and bodies

@@ -19,8 +19,8 @@ from eigassign.mechanism.assembly.affine_entries import (
     pattern,
 )
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
-from eigassign.mechanism.assembly.gravity.statics import hangs_on_stiffness
-from eigassign.mechanism.assembly.gravity.weight import add_weight
+from eigassign.mechanism.assembly.loads.loaded import Loaded
+from eigassign.mechanism.assembly.loads.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil, Weight
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
@@ -83,17 +83,22 @@ def build_pencil(
     add_springs(stiffness, case, parameters, motion, nodes)
     g, weight, K_g = gravity(case), AffineEntries(summed=True), None
     if g is not None:
-        coarse = None
-        if hangs_on_stiffness(case, motion):
-            coarse = local_links(in_few_elements(case), parameters, motion)
-        add_weight(weight, case, parameters, motion, links, nodes, g, coarse)
+        known = parameters.with_passive(motion.passive)
+        scene = Loaded(case, known, motion, by_name(motion, links), nodes)
+        add_weight(weight, scene, g, lambda: _in_few_elements(scene, parameters))
     add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
     if g is not None:
-        known, n_dof = parameters.with_passive(motion.passive), nodes.count + len(motion.columns)
+        n_dof = nodes.count + len(motion.columns)
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
     return _compile(K, M, K_g, case, parameters, motion, nodes.count)
+
+
+def _in_few_elements(scene: Loaded, parameters: ModelParameters) -> Loaded:
+    """The same mechanism in as few elements as may be."""
+    links, nodes = local_links(in_few_elements(scene.case), parameters, scene.motion)
+    return replace(scene, links=by_name(scene.motion, links), nodes=nodes)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -217,6 +222,11 @@ def local_links(
     else:
         nodes.number_passive(motion.tree.passive)
     return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
+
+
+def by_name(motion: Kinematics, links: Sequence[LocalLink]) -> dict[str, LocalLink]:
+    """The links by their names."""
+    return {p.link: link for p, link in zip(motion.placements, links, strict=True)}
 
 
 def rigid_links(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> list[LocalLink]:

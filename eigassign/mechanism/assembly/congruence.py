@@ -28,7 +28,7 @@ from scipy import sparse
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, Row
 from eigassign.mechanism.elements.mesh import Reduction, Term, total
-from eigassign.mechanism.kinematics.rotations import multiply, some
+from eigassign.mechanism.kinematics.rotations import multiply, scaled, some
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -88,16 +88,22 @@ def inertia(link: LocalLink) -> Objects:
     return _constants(link).inertia
 
 
-def weighed(link: LocalLink, pull: Objects) -> dict[int, Scalar]:
-    """Qᵀ m N a over u: what acts on a link under one acceleration a (n_twist,), in its axes."""
-    own = {s: [(int(link.own[s]), 1.0)] for s in np.flatnonzero(link.own >= 0).tolist()}
-    places: dict[int, Row] = {**own, **link.carried}
-    found: dict[int, Scalar] = {}
+def pulled(link: LocalLink, pull: Objects) -> Objects:
+    """m N a (n_local,): forces of one acceleration a (n_twist,), in its axes, on a link's dofs."""
+    force = np.zeros(len(link.own), dtype=object)
     for coefficient, momentum in _constants(link).momenta:
-        for s, k in zip(*(each.tolist() for each in np.nonzero(momentum)), strict=True):
-            force = coefficient * pull[k] * float(momentum[s, k])
-            for unknown, moved in places.get(s, ()) if some(force) else ():
-                found[unknown] = found.get(unknown, 0.0) + force * moved
+        force = force + multiply(momentum, scaled(pull, coefficient))
+    return force
+
+
+def scattered(link: LocalLink, force: Objects) -> dict[int, Scalar]:
+    """Qᵀ f over u of forces on a link's dofs."""
+    found: dict[int, Scalar] = {}
+    for slot, each in enumerate(force.tolist()):
+        own = int(link.own[slot])
+        row = [(own, 1.0)] if own >= 0 else link.carried.get(slot, ())
+        for unknown, moved in row if some(each) else ():
+            found[unknown] = found.get(unknown, 0.0) + each * moved
     return found
 
 

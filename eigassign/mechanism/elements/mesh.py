@@ -38,6 +38,15 @@ def total(terms: Sequence[Term], values: Floats) -> sparse.csr_array:
     return sparse.csr_array(out)
 
 
+def summed(terms: Sequence[tuple[Scalar, Any]], size: int) -> Objects:
+    """Σ coefficient × matrix (size, size) as scalars."""
+    out = np.zeros((size, size), dtype=object)
+    for coefficient, matrix in terms:
+        for i, j in zip(*(each.tolist() for each in matrix.nonzero()), strict=True):
+            out[i, j] = out[i, j] + coefficient * float(matrix[i, j])
+    return out
+
+
 class Strand(NamedTuple):
     """A row of beam elements from node to node, for what lies between the nodes."""
 
@@ -47,6 +56,13 @@ class Strand(NamedTuple):
     shear: Sequence[tuple[Shear, Shear]]  # per element, of bending in its x-y and x-z plane
     profiles: Sequence[Profile] = ()  # per element its values
     lengths: Sequence[Scalar] = ()  # per element, m: equal ones to the last digit
+
+    def turned(self, count: int) -> Floats:
+        """The turn of ``count`` vectors (3 count, 3 count) from the link's axes to the elements'.
+
+        Raises TypeError where no axes matter.
+        """
+        return np.asarray(np.kron(np.eye(count), self.axes), dtype=np.float64)  # type: ignore[arg-type]
 
 
 def element_motion(motion: Floats, axes: Floats) -> Floats:

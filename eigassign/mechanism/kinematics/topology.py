@@ -75,6 +75,21 @@ class Topology:
         own = [(f.component, k) for k, f in enumerate(self.freedoms) if f.joint == joint]
         return [k for _, k in sorted(own)]
 
+    def hanging(self, node: NodeName) -> list[tuple[JointEdge, int]]:
+        """The tree's joints at a node, −1 with the one that the node's own link hangs on."""
+        own = [(edge, -1) for edge in self.edges if edge.follower == node]
+        return own + [(edge, 1) for edge in self.edges if edge.base == node]
+
+    @cached_property
+    def beyond(self) -> dict[str, list[str]]:
+        """Every link with all that it carries in the tree."""
+        found: dict[str, list[str]] = {"ground": []}
+        for edge in reversed(self.edges):
+            own = found.setdefault(edge.follower[0], [])
+            own.append(edge.follower[0])
+            found.setdefault(edge.base[0], []).extend(own)
+        return found
+
     def riders(self, link: str) -> list[str]:
         """The carriages and nuts that travel along a link."""
         return self._riders.get(link, [])

@@ -23,11 +23,10 @@ from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply, p
 from eigassign.series.expression import Scalar
 
 
-def add_arm(target: AffineEntries, turn: MotionRows, force: Objects, arm: Objects) -> None:
-    """Hessian of −F · (θ × (θ × r))/2 = −(F·θ r·θ − F·r θ·θ)/2; ``turn`` are the rows of θ."""
-    work = np.outer(force, arm) * -0.5
-    along = (force[0] * arm[0] + force[1] * arm[1] + force[2] * arm[2]) * 0.5
-    add_bilinear(target, work + np.diag([along] * 3), turn, turn)
+def add_arms(target: AffineEntries, turn: MotionRows, D: Objects) -> None:
+    """Hessian of −½ θᵀ(D − tr D)θ, D = Σ F rᵀ of forces on arms; ``turn`` are the rows of θ."""
+    work = D * -0.5 + np.diag([(D[0, 0] + D[1, 1] + D[2, 2]) * 0.5] * 3)
+    add_bilinear(target, work, turn, turn)
 
 
 def add_joint(
@@ -44,7 +43,7 @@ def add_joint(
     """
     F = wrench[:3]
     M = wrench[3:] - cross(lever, F)  # about the follower's node
-    add_arm(target, base[3:], F, lever)
+    add_arms(target, base[3:], np.outer(F, lever))
     # −F · (θ × t₁) = θᵀ [F]× t₁, with t₁ and ψ₁ = A δ
     add_bilinear(target, multiply(skew(F), freedoms[:3]), base[3:], own)
     add_bilinear(target, multiply(skew(M), freedoms[3:]) * 0.5, base[3:], own)
@@ -84,7 +83,7 @@ def add_spring(
     """
     F, M = force[:3], force[3:]
     apart = [combined(b, a, -1.0) for a, b in zip(here[:3], there[:3], strict=True)]
-    add_arm(target, here[3:], F * -1.0, arm)
+    add_arms(target, here[3:], np.outer(F, arm) * -1.0)
     add_bilinear(target, skew(F), here[3:], apart)  # −F · (θ × D) = θᵀ [F]× D
     add_bilinear(target, skew(M) * 0.5, here[3:], there[3:])
 

@@ -1,0 +1,15 @@
+"""The stiffness K_g that loads add in a pose: K_g = Bᵀ k_σ(n) B + Σ_a p_a ∂²w_a/∂x².
+
+The drives hold the pose; n are the internal forces that the loads cause there. They are described
+once: the weight has loads that are functions of (q, y), any others are variables (`dynamics`).
+Read in this order; each imports only from those above it:
+
+    beam_stress   k_σ of a beam element from its end forces and its own load
+    imported      k_σ of a part that is known by its matrices alone
+    loaded        a mechanism that loads act on, and where its loops tell their forces
+    statics       loads, and the wrenches through the joints: explicit for trees, solved for loops
+    curvature     levers and joints: where displacements are of second order in the motion
+    second_order  all terms of K_g but those of beams
+    elastic       forces of the weight that hang on stiffnesses: redundant loops and springs
+    weight        the weight as loads, and the beams that it stresses
+"""
