@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 from scipy.spatial.transform import Rotation
 from spatial_cases import Built, built
-from spatial_oracle import Tree, mount, point, turn
+from spatial_oracle import Tree
 from weight_oracle import Weighed, lowest, weigh
 
 COUNT = 6
@@ -62,17 +62,6 @@ def agree_under_weight(tree: Tree, q: Any, g: np.ndarray) -> None:
     missed = np.abs(lowest(K, M, count) - expected)
     assert (missed <= 1e-6 * change + 2e-8 * np.abs(expected)).all()
     assert np.abs(K - K.T).max() <= 1e-14 * np.abs(K).max()
-
-
-def turned_about(tree: Tree, axis: np.ndarray, angle: float) -> Tree:
-    """The whole mechanism turned in the world with all that joins it to the ground."""
-    out, R = copy.deepcopy(tree), turn(axis, angle)
-    for joint in out["mechanism"]["joints"].values():
-        if joint["base"] == "ground":
-            joint["orientation"] = Rotation.from_matrix(R @ mount(joint)).as_euler("xyz").tolist()
-            joint.pop("angle", None)
-            joint["position"] = (R @ point(joint.get("position"))).tolist()
-    return out
 
 
 def level_carriage(seed: int, space: str) -> tuple[Tree, list[float], np.ndarray]:

@@ -144,7 +144,7 @@ class StiffnessUnderLoad:
         z = self.parameters.z(np.atleast_2d(x))
         poses: list[LoadedPose] = []
         for own, row in zip(z.T, zip(*self.at_rest(z), strict=True), strict=True):
-            now = _Numbers(row[:5], *row[5:10], elements=row[10:])
+            now = _Numbers._make((row[:5], *row[5:10], row[10:]))
             beams = [
                 Beams(elements, Alike(np.arange(len(h)), h, profile, sheared))
                 for (elements, sheared), h, profile in zip(

@@ -162,7 +162,7 @@ def loops_at_nodes(case: CaseFile, motion: Kinematics) -> LoopsAtNodes:
     tree = motion.tree
     loops = tree.loops[: tree.n_elastic if hangs_on_stiffness(case, motion) else 0]
     ends = [e.follower for e in loops] + [e.base for e in loops]
-    A, nodes = np.zeros((0, len(loops))), []
+    A, nodes = np.zeros((0, len(loops))), list[NodeName]()
     for node in dict.fromkeys(ends):
         if node != GROUND and link_type(case, node[0]) != "rigid":
             more = np.vstack([A, [_times(tree, node, edge) for edge in loops]])
@@ -174,7 +174,7 @@ def loops_at_nodes(case: CaseFile, motion: Kinematics) -> LoopsAtNodes:
             "closes a loop at nodes where other loops close, which leaves forces under loads "
             "unknown: give each loop nodes of its own, or write gravity: none",
         )
-    return LoopsAtNodes(loops, nodes, np.linalg.inv(A))
+    return LoopsAtNodes(loops, nodes, np.asarray(np.linalg.inv(A), dtype=np.float64))
 
 
 def _times(tree: Topology, node: NodeName, loop: JointEdge) -> int:
