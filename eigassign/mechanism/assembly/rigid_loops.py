@@ -49,7 +49,7 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     unknowns = sorted({u for row in gaps for u in row if u >= 0})
     J, G = _matrix(gaps, labels), _matrix(gaps, unknowns)
     at = parameters.compiled(np.hstack([J, G]))(reference[:, None])[0][0]
-    dependent = _pivots(at[:, : len(labels)])
+    dependent = pivots(at[:, : len(labels)])
     require_consistent(at[:, dependent], at[:, len(labels) :], loops, nodes.space)
     free = [k for k in range(len(passive)) if k not in dependent]
     nodes.number_passive([passive[k] for k in free])
@@ -65,7 +65,7 @@ def _matrix(rows: Sequence[MotionRow], unknowns: Sequence[int]) -> Objects:
     return np.array(entries, dtype=object).reshape(len(rows), len(unknowns))
 
 
-def _pivots(J: Floats) -> list[int]:
+def pivots(J: Floats) -> list[int]:
     """Columns of full rank, in order, the most independent ones."""
     if not J.size:
         return []

@@ -21,16 +21,16 @@ from typing import Any
 import numpy as np
 
 from eigassign.mechanism.assembly.loads.loaded import Loaded
+from eigassign.mechanism.assembly.rigid_loops import pivots
 from eigassign.mechanism.assembly.springs import SpringMotion
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.loop_closure import passive_motion
+from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
 from eigassign.mechanism.kinematics.rotations import (
     DOFS,
     Floats,
     Objects,
     cross,
     multiply,
-    present,
     scaled,
 )
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName
@@ -117,26 +117,24 @@ class _Wrenches:
             self.close(edge, self._at(edge.follower, sum(shares[1:], shares[0])))
 
     def close_rigid(self, loops: Sequence[JointEdge]) -> None:
-        """Close the other loops, by λ = −J (JᵀJ)⁻¹ G of more rows than passive freedoms.
+        """Close the other loops: λ = −J (JᵀJ)⁻¹ G, J the independent columns.
 
-        Where nodes have settled more freedoms than there are rows, it is −(J Jᵀ)⁻¹ J G.
+        Freedoms that depend on them, or that nodes have settled, are in balance, too.
         """
         if not loops:
             return
-        moved, kept = self._passive_rates, list(DOFS[self.scene.nodes.space])
+        case, known, moved = self.scene.case, self.scene.known, self._passive_rates
+        kept = list(DOFS[self.scene.nodes.space])
         J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
         G = np.zeros((J.shape[1], 1), dtype=object)
         for p in moved.placements:
             G[:, 0] = G[:, 0] + multiply(p.twist.T, self.total[p.link])
-        felt = present(J).any(axis=0)
-        J, G, recorder = J[:, felt], G[felt], self.scene.known.recorder
-        rows, columns = J.shape
-        if rows == columns:
-            found = passive_motion(recorder, J.T, G)
-        elif rows > columns:
-            found = multiply(J, passive_motion(recorder, multiply(J.T, J), G))
+        own = pivots(known.compiled(J)(reference(case, known)[:, None])[0][0])
+        J, G = J[:, own], G[own]
+        if len(J) == len(own):
+            found = passive_motion(known.recorder, J.T, G)
         else:
-            found = passive_motion(recorder, multiply(J, J.T), multiply(J, G))
+            found = multiply(J, passive_motion(known.recorder, multiply(J.T, J), G))
         wrenches = np.zeros((len(loops), 6), dtype=object)
         wrenches[:, kept] = found.reshape(len(loops), -1)
         for edge, wrench in zip(loops, wrenches, strict=True):
