@@ -18,7 +18,7 @@ first moment m c and second moments E = ½ tr J − J:
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -62,7 +62,7 @@ from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply, present
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, present
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Expression, Recorder, Scalar
@@ -470,11 +470,8 @@ def stiffness_under_load(
         add_terms(stiffness, scene.whole(name).stiffness, first[name], first[name])
     patterns = pattern(stiffness), pattern(_relative(scene, curved.shape[0]))
     strands = [(name, strand) for name in named for strand in scene.whole(name).strands]
-    interiors = [
-        first[name] + link.reduction.interior
-        for name, link in named.items()
-        if link.reduction is not None
-    ]
+    sheared = [strand.profiles[0][0].shear_z is not None for _, strand in strands]
+    elements = [StackedElements.of(strand, first[name], sum(sizes)) for name, strand in strands]
     return StiffnessUnderLoad(
         parameters=parameters,
         n_u=nodes.count,
@@ -483,35 +480,51 @@ def stiffness_under_load(
         stack=stack,
         stiffness=patterns[0],
         springs=patterns[1],
-        inner=np.concatenate([np.zeros(0, dtype=np.intp), *interiors]),
-        slots={
-            (name, node): np.where(own >= 0, own + first[name], -1)
-            for name in named
-            for node, own in scene.whole(name).nodes.items()
-        },
+        inner=_inner(scene, first),
+        slots=_slots(scene, first),
         sites=tuple(scene.sites),
         parts={name: _own_mass(scene.whole(name)) for name in scene.imported},
-        strands=[
-            (StackedElements.of(s, first[n], sum(sizes)), s.profiles[0][0].shear_z is not None)
-            for n, s in strands
-        ],
+        strands=list(zip(elements, sheared, strict=True)),
         told=scene.settled.nodes,
         counted=counted,
         curved=curved,
-        at_rest=parameters.compiled(
-            *stack.scalars,
-            *(np.array(each.coefficients, dtype=object) for each in patterns),
-            np.array(list(scene.sites.values()), dtype=object).reshape(-1, 6, 6),
-            np.array([one.stiffness for one in scene.springs], dtype=object).reshape(-1, 6),
-            np.array([p.world_rotation for p in motion.placements]),
-            *(array for _, strand in strands for array in _element_scalars(strand)),
-        ),
+        at_rest=parameters.compiled(*stack.scalars, *_scalars(scene, patterns, strands)),
         in_load=compile_arrays(
             parameters.recorder,
             [np.array(curved.coefficients, dtype=object)],
             parameters.count + len(counted),
         ),
     )
+
+
+def _scalars(
+    scene: Loaded, patterns: Sequence[Pattern], strands: Sequence[tuple[str, Strand]]
+) -> Iterator[Objects]:
+    """The scalars of `_Numbers` behind those of the stack, in their order."""
+    yield from (np.array(each.coefficients, dtype=object) for each in patterns)
+    yield np.array(list(scene.sites.values()), dtype=object).reshape(-1, 6, 6)
+    yield np.array([one.stiffness for one in scene.springs], dtype=object).reshape(-1, 6)
+    yield np.array([p.world_rotation for p in scene.motion.placements])
+    for _, strand in strands:
+        values = [[[0.0 if v is None else v for v in b] for b in each] for each in strand.profiles]
+        yield np.array(strand.lengths, dtype=object)
+        yield np.array(values, dtype=object)
+
+
+def _slots(scene: Loaded, first: Mapping[str, int]) -> dict[NodeName, Ints]:
+    """The dofs of all nodes among those of all links."""
+    return {
+        (name, node): np.where(own >= 0, own + first[name], -1)
+        for name in scene.links
+        for node, own in scene.whole(name).nodes.items()
+    }
+
+
+def _inner(scene: Loaded, first: Mapping[str, int]) -> Ints:
+    """The dofs inside reduced links among those of all links."""
+    reduced = [(first[name], link.reduction) for name, link in scene.links.items()]
+    own = [start + reduction.interior for start, reduction in reduced if reduction is not None]
+    return np.concatenate([np.zeros(0, dtype=np.intp), *own])
 
 
 def _relative(scene: Loaded, n_dof: int) -> Entries:
@@ -542,12 +555,3 @@ def _collected(K: AffineEntries, n_u: int, recorder: Recorder, n_dof: int) -> Pa
         scalar: Scalar = Expression(recorder, 0.0, {atom: 1.0}) if atom >= 0 else 1.0
         out.add(scalar, rows[own], columns[own], factors[own])
     return pattern(out)
-
-
-def _element_scalars(strand: Strand) -> tuple[Objects, Objects]:
-    """Lengths (n,) and values (n, n_legendre, 9) of the elements of a strand."""
-    assert strand.axes is not None
-    along = [b - a for a, b in itertools.pairwise(strand.points)]
-    h = [multiply(np.asarray(strand.axes[:1]), each)[0] for each in along]
-    values = [[[0.0 if v is None else v for v in b] for b in each] for each in strand.profiles]
-    return np.array(h, dtype=object), np.array(values, dtype=object)
