@@ -32,28 +32,6 @@ def test_the_unknowns_span_exactly_the_admissible_motions(seed: int) -> None:
     assert model.n_dof == len(oracle.K) - rank
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_links_are_drawn_where_the_global_frame_puts_them(seed: int) -> None:
-    tree, q = random_chain(seed)
-    model, oracle = model_of(tree), frame(tree, q)
-    lines = model.poses.lines(q[None])[0]
-    for name, line in zip(model.poses.links, lines, strict=True):
-        np.testing.assert_allclose(line[0, :2], oracle.origins[name], atol=1e-13)
-        np.testing.assert_allclose(line[1, :2], oracle.ends[name], atol=1e-13)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_every_sample_of_a_batch_is_its_own_pose(seed: int) -> None:
-    tree, _ = random_chain(seed)
-    model = model_of(tree)
-    poses = np.random.default_rng(seed).uniform(-3.0, 3.0, (4, len(tree["coordinates"])))
-    count = min(3, model.n_dof - model.n_rigid)
-    together = model.frequencies(poses, np.zeros((4, 0)), count)
-    for q, found in zip(poses, together, strict=True):
-        lam = frame(tree, q).eigenvalues(count)
-        np.testing.assert_allclose((2.0 * np.pi * found) ** 2, lam, rtol=1e-9)
-
-
 def test_more_modes_than_there_are_is_refused() -> None:
     model = model_of(two_link())
     assert model.frequencies([0.1, 0.2], [0.0, 0.0], 21).shape == (1, 21)

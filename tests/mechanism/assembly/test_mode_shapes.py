@@ -14,12 +14,7 @@ import eigassign as ea
 from eigassign.case import parse
 from eigassign.errors import UsageError
 from eigassign.mechanism import (
-    all_moving,
-    bending_mass,
-    bending_shapes,
-    node_position,
     shapes,
-    with_elements,
     with_reduction,
 )
 from eigassign.study import with_middle_loads
@@ -38,22 +33,6 @@ def posed(name: str) -> tuple[ea.Case, Any, Any]:
 def every_shape(case: ea.Case, q: Any, y: Any, vectors: Any) -> Any:
     model = case.model()
     return shapes(model.poses, model.x(q, y), vectors[None])[0]
-
-
-@pytest.mark.parametrize("phi", [0.0, 0.3, 4.0])
-@pytest.mark.parametrize(("plane", "dofs"), [("z", [1, 5, 7, 11]), ("y", [2, 4, 8, 10])])
-def test_products_of_the_drawn_shapes_integrate_to_the_consistent_mass(
-    phi: float, plane: str, dofs: list[int]
-) -> None:
-    points, weights = np.polynomial.legendre.leggauss(6)
-    xi, weights = 0.5 * (points + 1.0), 0.5 * weights
-    h = 0.7
-    sign = 1.0 if plane == "z" else -1.0
-    N = bending_shapes(xi, np.full(len(xi), phi)) * [1.0, sign * h, 1.0, sign * h]
-    mass = h * np.einsum("x,xi,xj->ij", weights, N, N)
-    parts = bending_mass(plane)
-    stored = sum(phi**i * h ** (j + 1) * parts[i][j] for i in range(3) for j in range(3))
-    np.testing.assert_allclose(mass, stored[np.ix_(dofs, dofs)] / (1 + phi) ** 2, rtol=1e-13)
 
 
 PLANAR = ["two_link", "four_bar", "five_bar", "six_bar", "luffing_boom", "gantry", "slider_crank"]
@@ -157,35 +136,6 @@ def test_a_mass_on_a_node_sees_the_node_move_as_drawn(
     np.testing.assert_allclose(motion @ motion.T, vectors.T @ difference @ vectors, atol=1e-10)
 
 
-def velocities(case: Any, x: np.ndarray, link: str, node: str) -> np.ndarray:
-    """R_w (v + ω × X) of a rigid link's node per q̇, (3, n_q)."""
-    poses, motion = case.model().poses, case.model().motion
-    p = all_moving(case.file, poses.parameters, motion).placement(link)
-    X = node_position(case.file, poses.parameters, motion.tree, (link, node))
-    R, twist, place = (found[0] for found in poses.values(x, [p.world_rotation, p.twist, X]))
-    return np.asarray(R @ (twist[:3] + np.cross(twist[3:].T, place).T))
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_rigid_motion_is_that_of_the_rigid_links(name: str) -> None:
-    case, q, y = posed(name)
-    model = case.model()
-    columns = model.motion.columns
-    vectors = np.eye(model.n_dof)[:, model.n_dof - len(columns) :]
-    for (link, node), shape in every_shape(case, q, y, vectors).nodes.items():
-        if node.startswith("@"):
-            continue  # material point of the beam: it does not travel with the carriage
-        exact = velocities(case, model.x(q, y), link, node)[:, columns]
-        np.testing.assert_allclose(shape.motion[:, :3].T, exact, atol=1e-10)
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_both_sides_of_every_joint_stay_together(name: str) -> None:
-    case, q, y = posed(name)
-    model = case.model()
-    together(case.file, model.motion, model.shapes(q, y, 3))
-
-
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 @pytest.mark.parametrize(
     "seed", [0, 2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 4, 5, 6, 7))]
@@ -228,35 +178,6 @@ def test_lines_end_at_their_nodes_and_move_with_them(name: str) -> None:
             shape = found.nodes[link, node]
             np.testing.assert_allclose(strand.places[k], shape.place[:d], atol=1e-12)
             np.testing.assert_allclose(strand.motions[:, k], shape.motion[:, :d], atol=1e-12)
-
-
-def test_a_coarse_mesh_bends_between_its_nodes_as_a_fine_one_does() -> None:
-    case, q, y = posed("two_link")
-    fine = ea.Case(with_elements(case.file, {"upper_arm": 24, "forearm": 24}))
-    coarse, right = case.model().shapes(q, y, 2), fine.model().shapes(q, y, 2)
-    for strand, other in zip(coarse.strands, right.strands, strict=True):
-        np.testing.assert_allclose(strand.places, other.places, atol=1e-12)
-        size = np.abs(other.motions).max(axis=(1, 2))
-        off = np.abs(strand.motions - other.motions).max(axis=(1, 2)) / size
-        assert (off < [1e-3, 1e-2]).all()
-        every = strand.motions[:, :: 24 // (4 if strand.link == "upper_arm" else 3)]
-        at = np.linspace(0, 1, every.shape[1]), np.linspace(0, 1, 25)
-        chords = np.array([[np.interp(at[1], at[0], m[:, i]) for i in (0, 1)] for m in every])
-        straight = np.abs(chords.transpose(0, 2, 1) - other.motions).max(axis=(1, 2)) / size
-        assert (straight > 4.0 * off).all()
-
-
-def test_a_rigid_link_stays_straight_and_a_superelement_keeps_its_slopes() -> None:
-    case, q, y = posed("arm_6r")
-    found = case.model().shapes(q, y, 1)
-    (hand,) = (s for s in found.strands if s.link == "hand")
-    np.testing.assert_allclose(np.diff(hand.motions[0], n=2, axis=0), 0.0, atol=1e-12)
-    case, q, y = posed("superelement_arm")
-    found, exact = case.model().shapes(q, y, 1), posed("two_link")[0].model().shapes(q, y, 1)
-    whole, parts = found.strands[1].motions[0], exact.strands[1].motions[0]
-    slopes = [np.diff(shape, axis=0)[[0, -1]] * 24 for shape in (whole, parts)]
-    phase = np.sign((slopes[0] * slopes[1]).sum())
-    np.testing.assert_allclose(phase * slopes[0], slopes[1], rtol=0.05)
 
 
 def test_shapes_are_of_one_pose() -> None:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from spatial_cases import ALLOY, Built, built, changed
-from spatial_examples import four_bar, rigid
 from spatial_oracle import Tree, world
 from spatial_random import add_springs as add_random_springs
 from spatial_random import random_closed, random_open
@@ -50,34 +49,6 @@ def agrees(tree: Tree, q: list[float], n_rigid: int) -> None:
     np.testing.assert_allclose(model.lam(q, 6), frame.spectrum(6), rtol=1e-8)
 
 
-def pendulums(**spring: Any) -> Tree:
-    """Two links that hang on the ground side by side."""
-    tree = chain({"x": {"between": ["l0.end", "l1.end"], **spring}}, 2)
-    tree["mechanism"]["joints"]["j1"] |= {"base": "ground", "position": [0.3, 0.0]}
-    return tree
-
-
-def test_coupled_pendulums_turn_together() -> None:
-    tree = pendulums(rotational=250.0)
-    agrees(tree, [0.3, -0.5], 1)
-    motion = built(tree).motion
-    assert motion.rigid == (0,)
-    np.testing.assert_array_equal(motion.coordinates.rates, [[1.0, 0.0], [1.0, 1.0]])
-
-
-def test_a_spring_across_two_joints_leaves_their_opposite_motion() -> None:
-    tree = chain(turning("l0.end", "l2.start"))
-    agrees(tree, [0.2, 0.4, -0.9], 2)
-    assert built(tree).motion.rigid == (0, 1)
-
-
-def test_absolute_angles_have_rigid_motions_of_their_own() -> None:
-    tree = chain(turning("l0.end", "l2.start"))
-    for data in tree["coordinates"].values():
-        data["angle"] = "absolute"
-    agrees(tree, [0.2, 0.6, -0.3], 2)
-
-
 def test_a_spring_across_an_elbow_leaves_the_shoulder_alone() -> None:
     """Resisted by cancelling terms only: round-off must not hold the shoulder."""
     springs = {"x": {"between": ["l0.start", "l1.end"], "translational": 5e4}}
@@ -86,17 +57,6 @@ def test_a_spring_across_an_elbow_leaves_the_shoulder_alone() -> None:
         for data, drive in zip(tree["coordinates"].values(), drives, strict=True):
             data["drive"] = drive
         agrees(tree, [0.2, 0.7], 1)
-
-
-def test_geared_slides_move_in_the_ratio_of_their_axes() -> None:
-    """Sprung along x only, a slide along x and one at 60° keep x alike: ratio cos 60°."""
-    tree = pendulums(translational=[6e4, 0.0])
-    joints = tree["mechanism"]["joints"]
-    joints["j0"] |= {"type": "prismatic", "axis": [1.0, 0.0]}
-    joints["j1"] |= {"type": "prismatic", "axis": [0.5, float(np.sqrt(0.75))]}
-    agrees(tree, [0.1, 0.2], 1)
-    rates = built(tree).motion.coordinates.rates
-    assert abs(rates[1, 1] / rates[0, 1] if rates[0, 1] else rates[1, 0]) == pytest.approx(2.0)
 
 
 def test_the_stiffness_takes_no_part_in_what_is_rigid() -> None:
@@ -126,19 +86,6 @@ def test_a_rigid_motion_that_turns_with_the_pose_is_refused_with_its_coordinates
     assert caught.value.path == "mechanism.springs.x"
     tree["coordinates"]["q1"]["drive"] = "locked"
     agrees(tree, [0.2, 0.4], 0)
-
-
-@pytest.mark.parametrize("links", ["beams", "rigid"])
-def test_a_coupled_five_bar_closes_its_loop_while_it_turns(links: str) -> None:
-    """A spring across the coupler pin of a four-bar holds its one freedom."""
-    tree = four_bar("free")
-    tree = rigid(tree) if links == "rigid" else tree
-    tree["mechanism"]["springs"] = turning("crank.end", "coupler.start", 80.0)
-    model, frame = built(tree), world(tree, [1.0])
-    frame.n_free = 0
-    count = min(4, model.n_elastic)
-    assert len(model.pencil.rigid) == 0
-    np.testing.assert_allclose(model.lam([1.0], count), frame.spectrum(count), rtol=1e-8)
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])

@@ -10,7 +10,6 @@ import pytest
 from small_case import edited
 
 from eigassign.case import parse
-from eigassign.errors import UsageError
 from eigassign.study import BuiltCase, load_case
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -64,20 +63,3 @@ def test_the_slope_is_that_of_a_curved_dependence() -> None:
         np.testing.assert_allclose(
             model.total_mass(np.array([0.7, d]))[1], [0.0, 2700 * 0.6 * pi / 2 * d], rtol=1e-12
         )
-
-
-def test_reduced_links_keep_their_mass() -> None:
-    whole = load_case(CASES / "two_link.yaml").model().mass([0.1, 0.2])
-    text = (
-        (CASES / "two_link.yaml")
-        .read_text()
-        .replace("elements: 4}", "elements: 9, reduce_to: 3 kHz}")
-    )
-    assert BuiltCase(parse(text.encode(), "c.yaml")).model().mass([0.1, 0.2]) == pytest.approx(
-        whole, rel=1e-12
-    )
-
-
-def test_a_design_of_another_size_is_refused() -> None:
-    with pytest.raises(UsageError):
-        load_case(CASES / "two_link.yaml").model().mass([0.1])

@@ -351,9 +351,3 @@ OF_MATLAB = (of_matlab, of_matlab73)  # each is read by a process: see test_dama
 @pytest.mark.parametrize("write", WRITERS)
 def test_damaged_files_are_read_or_refused(tmp_path: Path, write: Writer) -> None:
     survives(tmp_path, write, 5 if write in OF_MATLAB else 40, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("write", WRITERS)
-def test_thousands_of_damaged_files_are_read_or_refused(tmp_path: Path, write: Writer) -> None:
-    survives(tmp_path, write, 200 if write in OF_MATLAB else 3000, 2)

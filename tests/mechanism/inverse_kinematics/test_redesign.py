@@ -98,15 +98,6 @@ def test_the_answer_depends_on_the_design_alone() -> None:
     np.testing.assert_array_equal(path.at(y)[0], first)
 
 
-def test_some_samples_follow_as_they_do_among_all() -> None:
-    case = two_link_lengths()
-    rows, y = [0, 3, 17], other_design(case)
-    q, slopes = case.trajectory.at(y)
-    some_q, some_slopes = case.trajectory.chosen(rows).at(y)
-    np.testing.assert_array_equal(some_q, q[rows])
-    np.testing.assert_array_equal(some_slopes, slopes[rows])
-
-
 def test_coordinates_that_are_given_do_not_follow() -> None:
     case = two_link_lengths()
     given = replace(case.trajectory.parts[0].trajectory, of_design=None)

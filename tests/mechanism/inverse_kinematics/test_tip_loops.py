@@ -204,36 +204,6 @@ def test_a_slider_is_placed_by_its_crank() -> None:
     np.testing.assert_allclose(motion.q[:, 0], np.arccos(cosine), atol=1e-9)
 
 
-def test_a_slider_past_its_dead_centre_is_refused() -> None:
-    wish = {"tip": "slider.start", "waypoints": [[0.56, 0.0], [0.62, 0.0]], "timing": "linear"}
-    message = refused("slider_crank", wish)
-    assert "sample 67 (t = 0.67 s" in message  # 0.6 m is the end of its stroke
-    assert "out of reach" in message
-
-
-def test_a_six_bars_rocker_is_driven_through_both_loops() -> None:
-    """Crank, coupler and bell crank by two circles; rod and rocker by two more."""
-
-    def rocker_end(angle: float) -> np.ndarray:
-        b = 0.08 * np.array([np.cos(angle), np.sin(angle)])
-        pivot = np.array([0.3, 0.0])
-        e = (circles(b, 0.3, pivot, 0.2, +1.0) - pivot) / 0.2
-        out = pivot + 0.1 * e - 0.15 * np.array([-e[1], e[0]])
-        return circles(out, 0.27, np.array([0.65, -0.05]), 0.2, +1.0)
-
-    q = equal_chords(rocker_end, 75 * DEG, 2 * DEG, 20)
-    wish = {
-        "tip": "rocker.end",
-        "waypoints": [rocker_end(a).tolist() for a in q],
-        "path": "straight",
-        "timing": "linear",
-        "samples": 20,
-        "start": ["75 deg"],
-    }
-    motion = shipped("six_bar", wish).trajectory
-    np.testing.assert_allclose(motion.q[:, 0], q, atol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("name", "tip", "points", "q"),
     [

@@ -7,7 +7,7 @@ import pytest
 from planar_arms import serial_arm, two_link_angles
 from scipy.spatial.transform import Rotation
 from spatial_oracle import X, Y, Z, turn
-from tip_paths import between, course
+from tip_paths import course
 
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism import follow
@@ -86,31 +86,6 @@ def test_three_links_place_and_turn_the_tip_as_the_law_of_cosines_says(kind, ang
     expected = np.unwrap(two_link_angles(wrist, 0.5, 0.4, 1.0), axis=0)
     np.testing.assert_allclose(q[:, :2], expected, atol=1e-8)
     np.testing.assert_allclose(q.sum(axis=1), last, atol=1e-8)
-
-
-@pytest.mark.parametrize("size", [1e-3, 1e3])
-def test_the_size_of_an_arm_changes_none_of_its_angles(size: float) -> None:
-    wish = {"angle": [0.4, 0.9, 2.4, 2.0]}
-    lengths, points = np.array([0.5, 0.4, 0.15]), np.array(POINTS)
-    one, other = (
-        follow(
-            serial_arm(*(s * lengths), absolute=False, oriented=True),
-            course(s * points, 30, "spline", **wish),
-            start=[0.0, 1.2, 0.0],
-        ).q
-        for s in (1.0, size)
-    )
-    np.testing.assert_allclose(other, one, atol=1e-10)
-
-
-def test_a_fourth_link_is_redundant_and_says_so() -> None:
-    arm = serial_arm(0.4, 0.3, 0.2, 0.15, absolute=False, oriented=True)
-    due = course(POINTS, 40, "spline", angle=[0.4, 0.9, 2.4, 2.0])
-    followed = follow(arm, due)
-    seen, target = arm.evaluate(followed.q), due.target(due.s)
-    np.testing.assert_allclose(seen.point, target.point, atol=1e-10)
-    assert between(seen.rotation, target.rotation).max() < 1e-8
-    assert "fixes 3 of 4 coordinates" in followed.notes[0]
 
 
 def test_the_least_motion_does_not_depend_on_the_samples() -> None:

@@ -47,11 +47,6 @@ def test_a_place_outside_its_range_is_named_in_metres() -> None:
     assert "needs joint boom at 7.1 m, outside its range [1, 7] m" in error.value.message
 
 
-def test_a_place_is_not_inside_its_range_for_being_a_full_turn_further() -> None:
-    with pytest.raises(TrajectoryError, match=r"boom at -?8 m, outside its range \[1, 3\] m"):
-        follow(polar_arm(), course([(8.0, 0.0), (8.5, 0.0)], 9), {"boom": (1.0, 3.0)})
-
-
 def test_a_start_in_metres_is_kept() -> None:
     due = course([(2.0, 0.0), (9.0, 0.5)], 9)
     q = follow(polar_arm(), due, start=[2 * np.pi, 9.0]).q
@@ -74,52 +69,6 @@ def spatial(joints: dict, links: dict, coordinates: dict) -> dict:
 
 def link(*end: float) -> dict:
     return RIGID | {"inertia": [0.1, 0.1, 0.1], "nodes": {"end": list(end)}}
-
-
-def test_three_slides_make_a_cartesian_robot() -> None:
-    axes = np.eye(3).tolist()
-    names = ("x", "y", "z")
-    bases = ("ground", "x.end", "y.end")
-    tree = spatial(
-        {n: {"type": "prismatic", "base": b, "follower": f"{n}.start", "axis": a}
-         for n, b, a in zip(names, bases, axes, strict=True)},
-        {n: link(0.1, 0.2, 0.3) for n in names},
-        {n: {"joint": n} for n in names},
-    )  # fmt: skip
-    points = np.array([(1.0, -2.0, 12.0), (3.0, 8.0, -4.0)])
-    due = course(points, 11)
-    q = follow(chain_of(built(tree), "z.end"), due).q
-    np.testing.assert_allclose(q, due.path.point(due.s) - [0.3, 0.6, 0.9], atol=1e-12)
-
-
-def test_a_scara_places_and_turns_its_tool() -> None:
-    """Two turns, a cylindrical quill: closed form by the law of cosines."""
-    up = {"orientation": [0, 0, 0]}
-    tree = spatial(
-        {
-            "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"} | up,
-            "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"} | up,
-            "quill": {"type": "cylindrical", "base": "fore.end", "follower": "tool.start"} | up,
-        },
-        {"upper": link(0.5, 0, 0), "fore": link(0.4, 0, 0), "tool": link(0, 0, -0.3)},
-        {
-            "q1": {"joint": "shoulder"},
-            "q2": {"joint": "elbow"},
-            "z": {"joint": "quill", "component": "translation"},
-            "turn": {"joint": "quill", "component": "rotation"},
-        },
-    )
-    points = [(0.6, 0.2, 0.1), (0.4, 0.5, -0.2), (0.1, 0.7, 0.0)]
-    turns = [(0, 0, 0.2), (0, 0, 1.0), (0, 0, 0.5)]
-    due = course(points, 50, "straight", orientation=turns)
-    chain = chain_of(built(tree), "tool.end", oriented=True)
-    q = follow(chain, due, start=[0.0, 1.0, 0.0, 0.0]).q
-    x, y, z = due.path.point(due.s).T
-    elbow = np.arccos((x**2 + y**2 - 0.41) / 0.4)
-    shoulder = np.arctan2(y, x) - np.arctan2(0.4 * np.sin(elbow), 0.5 + 0.4 * np.cos(elbow))
-    R = due.target(due.s).rotation
-    turn = np.arctan2(R[:, 1, 0], R[:, 0, 0]) - shoulder - elbow
-    np.testing.assert_allclose(q, np.stack([shoulder, elbow, z + 0.3, turn], axis=1), atol=1e-8)
 
 
 def test_a_screw_turns_as_often_as_its_path_is_long() -> None:

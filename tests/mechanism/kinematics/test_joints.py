@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from spatial_cases import Built, built, changed
-from spatial_examples import arm3r, ball_screw, four_bar, gantry
+from spatial_examples import arm3r, four_bar, gantry
 from spatial_oracle import FREEDOMS, Tree, world
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 
@@ -56,14 +55,6 @@ def test_a_joints_freedoms_are_the_derivatives_of_its_rotation_and_travel(joint:
             np.testing.assert_allclose(A[:, k], [*v, *w], atol=1e-9)
 
 
-@pytest.mark.parametrize("joint", JOINTS, ids=KINDS)
-def test_a_joint_turns_rigidly(joint: Any) -> None:
-    c = np.linspace(0.4, -0.9, FREEDOMS[joint.type])
-    R, _, _ = numbers(joint_motion(joint, c.tolist()))
-    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(R) == pytest.approx(1.0)
-
-
 def test_every_joint_of_the_language_has_its_freedoms() -> None:
     assert {kind: len(parts) for kind, parts in KNOWN_FREEDOMS.items()} == FREEDOMS
 
@@ -93,31 +84,6 @@ def test_a_joint_walked_backwards_is_its_inverse(joint: Any) -> None:
 # Exchanging base and follower, each kind with its inverse at −c where the type has one
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic", "cylindrical", "screw"])
-@pytest.mark.parametrize("q", [0.3, -0.7])
-def test_exchanging_base_and_follower_negates_the_coordinate(kind: str, q: float) -> None:
-    """(M R(a, c))ᵀ = Mᵀ R(M a, −c), and the travel likewise: same mechanism, same spectrum."""
-    tree = arm3r({"stiffness": 900.0})
-    orientation = [0.4, 0.5, -0.3]
-    joint = {"type": kind, "base": "col.end", "follower": "up.start", "orientation": orientation}
-    axis = np.array([0.4, -1.0, 0.3])
-    tree["mechanism"]["joints"]["pitch"] = joint | {"axis": axis.tolist()}
-    if kind == "screw":
-        joint["lead"] = tree["mechanism"]["joints"]["pitch"]["lead"] = 0.2
-    if kind == "cylindrical":
-        tree["coordinates"]["pitch"]["component"] = "rotation"
-        tree["coordinates"]["slide"] = {
-            "joint": "pitch", "component": "translation", "drive": {"stiffness": 4e4}
-        }  # fmt: skip
-    M = Rotation.from_euler("xyz", orientation).as_matrix()
-    inverse: Tree = joint | {"base": "up.start", "follower": "col.end", "axis": (M @ axis).tolist()}
-    inverse["orientation"] = Rotation.from_matrix(M.T).as_euler("xyz").tolist()
-    other = changed(tree, "joints.pitch", inverse)
-    there = np.array([0.3, q, -0.9, 0.05])[: len(tree["coordinates"])]
-    back = there * np.array([1.0, -1.0, 1.0, -1.0])[: len(there)]
-    np.testing.assert_allclose(built(other).lam(back, 6), built(tree).lam(there, 6), rtol=1e-9)
-
-
 def test_an_absolute_angle_of_a_link_that_others_hold_is_refused_by_name() -> None:
     tree = four_bar("free")
     m = tree["mechanism"]
@@ -135,21 +101,6 @@ def test_an_absolute_angle_of_a_link_that_others_hold_is_refused_by_name() -> No
     np.testing.assert_allclose(
         built(tree).lam([0.4, 0.7], 3), world(tree, [0.4, 0.7]).spectrum(3), rtol=1e-9
     )
-
-
-def test_a_beam_may_hang_on_the_carriage_that_rides_on_it() -> None:
-    """A ram pushed through its guide: the guide block is fixed, the beam travels."""
-    tree = gantry("free")
-    m = tree["mechanism"]
-    m["links"] = {n: m["links"][n] for n in ("girder", "trolley")}
-    m["joints"] = {
-        "block": {"type": "fixed", "base": "ground", "follower": "trolley.start", "angle": 0.4},
-        "car": m["joints"]["car"],
-    }
-    model, frame = built(tree), world(tree, [0.6])
-    np.testing.assert_allclose(model.lam([0.6], 5), frame.spectrum(5), rtol=1e-9)
-    start = [model.poses.position(model.x([s]), "girder", "start")[0] for s in (0.5, 0.7)]
-    np.testing.assert_allclose(start[1] - start[0], [-0.2 * np.cos(0.4), -0.2 * np.sin(0.4), 0.0])
 
 
 def test_a_screw_travels_its_lead_in_one_turn() -> None:
@@ -214,42 +165,6 @@ def test_twists_of_loops_are_the_derivatives_of_the_world_frames(
 
 
 # What the mounting means
-
-
-def test_an_axis_is_given_in_the_followers_axes_in_its_zero_pose() -> None:
-    """Turned by R0, the follower then turns about R0 a: its world rotation is R0 Rot(a, q)."""
-    tree = arm3r("free")
-    orientation, axis = [0.4, -0.7, 1.1], np.array([0.6, 0.0, 0.8])
-    name = next(iter(tree["mechanism"]["joints"]))
-    tree["mechanism"]["joints"][name] |= {"orientation": orientation, "axis": axis.tolist()}
-    model = built(tree)
-    zero, later = (frames(model, model.motion, np.array([a, 0.0, 0.0]))[0][0] for a in (0.0, 0.9))
-    mounted = Rotation.from_euler("xyz", orientation).as_matrix()
-    np.testing.assert_allclose(zero, mounted, atol=1e-14)
-    np.testing.assert_allclose(vee(later @ zero.T), zero @ axis * np.sin(0.9), atol=1e-14)
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2, -2.0])
-def test_a_carriage_travels_along_its_beam_however_its_follower_is_mounted(angle: float) -> None:
-    tree = gantry("free")
-    tree["mechanism"]["joints"]["car"]["angle"] = angle
-    tree["mechanism"]["links"]["trolley"] |= {"nodes": {"hook": [0.1, -0.2]}, "inertia": 0.05}
-    model = built(tree)
-    ahead, behind = (model.poses.position(model.x([s]), "trolley", "hook")[0] for s in (0.6, 0.4))
-    np.testing.assert_allclose(ahead - behind, [0.2, 0.0, 0.0], atol=1e-12)
-    frame = world(tree, [0.5])
-    np.testing.assert_allclose(model.lam([0.5], 6), frame.spectrum(6), rtol=1e-9)
-
-
-@pytest.mark.parametrize("orientation", [[0, 0, 0], [0.3, 0, 0], [0, 0, np.pi / 2], [0.4, -1, 2]])
-def test_a_nut_turns_about_its_screw_however_its_follower_is_mounted(
-    orientation: list[float],
-) -> None:
-    tree = ball_screw([float(a) for a in orientation])
-    model, frame = built(tree), world(tree, [0.43])
-    np.testing.assert_allclose(model.lam([0.43], 6), frame.spectrum(6), rtol=1e-8)
-    tip = [model.poses.position(model.x([s]), "arm", "start")[0] for s in (0.3, 0.43)]
-    np.testing.assert_allclose(tip[1] - tip[0], [0.13, 0.0, 0.0], atol=1e-14)
 
 
 def test_a_tapered_beam_keeps_its_taper_where_a_carriage_splits_it() -> None:
