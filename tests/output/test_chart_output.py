@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from eigassign.chart import (
     Advice,
@@ -24,11 +23,7 @@ from eigassign.chart import (
 )
 from eigassign.output import (
     Table,
-    chart_figures,
     chart_tables,
-    draw,
-    screen_figures,
-    screen_table,
     write_chart,
 )
 
@@ -102,22 +97,6 @@ CHART = Chart(
 )
 
 
-def test_captions_tell_what_is_not_drawn() -> None:
-    plans = {plan.name: plan.caption for plan in chart_figures(CHART)}
-    assert "1 method is wrong by over 100 %" in plans["cost_one_trajectory"]
-    assert "0.06 Hz from the limit" in plans["mesh"]
-
-
-def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
-    bare = replace(CHART, mesh=(), designs=())
-    assert {p.name for p in chart_figures(bare)} == {
-        "choice",
-        "cost_one_trajectory",
-        "online_alone",
-    }
-    assert "Designs" not in [table.title for table in chart_tables(bare)]
-
-
 def test_a_folder_holds_every_point_the_tables_and_the_figures(tmp_path: Path) -> None:
     write_chart(CHART, tmp_path, kind="light")
     data = json.loads((tmp_path / "chart.json").read_text(), parse_constant=pytest.fail)
@@ -176,77 +155,3 @@ def test_the_page_is_a_sentence_that_names_a_key_one_plot_and_the_rest_is_folded
     assert "<table" not in above
     assert "All methods" in folded
     assert "Where this comes from" in folded
-
-
-def test_the_first_plot_has_three_families_and_rings_what_to_write() -> None:
-    families = ("reduced, 1 point", "1/λ, full", "reduced, 3 points")
-    more = tuple(replace(CHART.points[1], method=f, family=f, key="") for f in families)
-    plan = chart_figures(replace(CHART, points=(*CHART.points, *more)))[0]
-    figure = draw(plan)
-    (axes,) = figure.axes
-    assert axes.get_xlabel() == "time [µs]"
-    assert sorted(words(figure)) == [
-        "exact solves", "reduced models", "series of λ", "to write in the case",
-    ]  # fmt: skip
-    (ring,) = [line for line in axes.get_lines() if line.get_markersize() == 12.0]
-    np.testing.assert_allclose(ring.get_xydata(), [(0.1, 0.05)])
-    heights = [line.get_ydata()[0] for line in axes.get_lines() if len(set(line.get_ydata())) == 1]
-    assert 1.0 in heights  # % that were asked for
-
-
-def test_a_time_measured_once_says_so() -> None:
-    assert [row[1] for row in table("Designs").rows] == ["100 ms (90 ms–110 ms)"] * 2
-    assert [row[-1] for row in table("Mesh").rows] == ["100 µs (90 µs–110 µs)", "200 µs (once)"]
-    assert ("versions", "Python 3.12, NumPy 2") in table("Machine").rows
-
-
-def test_what_auto_takes_is_ringed() -> None:
-    plan = chart_figures(CHART)[1]
-    bare = chart_figures(replace(CHART, advice=()))[1]
-    ringed, plain = draw(plan), draw(bare)
-    (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
-    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[2].cost_s(152.0), 0.05)])
-    assert "taken by order: auto" in words(ringed)
-    assert "taken by order: auto" not in words(plain)
-
-
-def words(figure: Figure) -> list[str]:
-    return [text.get_text() for key in figure.legends for text in key.get_texts()]
-
-
-def test_points_are_drawn_by_kind_over_a_band_through_the_best() -> None:
-    figure = draw(chart_figures(CHART)[2])
-    (axes,) = figure.axes
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [%]")
-    assert words(figure)[:6] == [
-        "eigassign", "exact solves", "series of λ", "others", "exact solves by others",
-        "taken by order: auto",
-    ]  # fmt: skip
-    shown = {line.get_label(): line for line in axes.get_lines()}
-    np.testing.assert_allclose(shown["series of λ"].get_xydata(), [(1e-7, 0.05)])
-    np.testing.assert_allclose(shown["exact solves by others"].get_xydata(), [(2e-7, 0.005)])
-    assert shown["exact solves by others"].get_markerfacecolor() == "white"
-    (band,) = [line for line in axes.get_lines() if line.get_linewidth() == 7.0]
-    np.testing.assert_allclose(band.get_xydata(), [(1e-7, 0.05), (2e-7, 0.005), (1e-4, 5e-11)])
-
-
-def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> None:
-    families = (
-        "exact", "exact by others", "Taylor, full", "1/λ, full", "reduced, 1 point",
-        "Taylor, auto", "Taylor, linearised",
-    )  # fmt: skip
-    points = [
-        replace(CHART.points[0], method=f"m {f}", family=f, ours="by" not in f) for f in families
-    ]
-    shown = chart_figures(replace(CHART, points=tuple(points)))[1].shows
-    labels = [curve.label for curve in shown.panels[0].curves if curve.label]
-    assert len(labels) == len(set(labels)) <= 8
-    looks = {curve.look for curve in shown.panels[0].curves if curve.names}
-    assert len(looks) == 5
-    (figure,) = screen_figures(shown)
-    assert {name for trace in figure["data"] for name in trace.get("text", ())} == {
-        f"m {family}" for family in families
-    }
-    _, rows = screen_table(shown)
-    assert next(row[0] for row in rows).startswith("m ")

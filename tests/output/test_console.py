@@ -9,16 +9,13 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.output import (
-    CaseOutcome,
     Table,
-    batch_table,
     modes_table,
     print_assignment,
     print_tables,
     print_verdict,
     progress,
     validation_table,
-    wrapped,
 )
 from eigassign.study import ValidationRow
 
@@ -87,44 +84,6 @@ def test_all_tables_of_a_run_fit_the_width_and_break_no_word(columns, monkeypatc
     assert columns < 60 or {word for word in new if set(word) != {"─"}} == set()
 
 
-def test_long_paths_go_on_in_the_next_line_and_numbers_are_whole(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
-    path = "coordinates.shoulder_of_the_arm.drive.stiffness"
-    text = shown(Table("", ("name", "path", "value"), (("k", path, "1.5e+05"),)))
-    first, second = text.splitlines()[-3:-1]
-    assert first.split()[1] + second.strip() == path
-    assert first.endswith("1.5e+05")
-
-
-def test_a_heading_is_folded_only_where_the_width_asks_for_it(monkeypatch):
-    columns = ("name", "at the start", "at the end", "error in Hz")
-    table = Table("", columns, (("mode 1", "1", "2", "3"),))
-    headings = []  # that are in one line
-    for width in (45, 38, 36):
-        monkeypatch.setenv("COLUMNS", str(width))
-        lines = shown(table).splitlines()
-        assert max(map(len, lines)) <= width
-        headings.append([heading for heading in columns if any(heading in line for line in lines)])
-    assert headings == [list(columns), ["name", "at the start", "error in Hz"], list(columns[:2])]
-
-
-def test_rows_that_share_their_first_cell_are_named_by_two_in_every_part(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
-    rows = (("mode 1", "over q", "1" * 12, "2" * 12), ("mode 1", "over y", "3" * 12, "4" * 12))
-    text = shown(Table("", ("mode", "where", "Taylor", "linear"), rows))
-    found = [line.split() for line in text.splitlines()]
-    assert ["mode", "1", "over", "y", "3" * 12] in found
-    assert ["mode", "1", "over", "y", "4" * 12] in found
-
-
-def test_columns_that_need_a_second_part_are_not_narrowed_for_nothing(monkeypatch):
-    path = "sections.upper_tube.outer_diameter"
-    monkeypatch.setenv("COLUMNS", "60")
-    columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper", "lies on")
-    row = ("diameter", path, "m", "0.04", "0.0433304", "0.035", "0.06", "upper")
-    assert path in shown(Table("", columns, (row,)))
-
-
 def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatch):
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)
@@ -147,18 +106,6 @@ def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatc
             assert "\x1b" not in coloured()
 
 
-def test_long_lines_end_between_words_and_go_on_indented():
-    lines = ["a short line", "  note: one two three /a/path/longer/than/the/line four"]
-    assert wrapped(lines, 20) == [
-        "a short line",
-        "  note: one two",
-        "    three",
-        "    /a/path/longer/than/the/line",
-        "    four",
-    ]
-    assert wrapped(lines, 10_000) == lines
-
-
 def test_modes_are_numbered_from_the_first_elastic_one():
     found = modes_table([202.21961234567, 513.2], rigid_modes=2, where="q1 = 1.8 rad")
     assert found.title == "Modes at q1 = 1.8 rad"
@@ -179,15 +126,6 @@ def test_a_validation_says_which_line_failed():
     ]
     found = [(row[2], row[5], row[-1]) for row in validation_table(rows).rows]
     assert found == [("trajectory", "0.0900 %", "ok"), ("box", "5.00 %", "FAILED")]
-
-
-def test_a_batch_lists_every_case():
-    good = CaseOutcome("arm", "arm.yaml", "ok", 1.25, exact_max_relative=0.0155)
-    bad = CaseOutcome("leg", "leg.yaml", "error", 0.5, "leg.yaml:3:1: [what] is wrong")
-    assert batch_table([good, bad]).rows == (
-        ("arm", "Done", "1.55 %", "1.25 s", ""),
-        ("leg", "Not run", "", "500 ms", "leg.yaml:3:1: [what] is wrong"),
-    )
 
 
 def test_progress_counts_in_lines_off_terminal_and_in_place_on_one():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import itertools
 import unicodedata
 import xml.etree.ElementTree as ET
 
@@ -15,8 +14,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import as_limit, make_results, studied
 
-from eigassign.output import Curve, FigurePlan, Graph, Look, Panel, draw, render, run_figures
-from eigassign.study import OtherModes, RunResults
+from eigassign.output import FigurePlan, draw, render, run_figures
+from eigassign.study import RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
 EVERY = {
@@ -114,16 +113,6 @@ def test_what_was_asked_is_drawn_with_the_modes_around_it_and_its_distance(paper
     assert set(legend(figure)) == {"mode 1 at 190 Hz", "initial design", "optimal design"}
 
 
-def test_targets_far_apart_have_panels_of_their_own(paper):
-    results = make_results(n_targets=3)
-    (plan,) = plans_of(results, "frequencies")
-    panels = [panel for panel in plan.shows.panels if panel.label == "frequency [Hz]"]
-    assert len(panels) == 3
-    for panel, target in zip(panels, results.targets, strict=True):
-        assert panel.limits[0] < target.exact_hz.min() < target.exact_hz.max() < panel.limits[1]
-    assert len([p for p in run_figures(results) if p.section == "answer"]) == 2
-
-
 def test_all_that_is_forbidden_is_shaded(paper):
     lower, upper = paper.targets[0].asked.lower, paper.targets[0].asked.upper
     endless = np.full(lower.size, np.inf)
@@ -146,18 +135,6 @@ def test_all_that_is_forbidden_is_shaded(paper):
     assert "distance" in gap.get_ylabel()
 
 
-def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
-    lower = paper.targets[0].asked.lower
-    endless = np.full(lower.size, np.inf)
-    found = with_limits(paper, ("at_least", lower, endless), ("at_most", -endless, lower))
-    axes = drawn(found, "frequencies").axes[0]
-    below, above = (shade.get_paths()[0].get_extents() for shade in axes.collections)
-    assert below.y1 == pytest.approx(lower[0])
-    assert above.y0 == pytest.approx(lower[0])
-    low, high = axes.get_ylim()
-    assert max(below.height, above.height) < 0.06 * (high - low)
-
-
 def test_the_progress_shows_every_step_and_the_one_shot(paper):
     figure = drawn(paper, "progress")
     assert legend(figure) == ["initial", "taken", "given up", "one shot"]
@@ -168,26 +145,6 @@ def test_the_progress_shows_every_step_and_the_one_shot(paper):
     axes, below = drawn(found, "progress").axes
     assert axes.get_ylabel() == "objective"
     assert below.get_ylabel() == "limits missed [%]"  # by the initial design
-
-
-def test_steps_that_miss_limits_say_by_how_much(paper):
-    pairs = zip(paper.assignment.steps, (0.03, 0.001, 0.0), strict=True)
-    steps = tuple(dataclasses.replace(step, violation=missed) for step, missed in pairs)
-    row = dataclasses.replace(paper.assignment, steps=steps)
-    above, below = drawn(dataclasses.replace(paper, assignment=row), "progress").axes
-    assert below.get_ylabel() == "limits missed [%]"
-    assert below.get_lines()[1].get_ydata()[0] == pytest.approx(3.0)
-    assert above.get_ylabel() == "rms error [%]"
-
-
-def test_a_band_is_shown_with_the_modes_near_it(paper):
-    found = with_limits(paper, ("keep_out", np.full(152, 180.0), np.full(152, 220.0)))
-    near, far = np.full((152, 3), [160.0, 230.0, 700.0]), np.full((152, 3), [165.0, 240.0, 710.0])
-    found = dataclasses.replace(found, spectrum=OtherModes((1, 2, 3), near, far))
-    (axes,) = drawn(found, "frequencies").axes
-    low, high = axes.get_ylim()
-    assert low < 160.0 < 240.0 < high < 400.0
-    assert [text.get_text() for text in axes.texts] == ["mode 1", "mode 2"]
 
 
 def test_sensitivities_are_bars_of_the_largest():
@@ -203,63 +160,6 @@ def test_sensitivities_are_bars_of_the_largest():
     assert legend(figure) == ["mode 1 at 190 Hz", "mode 2 at 380 Hz"]
     (plan,) = plans_of(results, "sensitivity")
     assert "10 largest of 12" in plan.caption
-
-
-def test_ranges_enclose_the_answer_along_each_trajectory():
-    results = studied(make_results(parts=(100, 52)))
-    assert plans_of(results, "range_1")
-    (axes,) = drawn(results, "range_2").axes
-    reach, spread = (shade.get_paths()[0].get_extents() for shade in axes.collections[:2])
-    answer = results.targets[0].exact_hz[100:]
-    assert reach.y0 == pytest.approx(results.meaning.reach[0].lowest_hz[100:].min())
-    assert spread.y1 == pytest.approx(1.01 * answer.max())
-    np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), answer)
-
-
-def test_the_comparison_shows_both_expansions_and_their_errors(paper):
-    figure = drawn(paper, "approximation_mode_1_time")
-    above, below = figure.axes
-    values = paper.studies[0].over_time
-    curves = (values.exact_hz, values.taylor_hz, values.linearised_hz)
-    for line, hz in zip(above.get_lines(), curves, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), hz)
-    assert below.get_yscale() == "log"
-    off = np.maximum(100.0 * np.abs(values.taylor_error), below.get_ylim()[0])
-    np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), off)
-    assert legend(figure)[:2] == ["exact", "Taylor, order 4 (worst 0.0900 %)"]
-
-
-def test_the_coordinates_have_a_panel_for_each_unit_and_no_two_neighbours_are_alike():
-    found = make_results(n_q=12)
-    figure = drawn(found, "coordinates")
-    angles, strokes = figure.axes
-    assert (angles.get_ylabel(), strokes.get_ylabel()) == ("joint angle [rad]", "joint stroke [m]")
-    np.testing.assert_array_equal(strokes.get_lines()[0].get_ydata(), found.q[:, 3])
-    (plan,) = plans_of(found, "coordinates")
-    looks = {curve.label: curve.look for panel in plan.shows.panels for curve in panel.curves}
-    ordered = [looks[f"q{k + 1}"] for k in range(12)]
-    assert len(set(ordered)) == 12
-    assert all(first.dash != second.dash for first, second in itertools.pairwise(ordered))
-
-
-def test_maps_stand_side_by_side_with_the_expansion_point(paper):
-    figure = drawn(paper, "approximation_mode_1_design")
-    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
-    assert [axes.get_title(loc="left").splitlines()[0] for axes in maps] == [
-        "exact",
-        "Taylor, order 4",
-        "linearised in y",
-    ]
-    over = paper.studies[0].over_design
-    for axes in maps:
-        assert axes.get_xlabel() == "m1 [g]"  # 0.25 kg at most
-        assert axes.get_xlim() == pytest.approx((0.0, 1000.0 * over.axes[0][-1]))
-        ((x,), (y,)) = axes.get_lines()[0].get_data()
-        assert (x, y) == pytest.approx((125.0, 125.0))
-    (bands,) = [c for c in maps[0].collections if c.get_array() is not None]
-    assert bands.levels[0] <= over.values.exact_hz.min()
-    assert bands.levels[-1] >= over.values.exact_hz.max()
-    assert legend(figure) == ["expansion point"]
 
 
 @pytest.mark.parametrize("spatial", [False, True])
@@ -309,16 +209,6 @@ def test_the_user_s_matplotlib_settings_change_nothing_and_are_left_alone(paper)
         assert render(plans) == files
 
 
-def test_another_answer_gives_another_picture(paper):
-    moved = dataclasses.replace(paper.targets[0], exact_hz=paper.targets[0].exact_hz * 1.01)
-    names = ("frequencies", "coordinates")
-    before, after = (
-        render(plans_of(results, *names))
-        for results in (paper, dataclasses.replace(paper, targets=(moved,)))
-    )
-    assert [name for name in before if before[name] != after[name]] == ["frequencies.png"]
-
-
 def test_results_without_a_trajectory_plan_only_what_they_have():
     assert run_figures(make_results(n_t=0, n_y=0)) == ()
     (only,) = run_figures(make_results(n_t=0, n_y=2))
@@ -337,90 +227,7 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     drawn(found, "approximation_mode_1_design").canvas.draw()
 
 
-def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
-    found = make_results(varies=False)
-    (data,) = render(plans_of(found, "approximation_mode_1_design")).values()
-    image = pixels(data)
-    middle = image[image.shape[0] // 2]
-    assert (middle < 200).all(axis=1).mean() > 0.5
-
-
-def test_numbers_beside_maps_never_run_into_each_other(paper):
-    study = paper.studies[0]
-    wide = dataclasses.replace(study.over_design, axes=(np.linspace(1.2e5, 1.8e5, 21),) * 2)
-    flat = dict.fromkeys(("exact_hz", "taylor_hz", "linearised_hz"), np.ones((21, 21)))
-    over = dataclasses.replace(wide, values=dataclasses.replace(wide.values, **flat))
-    found = dataclasses.replace(paper, studies=(dataclasses.replace(study, over_design=over),))
-    figure = drawn(found, "approximation_mode_1_design")
-    figure.canvas.draw()
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = axis.get_view_interval()
-            boxes = [
-                tick.label1.get_window_extent()
-                for tick in axis.get_major_ticks()
-                if low <= tick.get_loc() <= high and tick.label1.get_visible()
-            ]
-            boxes = [box for box in boxes if box.width > 1.0]
-            assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
-
-
 # --- What a panel holds
-
-PLAIN = Look("#000000")
-
-
-@pytest.mark.parametrize(
-    "span", [(0.0, 1.0), (-3.0, 5.0), (190.0, 190.0), (0.0, 0.0), (123456.0, 123456.0001)]
-)
-def test_an_ordinate_encloses_all_values_and_is_never_empty(span):
-    low, high = Panel("", (Curve(np.array([np.nan, *span]), PLAIN),)).limits
-    assert low <= span[0] <= span[1] <= high
-    assert high - low > 1e-6 * abs(high)
-
-
-@pytest.mark.parametrize(
-    ("values", "most", "limits"),
-    [
-        ([0.5, 0.03], 5, (0.01, 1.0)),
-        ([2e-7, 3e-6], 5, (1e-7, 1e-5)),
-        ([1e-9, 0.5], 5, (1e-5, 1.0)),
-        ([3e-11, 5.0, np.inf, 0.0], None, (1e-11, 10.0)),
-        ([0.0, 0.0], 5, (1e-11, 1e-10)),
-        ([np.nan, 0.2, 0.5], 5, (0.1, 1.0)),
-    ],
-)
-def test_decades_hold_all_values_or_the_highest(values, most, limits):
-    curve = Curve(np.array(values), PLAIN)
-    panel = Panel("", (curve,), logarithmic=True, decades=most)
-    assert panel.limits == pytest.approx(limits, abs=0.0)
-
-
-def test_the_lowest_label_of_a_logarithmic_axis_owns_up_to_what_it_cuts():
-    panel = Panel("error", (Curve(np.array([0.0, 0.02, 0.5]), PLAIN),), logarithmic=True)
-    shown = Graph("", "", np.arange(3.0), (panel,))
-    (axes,) = draw(FigurePlan("", "", "", "", shown)).axes
-    assert axes.get_ylim() == (0.01, 1.0)
-    show = axes.yaxis.get_major_formatter()
-    labels = [show(at) for at in (0.01, 0.1, 1.0, 1e4, 1e5)]
-    assert labels == ["≤0.01", "0.1", "1", "10000", "10⁵"]
-    np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), [0.01, 0.02, 0.5])
-
-
-@pytest.mark.parametrize(
-    ("ends", "places"),
-    [
-        ([0.0, 1.0], [0.0, 1.0]),
-        ([0.5, 0.5, 0.5], [0.3, 0.5, 0.7]),
-        ([0.0, 0.1, 0.25], [-1 / 12, 7 / 60, 19 / 60]),
-        ([], []),
-    ],
-)
-def test_labels_at_curve_ends_are_moved_apart_and_no_further(ends, places):
-    curves = tuple(Curve(np.array([end]), PLAIN, end="a") for end in ends)
-    scale = (Curve(np.array([0.0, 1.0]), PLAIN),)
-    panel = Panel("", (*curves, *scale), height=0.15 * 1.1 / 0.2)  # a label is 0.2 high then
-    np.testing.assert_allclose([at for _, at, _ in panel.ends()], places)
 
 
 def test_names_lose_their_control_characters_and_their_middle():

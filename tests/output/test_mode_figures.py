@@ -15,14 +15,12 @@ from PIL import Image
 import eigassign as ea
 from eigassign.output import (
     draw,
-    mechanism_plan,
     mode_figures,
     render,
-    scale_words,
     thumbnail,
     write_modes,
 )
-from eigassign.study import DrawnBody, DrawnPoses, ModePictures, draw_modes, with_middle_loads
+from eigassign.study import ModePictures, draw_modes, with_middle_loads
 
 CASES = Path(__file__).parents[2] / "cases"
 GALLERY = CASES / "gallery"
@@ -117,83 +115,3 @@ def test_the_shapes_are_left_as_numbers_too(tmp_path: Path) -> None:
 
 
 # --- A drawing
-
-
-def poses(*lines: list[list[float]], **more: object) -> DrawnPoses:
-    """One pose of these lines."""
-    more = {"line_links": ("a",) * len(lines), **more}
-    return DrawnPoses(np.zeros(1), (tuple(np.array(line) for line in lines),), ("a",), **more)
-
-
-def bearings(figure: Figure) -> list[np.ndarray]:
-    """The axes' directions on the sheet."""
-    ends = [line.get_xydata() for line in figure.axes[1].get_lines()[:-1]]
-    return [end[1] - end[0] for end in ends]
-
-
-def test_space_is_seen_from_above_with_z_upright_and_x_to_the_right() -> None:
-    cloud = np.random.default_rng(0).standard_normal((40, 3)).tolist()
-    x, y, z = bearings(draw(mechanism_plan("", poses(cloud))))
-    assert z[0] == pytest.approx(0.0)
-    assert z[1] > 0.0
-    assert x[0] > 0.0
-    assert x[1] < 0.0 < y[1]
-    sheet = np.array([x, y, z]) / np.linalg.norm([x[0], y[0]])
-    np.testing.assert_allclose(sheet.T @ sheet, np.eye(2), atol=1e-12)
-
-
-def test_a_mechanism_in_the_plane_of_sight_is_seen_from_another_side() -> None:
-    rng, turn = np.random.default_rng(0), np.radians(-60.0)
-    flat = rng.uniform(size=(50, 2)) @ np.array([[np.cos(turn), np.sin(turn), 0], [0, 0, 1]])
-    usual = bearings(draw(mechanism_plan("", poses(rng.uniform(size=(50, 3)).tolist()))))
-    figure = draw(mechanism_plan("", poses(flat.tolist())))
-    assert not np.allclose(bearings(figure), usual)
-    (line,) = segments(figure, BLUE)
-    assert np.linalg.svd(line - line.mean(axis=0), compute_uv=False)[1] > 1.0
-
-
-def test_a_taper_is_drawn_in_pieces_that_grow_thinner() -> None:
-    line = [[0.0, 0.0], [1.0, 0.0]]
-    figure = draw(mechanism_plan("", poses(line, depths=((0.1, 0.025),))))
-    _, links = figure.axes[0].collections  # over a gap around it
-    widths = np.array(links.get_linewidths())
-    assert len(widths) > 4
-    assert (np.diff(widths) < 0.0).all()
-    np.testing.assert_allclose(links.get_segments()[0][0], line[0])
-    np.testing.assert_allclose(links.get_segments()[-1][-1], line[1], atol=1e-12)
-
-
-def test_sections_are_drawn_to_scale_or_so_many_times_as_thick() -> None:
-    lines = [[[0.0, float(k)], [2.0, float(k)]] for k in range(3)]
-    for depth, times, words in (
-        (0.2, 1, "to scale"),
-        (0.01, 10, "10 times"),
-        (5.0, None, "thinner"),
-    ):
-        depths = ((depth, depth), (depth / 2, depth / 2), (0.0, 0.0))
-        shown = poses(*lines, depths=depths)
-        axes = draw(mechanism_plan("", shown)).axes[0]
-        points_per_metre = np.diff(axes.transData.transform([[0, 0], [1, 0]])[:, 0])[0]
-        points_per_metre *= 72.0 / axes.figure.dpi
-        thick, thin, plain = (c.get_linewidths()[0] for c in axes.collections[1::2])
-        assert thin == pytest.approx(thick / 2)
-        assert plain >= 1.3
-        if times:
-            assert thick == pytest.approx(times * depth * points_per_metre, rel=1e-6)
-        assert words in scale_words(shown)
-
-
-def test_heavy_bodies_are_large() -> None:
-    line = [[0.0, 0.0], [1.0, 0.0]]
-    bodies = tuple(DrawnBody(f"{m}", m, np.zeros((1, 2))) for m in (8.0, 1.0, 0.0))
-    axes = draw(mechanism_plan("", poses(line, bodies=bodies))).axes[0]
-    assert [dot.get_markersize() for dot in axes.get_lines()] == [12.0, 9.0, 6.0]
-
-
-@pytest.mark.parametrize(
-    ("size", "label"), [(0.5, "0.1 m"), (0.2, "20 mm"), (10.0, "2 m"), (2e-7, "2·10⁻⁸ m")]
-)
-def test_the_scale_is_a_round_length(size: float, label: str) -> None:
-    figure = draw(mechanism_plan("", poses([[0.0, 0.0], [size, 0.0]])))
-    texts = [text.get_text() for text in figure.axes[1].texts]
-    assert texts == ["x", "y", label]

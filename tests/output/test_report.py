@@ -24,7 +24,6 @@ from eigassign.output import (
     screen_figures,
     write_run,
 )
-from eigassign.study import ErrorRow
 
 VOID = {"meta", "img", "br", "link", "input"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
@@ -143,53 +142,6 @@ def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
     assert ("So it is." in parsed.text) == (tone == "bad")
 
 
-def test_a_worst_error_that_grew_is_said_with_the_rms_that_fell():
-    results = make_results()
-    (target,) = results.targets
-    initial, exact = ErrorRow(0.05, 0.04), ErrorRow(0.06, 0.02)
-    target = replace(target, error=replace(target.error, initial=initial, exact=exact))
-    row = replace(results.assignment, verdict="improved", max_error=0.01)
-    _, parsed, _ = made(replace(results, targets=(target,), assignment=row))
-    said = "mode 1 at 190 Hz is 2.00 % off rms, 6.00 % at worst (4.00 % and 5.00 % before)."
-    assert f"Improved, not reached : {said}" in parsed.text
-
-
-def test_the_sentence_is_of_what_the_reason_is_of():
-    results = make_results(n_targets=2)
-    reason = "mode 2 at 380 Hz is out of reach; the nearest design: so it is"
-    row = replace(results.assignment, verdict="unreachable", reason=reason, max_error=1e-3)
-    _, parsed, _ = made(replace(results, assignment=row))
-    assert "Not reachable : mode 2 at 380 Hz is" in parsed.text
-    assert "Mode 2 at 380 Hz is out of reach. " in parsed.text  # the rest is in the sentence
-
-
-def test_bars_write_large_numbers_out():
-    results = make_results()
-    row = replace(results.design[0], initial=8000.0, optimal=15432.6, lower=5000.0, upper=2e4)
-    _, parsed, _ = made(replace(results, design=(row, *results.design[1:])))
-    first = parsed.text.split("How sure")[0]
-    assert "8000 → 15430" in first
-    assert "20000" in first
-    assert "e+04" not in first
-
-
-def test_a_light_report_names_what_it_has_no_room_for():
-    html, parsed, images = made(make_results(), size=100_000)
-    assert 500_000 < len(html) < 10**6
-    shown = [a for tag, a in parsed.tags if tag == "img"]
-    assert 0 < len(shown) < len(images)
-    assert f"figures/{list(images)[-1]}" in parsed.text
-
-
-def test_numbers_of_the_run_stand_in_the_tables():
-    results = make_results()
-    _, parsed, _ = made(results)
-    for text in ("228.7", "6.00 %", "1.00 %", "3.1e-17", "solved", "12.3 ms", "250", "kg"):
-        assert text in parsed.text
-    for line in (*results.warnings, *results.notes, results.case_sha256):
-        assert line in parsed.text
-
-
 @pytest.mark.parametrize("full", [False, True])
 def test_text_from_the_case_is_never_markup(full):
     html, parsed, _ = made(make_results(title=EVIL, prefix=EVIL), full)
@@ -205,21 +157,6 @@ def test_text_from_the_case_is_never_markup(full):
 def test_unpaired_surrogates_do_not_stop_the_report():
     html, _, _ = made(make_results(title="a\udcffb"))
     assert "a&#56575;b" in html
-
-
-@pytest.mark.parametrize(
-    ("options", "absent"),
-    [({"n_t": 0, "n_y": 0}, "Worst distance"), ({"n_t": 0}, "Mechanism")],
-)
-def test_what_was_not_asked_for_is_left_out(options, absent):
-    _, parsed, _ = made(make_results(**options))
-    assert absent not in parsed.text
-
-
-def test_several_targets_are_listed_and_summed_up():
-    _, parsed, _ = made(make_results(n_targets=3))
-    for label in ("mode 1", "mode 2", "mode 3", "all"):
-        assert label in parsed.text
 
 
 def test_a_run_leaves_results_report_and_figures(tmp_path):
@@ -254,14 +191,6 @@ def test_the_report_is_right_with_figures_of_any_format(tmp_path, formats, embed
     assert len(images) == (embedded is not None)
     assert all((embedded or "") in image for image in images)
     assert (f"figures/{plan.name}.pdf" in parsed.text) == (embedded is None)
-
-
-def test_the_report_is_right_without_figures(tmp_path):
-    write_run(make_results(), tmp_path, (), "light")
-    assert not (tmp_path / "figures").exists()
-    parsed = Page((tmp_path / "report.html").read_text())
-    assert not any(tag in ("img", "figure") for tag, _ in parsed.tags)
-    assert "6.00 %" in parsed.text
 
 
 def test_no_report_is_written_where_none_is_wanted(tmp_path):

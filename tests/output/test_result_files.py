@@ -61,13 +61,6 @@ def test_with_several_targets_the_error_is_over_all_of_them():
     assert found["frequencies"] == found["targets"][0]["frequencies"]
 
 
-def test_what_was_not_asked_for_is_null():
-    found = read(make_results(n_t=0, n_y=0))
-    assert found["error"] is found["frequencies"] is found["solver"] is None
-    assert found["design"] == {}
-    assert found["targets"] == found["other_modes"] == []
-
-
 def test_every_number_comes_back_bit_for_bit():
     results = make_results(scale_hz=np.pi)
     found = read(results)

@@ -14,7 +14,6 @@ import pytest
 
 from eigassign.output import (
     CaseOutcome,
-    batch_table,
     from_plain,
     index_page,
     to_plain,
@@ -155,25 +154,6 @@ def test_numbers_on_the_page_have_few_digits_and_the_units_that_people_use(tmp_p
     assert hidden == ["mode 1, lowest", "mode 1, highest", "time"]
 
 
-def test_what_is_swept_has_the_unit_it_is_written_in_and_digits_that_tell_it_apart(tmp_path):
-    near = [variant(k, 100 + k / 1000, f"{190 + k} deg") for k in range(3)]
-    found = page_of(tmp_path, near)
-    assert found["tool.mass"] == ("kg", "swept", [100.0, 100.001, 100.002])
-    assert found["targets.0.frequency"][0] == "deg"
-    words = [variant(k, 1.0, hz) for k, hz in enumerate(("auto", "12 Hz", "14 Hz"))]
-    assert page_of(tmp_path, words)["targets.0.frequency"][2] == ["auto", "12 Hz", "14 Hz"]
-
-
-def test_variants_are_named_by_their_number_and_no_name_has_a_hash_that_it_needs_not(tmp_path):
-    assert page_of(tmp_path, GRID)["case"][2] == [str(k + 1) for k in range(16)]
-    twice = [variant(0, 0.1, "12 Hz"), variant(1, 0.1, "12 Hz"), variant(2, 0.2, "12 Hz")]
-    names = ["mass=0.1,frequency=12Hz~0000000000", "mass=0.1,frequency=12Hz~0000000001"]
-    assert page_of(tmp_path, twice)["case"][2] == [*names, "mass=0.2,frequency=12Hz"]
-    assert [row[0] for row in batch_table(twice).rows] == [*names, "mass=0.2,frequency=12Hz"]
-    plain = replace(GRID[0], name="arm~0123456789", values={})
-    assert page_of(tmp_path, [plain], ())["case"][2] == ["arm~0123456789"]
-
-
 def test_the_page_says_in_a_sentence_how_many_meet_what_is_asked(tmp_path):
     missed = {"status": "failed", "verdict": "unreachable", "message": "unreachable: mode 1 is off"}
     rows = [*GRID[:2], *(replace(row, **missed, exact_max_relative=0.3) for row in GRID[2:])]
@@ -187,25 +167,6 @@ def test_the_page_says_in_a_sentence_how_many_meet_what_is_asked(tmp_path):
     for rows, said in ((GRID, "All 16 variants meet"), ([GRID[0]], "The variant meets")):
         page_of(tmp_path, rows)
         assert said in (tmp_path / "index.html").read_text("utf-8")
-
-
-def test_designs_that_differ_from_case_to_case_are_told_in_words(tmp_path):
-    rows = [
-        replace(GRID[k], name=name, path=f"{name}.yaml", values={}, units={f"m{k}": "kg"},
-                design=((f"m{k}", 0.25), ("w", 1.0)))
-        for k, name in enumerate(("arm", "leg", "boom"))
-    ]  # fmt: skip
-    found = page_of(tmp_path, rows, ())
-    assert found["design"][2] == [f"m{k}\N{NO-BREAK SPACE}250\N{NO-BREAK SPACE}g" for k in range(3)]
-    assert found["w"][2] == [1.0, 1.0, 1.0]
-    assert found["case"][2] == ["arm", "leg", "boom"]
-
-
-def test_of_several_swept_files_the_file_is_one_of_the_swept_values(tmp_path):
-    other = [replace(row, path="cases/leg.yaml", index=16 + row.index) for row in GRID]
-    found = page_of(tmp_path, [*GRID, *other])
-    assert found["case file"][1:] == ("swept", ["arm"] * 16 + ["leg"] * 16)
-    assert found["case"][2][-1] == "32"
 
 
 def test_the_page_of_a_thousand_variants_is_at_most_two_megabytes(tmp_path):
