@@ -1,4 +1,4 @@
-"""The shipped cases: what the references know of them, and that each can be followed."""
+"""The shipped cases: what closed forms know of them, and that each can be followed."""
 
 from __future__ import annotations
 

@@ -227,9 +227,6 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     drawn(found, "approximation_mode_1_design").canvas.draw()
 
 
-# --- What a panel holds
-
-
 def test_names_lose_their_control_characters_and_their_middle():
     found = make_results(prefix=LONG + "x" * 50)
     names = legend(drawn(found, "coordinates"))

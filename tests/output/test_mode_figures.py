@@ -1,4 +1,4 @@
-"""Pictures of modes, and how space is shown on a sheet."""
+"""Pictures of modes."""
 
 from __future__ import annotations
 
@@ -112,6 +112,3 @@ def test_the_shapes_are_left_as_numbers_too(tmp_path: Path) -> None:
         "mode_2.png",
         "mode_3.png",
     ]
-
-
-# --- A drawing

@@ -1,4 +1,4 @@
-"""Tables of what only some runs have: bands, catalogues, prices, error against mass."""
+"""Tables of what only some runs have: bands, catalogues, limits."""
 
 from __future__ import annotations
 

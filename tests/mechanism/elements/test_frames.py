@@ -1,4 +1,4 @@
-"""Links of several beams: the same as one beam, as the plain frame, however they are drawn."""
+"""Links of several beams: the same as one beam, and where their sections lie."""
 
 from __future__ import annotations
 

@@ -81,9 +81,6 @@ def test_a_joint_walked_backwards_is_its_inverse(joint: Any) -> None:
         np.testing.assert_allclose(A[:, k], [*v, *w], atol=1e-9)
 
 
-# Exchanging base and follower, each kind with its inverse at −c where the type has one
-
-
 def test_an_absolute_angle_of_a_link_that_others_hold_is_refused_by_name() -> None:
     tree = four_bar("free")
     m = tree["mechanism"]
@@ -162,9 +159,6 @@ def test_twists_of_loops_are_the_derivatives_of_the_world_frames(
 ) -> None:
     tree, q0, _ = random_closed(*drawn)
     twists_agree(tree, q0)
-
-
-# What the mounting means
 
 
 def test_a_tapered_beam_keeps_its_taper_where_a_carriage_splits_it() -> None:
