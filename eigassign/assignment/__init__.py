@@ -32,7 +32,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.stationarity": "first_order",
         "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
-        "program": ("Bounds ProgramAnswer ScaledProgram build_program scaled_program unscaled"),
+        "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.band": "ForbiddenBand",
         "requirements.frequency": "AssignedFrequency",
         "requirements.gap": "ModeGap",

@@ -44,11 +44,10 @@ __all__, __getattr__, __dir__ = face(
         "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "statics": "Flexibility compliances sags",
-        "storage": "expansion_arrays stored_series tree_arrays",
+        "storage": "expansion_arrays tree_arrays",
         "surrogate": "Surrogate",
         "under_load": "WeightChanges buckling sag_of_nodes weight_changes",
         "taylor.bordered": "factor_dense factor_sparse",
-        "taylor.local_coordinates": "substitute",
         "taylor.recursion": "expand_subspace",
     },
 )

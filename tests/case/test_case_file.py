@@ -109,38 +109,10 @@ def test_joint_samples_may_come_with_times_or_a_duration_and_in_degrees() -> Non
     assert (even.time, even.duration) == (None, 0.2)
 
 
-def test_a_trajectory_file_is_found_beside_the_case(tmp_path: Path) -> None:
-    (tmp_path / "path.csv").write_text("time,q1,q2\n0,0,0\n1,1,1\n")
-    (tmp_path / "case.yaml").write_text(edited(MOTION, "  file: path.csv\n"))
-    assert load(tmp_path / "case.yaml").trajectory.file == str(tmp_path / "path.csv")
-
-
 def test_a_wanted_frequency_may_change_in_time() -> None:
     text = edited("frequency: 190 Hz", "frequency: {time: [0, 1 s], frequency: [0.19 kHz, 200]}")
     profile = read(text).targets[0].frequency
     assert (profile.time, profile.frequency) == ((0, 1), (190, 200))
-
-
-@pytest.mark.parametrize(
-    ("path", "low", "high"),
-    [
-        ("materials.alu.youngs_modulus", "60 GPa", "80 GPa"),
-        ("materials.alu.density", "2 g/cm3", "3 g/cm3"),
-        ("sections.pipe.thickness", "1 mm", "3 mm"),
-        ("sections.bar.bending_inertia", "3 cm4", "4 cm4"),
-        ("links.fore.length", "40 cm", "50 cm"),
-        ("bodies.tool.inertia", "0", "5 kg cm2"),
-        ("coordinates.q2.drive.stiffness", "50 N m/rad", "1 kN m/rad"),
-    ],
-)
-def test_any_real_property_may_be_a_design_parameter(path: str, low: str, high: str) -> None:
-    text = edited(
-        "{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}",
-        f"{{parameter: {path}, min: {low}, max: {high}}}",
-    )
-    parameter = read(text).design.parameters["d"]
-    assert parameter.parameter == path
-    assert parameter.min < parameter.max
 
 
 @pytest.mark.parametrize(

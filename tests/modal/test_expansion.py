@@ -21,10 +21,9 @@ from eigassign.modal import (
     error_beside,
     expand_subspace,
     modes,
-    substitute,
 )
 from eigassign.modal import expand as expand_pencil
-from eigassign.series import lower_set, monomials, total_degree
+from eigassign.series import lower_set, total_degree
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 BOTH = ("absolute", "absolute")
@@ -60,22 +59,6 @@ def test_a_coordinate_that_turns_the_whole_mechanism_is_in_no_series() -> None:
     e = expand_pencil(built(arm3r("free")).pencil, [0.3, 0.5, -0.9], [], (1,), 3)
     assert not e.coefficients[:, e.indices[:, 0] > 0].any()
     assert (e.coefficients[:, (e.indices[:, 0] == 0) & (e.indices[:, 1] > 0)] != 0.0).any()
-
-
-def test_only_a_set_that_is_linear_in_some_variables_may_leave_out_their_vectors() -> None:
-    linear, full = (expand(paper(), Q0, Y0, (1,), 4, linear_in_y=each) for each in (True, False))
-    assert linear.vector_space.indices.tolist() == [[k, 0, 0] for k in range(5)]
-    assert len(full.vector_space) == len(total_degree(3, 2))
-
-
-def test_variables_may_be_renamed_in_another_order() -> None:
-    space = total_degree(2, 3)
-    values = np.random.default_rng(0).standard_normal((1, len(space)))
-    swapped, found = substitute(space, values, np.array([[0.0, 1.0], [1.0, 0.0]]), 2, 0)
-    x = np.array([[0.3, -0.7]])
-    np.testing.assert_allclose(
-        found @ monomials(swapped, x).T, values @ monomials(space, x[:, ::-1]).T
-    )
 
 
 def test_too_few_vectors_do_not_give_the_order() -> None:
@@ -240,24 +223,6 @@ def test_six_hundred_unknowns_have_the_series_of_a_coarser_mesh() -> None:
 # Refusals
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"order": 0}, "order 0 is not within 1 to 20"),
-        ({"order": 21}, "order 21"),
-        ({"modes": ()}, "modes count from 1"),
-        ({"modes": (0, 1)}, "modes count from 1"),
-        ({"modes": (22,)}, "22 modes asked for"),
-        ({"q0": [0.1]}, "q has 1 values"),
-        ({"y0": [0.1, np.nan]}, "y must be finite"),
-    ],
-)
-def test_impossible_expansions_are_refused(arguments: dict[str, object], words: str) -> None:
-    given = {"q0": Q0, "y0": Y0, "modes": (1,), "order": 2, **arguments}
-    with pytest.raises(UsageError, match=words):
-        expand(paper(), **given)  # type: ignore[arg-type]
-
-
 def test_evaluation_checks_its_samples_and_takes_one_or_many() -> None:
     e = expand(paper(), Q0, Y0, (1, 2), 2)
     assert e.frequencies(Q0, Y0).shape == (1, 2)
@@ -283,18 +248,6 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
     for array in (a.coefficients, a.q0, a.clusters[0].vectors, a.clusters[0].coefficients):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
-
-
-@pytest.mark.parametrize("gap", [0.02, 0.9], ids=["single modes", "one cluster"])
-def test_many_samples_give_what_few_give(gap: float) -> None:
-    pencil = paper().pencil
-    made = expand_pencil(pencil, [1.817, 5.312], [0.125, 0.125], (1, 2), order=3, cluster_gap=gap)
-    random = np.random.default_rng(3)
-    q = made.q0 + random.uniform(-0.1, 0.1, (300, 2))
-    y = random.uniform(0.0, 0.25, (300, 2))
-    few = np.vstack([made.eigenvalues(q[i : i + 30], y[i : i + 30]) for i in range(0, 300, 30)])
-    # a sum's round-off is relative to its largest term, which the largest eigenvalue is near
-    np.testing.assert_allclose(made.eigenvalues(q, y), few, rtol=1e-12, atol=1e-12 * few.max())
 
 
 def test_where_the_reduced_model_is_refused_the_error_is_infinite_without_a_word() -> None:

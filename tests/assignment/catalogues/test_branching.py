@@ -149,26 +149,6 @@ def test_so_it_is_on_many_models_narrow_and_wide(seed):
     assert search.best[0].objective == pytest.approx(arm.brute_force(catalogues)[0], rel=1e-9)
 
 
-def test_the_best_few_are_distinct_and_in_order():
-    arm, catalogues = Arm(7), lists(7, 7, 1)
-    search = search_catalogue(Problem(arm, catalogues), keep=8)
-    figures = [one.objective for one in search.best]
-    assert figures == sorted(figures)
-    assert len({one.rows for one in search.best}) == len(figures) == 8
-
-
-def test_no_combination_is_asked_for_twice():
-    arm, catalogues = Arm(8), lists(8, 7, 1)
-    asked, fix = [], arm.fix(catalogues)
-
-    def counted(rows):
-        asked.append(rows)
-        return fix(rows)
-
-    search_catalogue(Problem(arm, catalogues, fix=counted))
-    assert len(asked) == len(set(asked))
-
-
 def test_a_start_that_nothing_beats_is_the_answer_even_if_no_relaxation_is_solved():
     arm, catalogues = Arm(9), lists(9, 7, 1)
     best = search_catalogue(Problem(arm, catalogues)).best[0]

@@ -204,13 +204,6 @@ def test_a_search_that_is_stopped_states_a_gap_that_holds():
     assert part.relative_gap == part.gap / part.best[0].objective
 
 
-def test_the_same_search_gives_the_same_answer():
-    p, catalogues = three_valued(5, 0.5)
-    first, second = (solve_catalogue(p, catalogues) for _ in range(2))
-    assert [one.rows for one in first.best] == [one.rows for one in second.best]
-    assert (first.nodes, first.lower_bound) == (second.nodes, second.lower_bound)
-
-
 BASE = ([1.2, 1.1, 0.9], [[-0.1, 0.02], [0.03, -0.1], [0.05, 0.05]])
 PAIR = [ListedValues("rod", (0,), [[0.0], [1.0]]), ListedValues("hub", (1,), [[0.0], [1.0]])]
 
@@ -245,21 +238,6 @@ def test_rows_outside_the_bounds_do_not_count_and_a_list_without_others_is_named
     assert {one.rows for one in search.best} == {(1, 0), (1, 1)}
     with pytest.raises(InfeasibleError, match="'rod': no row is within the bounds"):
         solve_catalogue(p, [ListedValues("rod", (0,), [[-5.0]]), PAIR[1]])
-
-
-def test_of_equal_rows_the_first_is_chosen():
-    rod = ListedValues("rod", (0,), [[1.0], [1.0], [0.0], [1.0]])
-    search = solve_catalogue(program(*BASE, [0, 0], [1, 1]), [rod, PAIR[1]])
-    assert {one.rows[0] for one in search.best} == {0, 2}
-    assert len(search.best) == 4
-
-
-def test_a_single_combination_is_the_answer():
-    only = [ListedValues("rod", (0,), [[0.5]]), ListedValues("hub", (1,), [[0.25]])]
-    search = solve_catalogue(program(*BASE, [0, 0], [1, 1]), only)
-    np.testing.assert_array_equal(search.best[0].y, [0.5, 0.25])
-    assert search.relative_gap <= 1e-9
-    assert search.exhausted
 
 
 def test_a_limit_reached_before_anything_was_found_is_said():
