@@ -42,14 +42,14 @@ __all__, __getattr__, __dir__ = face(
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
-        "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
+        "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
         "meaning.levers": "anatomies",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",
         "planning": (
             "Plan at_corners at_random automatic_elements central_sample corners joint_map "
-            "farthest mesh_share plan_expansion scattered series_share shown_point "
+            "farthest mesh_share plan_expansion scattered series_share "
             "truncation_share unseen with_middle_loads with_worse_designs"
         ),
         "results": (

@@ -88,13 +88,6 @@ def test_modes_takes_units_negative_numbers_and_either_separator(capsys: Capture
         assert other["frequencies_hz"] == pytest.approx(found[0]["frequencies_hz"], rel=1e-12)
 
 
-def test_modes_without_q_and_y_is_at_the_expansion_point_and_the_design_of_the_file(
-    capsys: Captured,
-) -> None:
-    found = json.loads(answer(capsys, "modes", TWO_LINK, "--count", 3, "--json"))
-    assert found["frequencies_hz"] == pytest.approx(REFERENCE["0 0"], rel=1e-6)
-
-
 def test_modes_drawn_leave_a_folder_and_print_the_same(capsys: Captured) -> None:
     plain = json.loads(answer(capsys, "modes", TWO_LINK, "--count", 2, "--json"))
     assert main(["modes", str(TWO_LINK), "--count", "2", "--json", "--draw"]) == 0
@@ -118,17 +111,6 @@ def test_modes_are_not_drawn_over_something_else(capsys: Captured) -> None:
     assert "mine is not a run folder" in capsys.readouterr().err.replace(str(Path.cwd()) + "/", "")
     assert main(["modes", str(TWO_LINK), "--out", "mine", "--force", "--figures", "none"]) == 0
     assert Path("mine.1/thesis.txt").exists()
-
-
-def test_modes_say_where_they_were_solved(capsys: Captured) -> None:
-    out = answer(capsys, "modes", TWO_LINK, "--q", "1.8, 5.3", "--y", "125 g, 0")
-    assert out.startswith("Modes at q1 = 1.8 rad, q2 = 5.3 rad, m1 = 125 g, m2 = 0 kg\n")
-
-
-def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
-    out = answer(capsys, "modes", TWO_LINK, "--count", 2)
-    assert re.search(r"^ *1 +202\.220\b", out, re.MULTILINE)
-    assert re.search(r"^ *2 +513\.156\b", out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -274,17 +256,6 @@ def test_optimize_leaves_a_foreign_folder_alone_unless_forced(capsys: Captured) 
     assert [path.name for path in Path("mine").iterdir()] == ["thesis.txt"]
     assert main([*args, "--force"]) == 0
     assert Path("mine.1/thesis.txt").read_text() == "years of work"
-
-
-def test_an_edited_case_in_a_run_is_kept_beside_the_next_run(capsys: Captured) -> None:
-    args = ["modes", "good.yaml", "--out", "run", "--count", "1", "--figures", "none"]
-    assert main(args) == 0
-    Path("run/case.yaml").write_text("mine")
-    capsys.readouterr()
-    assert main(args) == 0
-    assert "kept what was in" in capsys.readouterr().err
-    assert Path("run.1/case.yaml").read_text() == "mine"
-    assert Path("run/case.yaml").read_text() != "mine"
 
 
 def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -13,8 +12,7 @@ from run_cases import TARGET, automatic, case_of, chain, shipped
 from scipy import sparse
 
 from eigassign import Case
-from eigassign.errors import UsageError
-from eigassign.modal import Expansion, stored_series, tree_arrays
+from eigassign.modal import Expansion, tree_arrays
 from eigassign.output import Cache
 from eigassign.pipeline import Options, affordable_order, expand_plan, expansion_key, solve_case
 from eigassign.study import Plan, plan_expansion
@@ -59,35 +57,6 @@ def test_a_hit_equals_a_recomputation_bit_for_bit(text: str, tmp_path: Path) -> 
         np.testing.assert_array_equal(fresh[k].indices, known[k].indices)
 
 
-def test_what_comes_from_the_cache_is_frozen(tmp_path: Path) -> None:
-    case, cache = case_of(tmp_path, shipped()), Cache(tmp_path / "cache")
-    expanded(case, cache)
-    full, linear, _ = expanded(case, cache)
-    for expansion in (full, linear):
-        named = {name: getattr(expansion, name) for name in ("q0", "y0", "directions")}
-        named |= {"indices": expansion.space.indices, "halves": expansion.vector_space.indices}
-        named |= {k: c.vectors for k, c in enumerate(expansion.clusters)}
-        named |= {c.modes: c.coefficients for c in expansion.clusters}
-        for name, array in named.items():
-            assert not array.flags.writeable, name
-
-
-def test_a_whole_solution_from_the_cache_has_the_same_bits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EIGASSIGN_CACHE", "always")
-    case = case_of(tmp_path, shipped())
-    options = Options(cache_dir=tmp_path / "cache")
-    first, second, third = (
-        solve_case(case, o) for o in (options, options, Options(use_cache=False))
-    )
-    assert FROM_CACHE in second.results.notes
-    for other in (second, third):
-        assert first.design == other.design
-        np.testing.assert_array_equal(first.predicted_hz, other.predicted_hz)
-        np.testing.assert_array_equal(first.exact_hz, other.exact_hz)
-
-
 LARGE = (("samples: 152", "samples: 3"), ("order: 4", "order: 20"))  # about 0.5 s
 
 
@@ -108,57 +77,6 @@ def test_what_is_cached_follows_the_rule_and_the_size(
     for name, text, count in (("small", shipped(), small), ("large", shipped(*LARGE), large)):
         solve_case(case_of(tmp_path, text), Options(cache_dir=tmp_path / name, study="none"))
         assert len(list((tmp_path / name).glob("*.h5"))) == count, name
-
-
-def test_a_rule_that_is_none_is_a_usage_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EIGASSIGN_CACHE", "on")
-    with pytest.raises(UsageError, match="EIGASSIGN_CACHE = 'on': expected one of always, auto, n"):
-        solve_case(case_of(tmp_path, shipped()), Options(use_cache=False))
-
-
-@pytest.mark.parametrize("damage", ["truncated", "flipped"])
-def test_a_damaged_entry_is_set_aside_and_rebuilt_with_a_warning(
-    damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    case, cache = case_of(tmp_path, shipped()), Cache(tmp_path / "cache")
-    fresh = expanded(case, cache)
-    (file,) = (tmp_path / "cache").glob("*.h5")
-    data = bytearray(file.read_bytes())
-    if damage == "flipped":
-        data[-100] ^= 1
-    file.write_bytes(data[: len(data) if damage == "flipped" else len(data) // 2])
-    with caplog.at_level(logging.WARNING):
-        rebuilt = expanded(case, cache)
-    assert "set aside" in caplog.text
-    assert_same_bits(fresh[0], rebuilt[0])
-    assert len(list((tmp_path / "cache").glob("*.damaged"))) == 1
-    assert FROM_CACHE in expanded(case, cache)[2]
-
-
-@pytest.mark.parametrize("spoiled", ["a missing array", "a wrong shape", "NaN", "other modes"])
-def test_an_intact_entry_with_other_content_is_recomputed_with_a_warning(
-    spoiled: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    case, cache = case_of(tmp_path, shipped()), Cache(tmp_path / "cache")
-    fresh = expanded(case, cache)
-    entry = expansion_key(case.model(), plan_of(case), 4)
-    stored = dict(cache.load(entry) or {})
-    if spoiled == "a missing array":
-        del stored["vectors_1_0"]
-    elif spoiled == "a wrong shape":
-        stored["coefficients_1_0"] = stored["coefficients_0_0"]
-    elif spoiled == "NaN":
-        stored["vectors_0_0"] = np.where(stored["vectors_0_0"] > 0.0, np.nan, 0.0)
-    else:
-        stored["modes_0_0"] = np.array([2])
-    cache.store(entry, stored, {})
-    with caplog.at_level(logging.WARNING):
-        rebuilt = expanded(case, cache)
-    assert "computed anew" in caplog.text
-    assert_same_bits(fresh[1], rebuilt[1])
-    assert FROM_CACHE in expanded(case, cache)[2]
 
 
 CHANGES = {
@@ -231,18 +149,6 @@ def test_every_array_of_the_pencil_counts(tmp_path: Path) -> None:
             flat[-1], count = old, count + 1
     assert count > 20
     assert expansion_key(model, plan, 4) == plain
-
-
-def test_only_what_can_be_stored_exactly_is() -> None:
-    for thing in (np.zeros(3, dtype=complex), np.array(["a"]), {1: 2}, object()):
-        with pytest.raises(UsageError, match="cannot be stored"):
-            tree_arrays(thing)
-
-
-def test_what_is_no_expansion_is_not_taken_for_one() -> None:
-    assert stored_series({"q0": np.zeros(2)}, 0) == []
-    with pytest.raises(UsageError, match="not expansions"):
-        stored_series({"modes_0_0": np.ones(1)}, 0)
 
 
 def test_a_set_too_large_is_taken_to_a_lower_order_and_said_so(tmp_path: Path) -> None:

@@ -121,21 +121,6 @@ def searched(case: BuiltCase, kind: str = "proved") -> tuple[Result, CatalogueRo
     return result, row.catalogue
 
 
-def test_catalogues_give_the_combination_that_brute_force_gives() -> None:
-    case = with_lists("0, 80 g, 160 g, 250 g", "28 mm, 30 mm, 32 mm")
-    result, search = searched(case)
-    found = exact_objectives(case)
-    best = min(found, key=lambda key: found[key])
-    assert search.best[0].objective == pytest.approx(found[best], rel=1e-9)
-    assert [row.choice for row in result.results.design] == [best[0], best[1], best[2], best[2]]
-    assert search.gap == 0.0
-    assert search.best[0].choices["fore"] == best[2]
-    listed = [one.objective for one in search.best]
-    assert listed == sorted(listed)
-    for one in search.best:
-        assert one.objective == pytest.approx(found[tuple(one.choices.values())], rel=1e-9)
-
-
 def test_a_search_of_catalogues_without_time_proves_nothing_and_says_so() -> None:
     row = solve_case(with_lists("0, 80 g", "28 mm", "assignment: {seconds: 1e-9}\n"))
     found = row.results.assignment
@@ -143,16 +128,6 @@ def test_a_search_of_catalogues_without_time_proves_nothing_and_says_so() -> Non
     assert found.optimality.kind == "local"
     assert "of 6 combinations of the catalogues; time used up" in found.optimality.words
     assert "unfinished: time used up" in found.reason
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("hz", [170.0, 185.0, 200.0, 230.0])
-def test_so_they_do_of_hundreds_whatever_is_wanted(hz: float) -> None:
-    masses = ", ".join(f"{20 * k} g" for k in range(12))
-    case = with_lists(masses, ", ".join(f"{26 + 0.5 * k} mm" for k in range(13)), hz=hz)
-    _, search = searched(case)
-    least = min(exact_objectives(case, hz).values())  # of 468
-    assert search.best[0].objective == pytest.approx(least, rel=1e-9)
 
 
 def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from load_cases import INERTIA, LOADED, MASS, alone, arm, case, text
-from run_cases import UNCACHED, solved, written
+from run_cases import solved, written
 
 from eigassign import load_case
 from eigassign.errors import CaseError, UsageError
 from eigassign.output import results_document, sample_files
-from eigassign.pipeline import Options, Result, check, modes, optimize, validate
+from eigassign.pipeline import Result, check, modes
 from eigassign.study import read_measurements
 
 TARGET = [{"mode": 1, "frequency": 13.0}]
@@ -50,39 +49,6 @@ def test_results_say_what_each_trajectory_sets_and_tables_hold_coordinates_only(
     header = sample_files(run.results)["trajectory_pick.csv"].decode().splitlines()[0]
     assert header == "time [s],q1 [rad],q2 [rad]"
     assert f"trajectory 'pick': {MASS} = 3 kg" in run.results.notes
-
-
-def test_a_run_of_its_own_folder_gives_the_same_numbers(tmp_path: Path) -> None:
-    path = written(tmp_path, text(arm(*LOADED, targets=TARGET)))
-    found = []
-    for name, source in (("a", path), ("b", tmp_path / "a" / "case.yaml")):
-        options = Options(out=tmp_path / name, use_cache=False, figures=(), report="light")
-        folder = optimize(source, options).folder
-        assert folder is not None
-        found.append(json.loads((folder / "results.json").read_text()))
-    for key in ("design", "error", "targets", "trajectory", "trajectories", "approximation"):
-        assert found[0][key] == found[1][key]
-    page = (tmp_path / "a" / "report.html").read_text()
-    assert MASS in page
-
-
-def test_samples_from_a_file_take_what_the_trajectory_sets(tmp_path: Path, run: Result) -> None:
-    for name, content in sample_files(run.results).items():
-        (tmp_path / name).write_bytes(content)
-    tree = arm(*LOADED, targets=TARGET)
-    tree["trajectory"] = [
-        {"name": motion["name"], "file": f"trajectory_{motion['name']}.csv", "set": motion["set"]}
-        for motion in tree["trajectory"]
-    ]
-    read = solved(tmp_path, text(tree))
-    np.testing.assert_allclose(read.exact_hz, run.exact_hz, rtol=1e-12)
-
-
-def test_every_place_of_the_validation_is_within_the_tolerance(tmp_path: Path) -> None:
-    tree = arm({MASS: 1.0}, {MASS: 0.0}, targets=TARGET, expansion={"order": 6})
-    rows = validate(written(tmp_path, text(tree)), UNCACHED).rows
-    assert len(rows) == 4
-    assert all(row.passed for row in rows)
 
 
 def test_modes_take_the_coordinates_alone_or_with_the_loads(tmp_path: Path) -> None:

@@ -4,18 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_cases import SHIPPED, automatic, chain, shipped, without, written
+from run_cases import SHIPPED, chain, shipped, without, written
 
 import eigassign
 from eigassign.errors import CaseError, StorageError, UsageError
 from eigassign.pipeline import Options, check, draw, modes, optimize
-
-
-def test_modes_are_taken_where_the_case_says_unless_asked_elsewhere() -> None:
-    answer = modes(SHIPPED)
-    assert answer.q == (("q1", 1.817), ("q2", 5.312))
-    assert answer.y == (("m1", 0.0), ("m2", 0.0))
-    assert modes(SHIPPED, [1.817, 5.312], [0.0, 0.0]) == answer
 
 
 def test_without_an_expansion_point_the_trajectory_starts_the_pose(tmp_path: Path) -> None:
@@ -29,24 +22,6 @@ def test_without_any_pose_one_is_asked_for(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="give a value for q0, q1"):
         modes(path)
     assert len(modes(path, [0.1, 0.2]).frequencies_hz) == 3
-
-
-@pytest.mark.parametrize(
-    ("q", "y", "count", "message"),
-    [
-        ([1.0], None, 3, "q has 1 values"),
-        (None, [1.0], 3, "y has 1 values"),
-        ([1.0, float("nan")], None, 3, "q must be finite"),
-        (None, None, 0, "1 to 21"),
-        (None, None, 22, "1 to 21"),
-        ("1 deg", None, 3, "expected 2"),
-    ],
-)
-def test_questions_that_make_no_sense_are_refused(
-    q: list[float] | str | None, y: list[float] | None, count: int, message: str
-) -> None:
-    with pytest.raises(UsageError, match=message):
-        modes(SHIPPED, q, y, count)
 
 
 def test_modes_state_what_round_off_leaves(tmp_path: Path) -> None:
@@ -135,28 +110,10 @@ def test_a_case_is_drawn_with_and_without_its_trajectory(
         draw(path, Path("mine"), False, ("svg",))
 
 
-def test_check_follows_the_trajectory(tmp_path: Path) -> None:
-    path = written(tmp_path, shipped(("[-0.01, 0.19]", "[-2, 0.19]")))
-    with pytest.raises(CaseError, match="sample"):
-        check(path)
-
-
-def test_check_finds_a_mechanism_without_mass_at_its_line(tmp_path: Path) -> None:
-    text = automatic(("density: 2690.007033", "density: 0"))
-    with pytest.raises(CaseError, match=r"case.yaml:\d+:\d+: mechanism"):
-        check(written(tmp_path, text))
-
-
 def test_check_needs_neither_trajectory_nor_design_nor_targets(tmp_path: Path) -> None:
     text = without(chain(3), "trajectory", "design", "targets")
     answer = check(written(tmp_path, text))
     assert (answer.samples, answer.targets, answer.y_names) == (0, 0, ())
-
-
-def test_check_passes_warnings_on(tmp_path: Path) -> None:
-    text = shipped(("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4"))
-    warned = [warning.path for warning in check(written(tmp_path, text)).warnings]
-    assert "mechanism.sections.rod.bending_inertia" in warned
 
 
 def test_modes_need_no_measurements_and_check_misses_them_at_their_line(tmp_path: Path) -> None:

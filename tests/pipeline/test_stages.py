@@ -43,16 +43,6 @@ def test_a_stage_that_lasts_says_how_far_it_is() -> None:
     assert list(stages.timing_s) == ["expansion"]
 
 
-def test_a_stage_may_be_announced_only_where_it_lasts() -> None:
-    lines = Lines()
-    with Stages(lines, first_s=60.0)("check", "checking", at_once=False):
-        pass
-    assert lines.lines == []
-    with Stages(lines, first_s=0.01)("check", "checking", at_once=False):
-        lines.wait(3)
-    assert lines.lines[:3] == ["checking", "  0 s", "  0 s"]
-
-
 def test_a_stage_ends_its_progress_with_an_error_too_and_silent_ones_start_no_thread() -> None:
     before = threading.active_count()
     with pytest.raises(ValueError, match="bad"), Stages(Lines(), first_s=60.0)("a", "b"):

@@ -199,6 +199,13 @@ def test_a_stiffness_is_a_parameter_and_the_case_can_be_kept(crane: Path, tmp_pa
         ('"slide"', '"upper_arm"', "two names of links or joints are alike"),
         ('"yaw"', '"ground"', "or one is ground"),
         ('<mass value="5"/>', "", "link upper-arm: inertial needs mass and inertia"),
+        ('<mass value="5"/>', '<mass value="five"/>', "expected a number"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0.6"', "expected 3 numbers"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0 0"', "joint pitch: its axis has no direction"),
+        ('xyz="0 0.6 0.8"', 'xyz="0 0 ${a}"', r"xacro .*crane.urdf > robot.urdf expands it"),
+        ("<robot", '<xacro:x xmlns:xacro="http://ros.org/wiki/xacro"/><robot', "xacro"),
+        ("robot", "sdf", "it begins with <sdf>, not <robot>"),
+        ('name="pitch"', 'name="yaw"', "two links or two joints have one name"),
     ],
 )
 def test_what_is_no_such_robot_is_refused(crane: Path, old: str, new: str, said: str) -> None:
@@ -231,24 +238,6 @@ def test_entities_are_refused_in_every_encoding(crane: Path, encoding: str) -> N
         text.replace("<robot", "<!DOCTYPE x [<!ENTITY a 'b'>]><robot").encode(encoding)
     )
     with pytest.raises(UsageError, match=r"no document type and no entities|not a URDF file"):
-        ea.urdf_mapping(crane, 1e4)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('<mass value="5"/>', '<mass value="five"/>', "expected a number"),
-        ('xyz="0 0.6 0.8"', 'xyz="0 0.6"', "expected 3 numbers"),
-        ('xyz="0 0.6 0.8"', 'xyz="0 0 0"', "joint pitch: its axis has no direction"),
-        ('xyz="0 0.6 0.8"', 'xyz="0 0 ${a}"', r"xacro .*crane.urdf > robot.urdf expands it"),
-        ("<robot", '<xacro:x xmlns:xacro="http://ros.org/wiki/xacro"/><robot', "xacro"),
-        ("robot", "sdf", "it begins with <sdf>, not <robot>"),
-        ('name="pitch"', 'name="yaw"', "two links or two joints have one name"),
-    ],
-)
-def test_what_is_wrong_in_a_robot_is_named(crane: Path, old: str, new: str, said: str) -> None:
-    crane.write_text(ROBOT.replace(old, new), encoding="utf-8")
-    with pytest.raises(UsageError, match=said):
         ea.urdf_mapping(crane, 1e4)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
@@ -51,15 +49,6 @@ def test_the_worst_corner_is_climbed_to_from_a_bad_one(scene: Scene) -> None:
     np.testing.assert_array_equal(errors[: len(seen.x)], error(seen.x))
     np.testing.assert_allclose(errors.max(), 1.0 + high[1] - low[0])
     np.testing.assert_array_equal(more.x[errors.argmax(), 2:], [low[0], high[1]])
-
-
-def test_rows_of_another_keep_their_samples(scene: Scene, tmp_path: Path) -> None:
-    full = scene.expansions.full
-    one = at_corners(scene.file, scene.trajectory, full.q0, full.y0, samples=4)
-    two = at_random(scene.file, scene.trajectory, full.q0, full.y0, 10)
-    both = one.joined(two)
-    np.testing.assert_array_equal(both.x, np.vstack([one.x, two.x]))
-    assert both.place(len(both.x) - 1) == two.place(9)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 4, 5, 9, 15])

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import HEAD, SHIPPED, changed, scene_of
+from scenes import SHIPPED, scene_of
 
 import eigassign as ea
-from eigassign.case import parse
 from eigassign.mechanism import Trajectories
 from eigassign.study import (
     AMPLITUDE,
@@ -17,7 +16,6 @@ from eigassign.study import (
     draw_modes,
     draw_poses,
     rest_pose,
-    spread_samples,
     with_middle_loads,
 )
 
@@ -52,19 +50,6 @@ def test_poses_say_which_of_several_trajectories_they_belong_to() -> None:
     assert {*poses.of} == {part.name for part in several.parts}
     one = draw_poses(case.file, case.model(), Trajectories(tuple(alone)), case.initial_design)
     assert one.of == ()
-
-
-def test_a_body_at_the_start_of_a_link_is_drawn_there(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, changed(("at: forearm.end", "at: forearm.start")))
-    poses = draw_poses(scene.file, scene.model, scene.path, scene.initial)
-    bodies = {body.name: body.places for body in poses.bodies}
-    np.testing.assert_allclose(bodies["tool_mass"], bodies["elbow_mass"], atol=1e-12)
-
-
-def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
-    q = np.array([[0.0], [0.0], [0.01], [0.5], [0.99], [1.0], [1.0]])
-    assert spread_samples(q, 3) == [0, 3, 5]
-    assert spread_samples(np.zeros((4, 2)), 3) == [0]
 
 
 def pictures(name: str, count: int = 2) -> tuple[ea.Case, ModePictures]:
@@ -118,31 +103,6 @@ def test_a_joint_is_marked_by_what_it_lets_move() -> None:
         assert expected.items() <= marks.items()
 
 
-def test_what_slides_is_drawn_along_its_axis_in_the_world() -> None:
-    _, found = pictures("luffing_boom")
-    cylinder = next(j for j in found.rest.joints if j.name == "cylinder")
-    barrel = next(
-        line
-        for line, link in zip(found.rest.lines[0], found.rest.line_links, strict=True)
-        if link == "barrel"
-    )
-    along = barrel[-1] - barrel[0]
-    np.testing.assert_allclose(cylinder.axes[0], along / np.linalg.norm(along), atol=1e-12)
-
-
-def test_a_joint_is_drawn_at_its_follower_as_the_file_has_it() -> None:
-    elbow = "{type: revolute, base: upper_arm.end, follower: forearm.start}"
-    turned = "{type: prismatic, base: forearm.start, follower: upper_arm.end}"
-    text = changed((elbow, turned), (", angle: absolute", ""), text=HEAD)
-    case = ea.Case(parse(text.encode(), "case.yaml"))
-    model, q = case.model(), np.array([0.3, 0.1])
-    assert model.motion.tree.edges[1].turned
-    (mark,) = (j for j in rest_pose(case.file, model, q, np.zeros(0)).joints if j.name == "elbow")
-    place = model.poses.position(model.x(q, []), "upper_arm", "end")
-    np.testing.assert_allclose(mark.places, place[:, :2], atol=1e-12)
-    np.testing.assert_allclose(mark.axes, [[np.cos(0.3), np.sin(0.3)]], atol=1e-12)
-
-
 def test_masses_and_thicknesses_are_those_of_the_design() -> None:
     case = ea.load_case(CASES / "gantry.yaml")
     q, y = np.array([0.8]), case.initial_design.copy()
@@ -167,18 +127,3 @@ def test_without_a_tip_the_path_is_that_of_the_point_that_travels_farthest() -> 
     x = case.model().x(path.q, case.initial_design)
     head = case.model().poses.position(x, "boom", "head")
     np.testing.assert_allclose(poses.tip_path, head[:, :2], atol=1e-12)
-
-
-def test_the_path_without_a_tip_stops_between_two_trajectories() -> None:
-    case = ea.load_case(CASES / "five_bar.yaml")
-    path = case.trajectory
-    assert path.several
-    assert path.tip is None
-    poses = draw_poses(case.file, case.model(), path, case.initial_design)
-    assert poses.tip_path is not None
-    gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
-    assert gaps.tolist() == [path.rows[0].stop]
-    x = case.model().x(path.q, case.initial_design)
-    tool = case.model().poses.position(x, "left_arm", "end")[:, :2]
-    drawn = np.delete(poses.tip_path, gaps, axis=0)
-    np.testing.assert_allclose(drawn, tool, atol=1e-12)

@@ -57,22 +57,6 @@ def test_a_reduced_model_serves_all_loads(which: str) -> None:
     assert error.max() < 1e-5
 
 
-@pytest.mark.parametrize("which", SETS)
-def test_a_series_about_a_sample_has_the_value_of_that_trajectorys_own(which: str) -> None:
-    tree = arm(*SETS[which])
-    whole = case(tree)
-    for k, part in enumerate(whole.trajectories):
-        one = case(alone(tree, k))
-        q, own_q = part.trajectory.q[2], one.trajectory.q
-        both = (
-            ea.expand(whole.model(), q, Y, (1, 2), 4),
-            ea.expand(one.model(), own_q[2], Y, (1, 2), 4),
-        )
-        poses = part.trajectory.q[1:4], own_q[1:4]
-        here, there = (e.frequencies(at, Y) for e, at in zip(both, poses, strict=True))
-        np.testing.assert_allclose(here, there, rtol=1e-10)
-
-
 def test_a_load_enters_the_series_to_full_order_even_where_the_design_does_not() -> None:
     model = case(arm(*LOADED)).model()
     q0, far = np.array([0.5, 1.6, 1.0, 2e-3]), np.array([0.5, 1.6, 1.3, 2e-3])
@@ -84,37 +68,6 @@ def test_a_load_enters_the_series_to_full_order_even_where_the_design_does_not()
         )
     assert errors[1] < 0.1 * errors[0]
     assert errors[2] < 0.1 * errors[1]
-
-
-def test_the_slope_in_a_load_is_that_of_a_difference() -> None:
-    model = case(arm(*LOADED)).model()
-    q0 = np.array([0.5, 1.6, 1.0, 2e-3])
-    series = ea.expand(model, q0, Y, (1,), 2)
-    first = [int(np.flatnonzero((series.indices == unit).all(axis=1))[0]) for unit in np.eye(6)]
-    slopes = series.coefficients[0, first]
-    exact = model.slopes(q0, Y, 1)[1][0, 0]
-    np.testing.assert_allclose(slopes, exact, rtol=1e-6, atol=1e-6 * np.abs(exact[1]))
-    step = 1e-4
-    up, down = (model.frequencies([*q0[:2], q0[2] + h, q0[3]], Y, 1)[0, 0] for h in (step, -step))
-    difference = (2 * np.pi) ** 2 * (up**2 - down**2) / (2 * step)
-    np.testing.assert_allclose(slopes[2], difference, rtol=1e-6)
-
-
-def test_a_tip_path_is_followed_with_the_lengths_that_its_trajectory_sets() -> None:
-    tree = arm({"links.fore.length": 0.5}, {"links.fore.length": 0.4})
-    for motion in tree["trajectory"]:
-        for key in ("points", "duration", "samples"):
-            motion.pop(key)
-        motion |= {"tip": "fore.end", "waypoints": [[0.7, 0.2], [0.6, 0.4]], "samples": 7}
-        motion["branch"] = {"elbow": [0.0, 3.0]}
-    whole = case(tree)
-    model = whole.model()
-    for part in whole.trajectories:
-        x = model.x(part.trajectory.q, Y)
-        tip = model.poses.position(x, "fore", "end")[:, :2]
-        np.testing.assert_allclose(tip, part.trajectory.tip, atol=1e-9)
-    a, b = (part.trajectory.q[:, 1] for part in whole.trajectories)
-    assert np.abs(a - b).min() > 0.01
 
 
 def test_coordinates_follow_a_length_of_the_design_beside_one_that_trajectories_set() -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
-from eigassign.case import parse
-from eigassign.study import COARSE, compare, grid_over, q_grid, study_modes
+from eigassign.study import COARSE, grid_over, q_grid, study_modes
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
@@ -35,22 +34,6 @@ def test_the_map_over_q_moves_the_elbow_over_what_it_travels(tmp_path: Path) -> 
     np.testing.assert_allclose([elbow[0], elbow[-1]], [travelled.min(), travelled.max()])
 
 
-def test_known_exact_frequencies_are_used_and_not_solved_again(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, SHIPPED)
-    marked = np.full((152, 4), 100.0)
-    (study,) = study_modes(scene, marked).rows
-    assert study.over_time is not None
-    assert (study.over_time.exact_hz == 100.0).all()
-
-
-def test_each_mode_gets_its_own_columns(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, changed(("modes: [1]", "modes: [1, 3]")))
-    one, three = compare(scene.model, scene.expansions, scene.model.x(scene.q0, [0.125, 0.125]))
-    for comparison, hz in ((one, 193.1130), (three, 708.2169)):
-        for value in (comparison.exact_hz, comparison.taylor_hz, comparison.linearised_hz):
-            assert value[0] == pytest.approx(hz, abs=6e-5)
-
-
 def test_variables_without_room_are_left_out_of_a_map() -> None:
     low, high, x0 = np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0]), np.array([9.0, 8.0, 7.0])
     grid = grid_over((0, 1, 2), "abc", "xyz", low, high, x0, COARSE)
@@ -71,19 +54,3 @@ def test_the_expansion_point_is_on_the_map_even_if_the_path_misses_it(tmp_path: 
 def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -> None:
     (study,) = study_modes(scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.2]}\n")).rows
     assert (study.over_time, study.over_design, study.over_q) == (None, None, None)
-
-
-def test_the_masses_of_the_arm_are_designed_in_kilograms(tmp_path: Path) -> None:
-    assert scene_of(tmp_path, SHIPPED).file.design_units == ("kg", "kg")
-
-
-def test_what_slides_is_measured_in_metres() -> None:
-    text = changed(
-        ("{type: revolute, base: upper_arm.end", "{type: prismatic, base: upper_arm.end"),
-        ("angle: absolute}", "drive: {stiffness: 1 kN/m}}"),
-        text=HEAD,
-    )
-    text += "design: {k: {parameter: coordinates.q2.drive.stiffness, min: 1, max: 1e5}}"
-    file = parse(text.encode(), "case.yaml")
-    assert file.coordinate_units == ("rad", "m")
-    assert file.design_units == ("N/m",)

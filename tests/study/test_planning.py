@@ -10,7 +10,7 @@ from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign import load_case
 from eigassign.errors import CaseError, UsageError
-from eigassign.study import Plan, central_sample, joint_map, plan_expansion, shown_point
+from eigassign.study import Plan, central_sample, joint_map, plan_expansion
 
 
 def plan_of(folder: Path, text: str, **override: object) -> Plan:
@@ -65,10 +65,6 @@ def test_a_very_long_trajectory_is_nearly_centred() -> None:
     assert abs(central_sample(line) - 3500) <= 10
 
 
-def test_without_coordinates_that_matter_the_middle_sample_is_taken() -> None:
-    assert central_sample(np.zeros((9, 0))) == 4
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -106,19 +102,8 @@ def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:
     assert any("because no target names a mode" in note for note in plan.notes)
 
 
-def test_order_and_modes_can_be_overridden(tmp_path: Path) -> None:
-    plan = plan_of(tmp_path, SHIPPED, order=2, modes=(3, 2, 3))
-    assert (plan.order, plan.modes) == (2, (2, 3))
-
-
 def test_a_point_outside_what_it_stands_for_is_noted(tmp_path: Path) -> None:
     text = changed(("y: [0.125, 0.125]", "y: [0.5, 0.125]"), ("q: [1.817, 5.312]", "q: [1.8, 7]"))
     notes = " / ".join(plan_of(tmp_path, text).notes)
     assert "m1 = 0.5, outside its bounds 0 to 0.25" in notes
     assert "farther from the trajectory than that is long" in notes
-
-
-def test_of_many_values_the_first_are_shown() -> None:
-    names = [f"m{i}" for i in range(20)]
-    assert shown_point(names, np.zeros(20)).endswith("m7 = 0 and 12 more")
-    assert shown_point((), np.zeros(0)) == "none"

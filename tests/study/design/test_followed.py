@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chains import case_of
 from rail_and_mast import HEIGHT, LAMP, OUT, alone, case
-from redesigned_arms import cart, extrapolated
+from redesigned_arms import extrapolated
 from scipy.optimize import brentq
 
 from eigassign import Case
@@ -30,7 +29,6 @@ RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}
 BOTH = [{"mode": RAIL_LIKE, "frequency": 25.0}, {"mode": MAST_LIKE, "at_least": 20.0}]
 RAIL, MAST = alone("rail").model(), alone("mast").model()
-NAMED, LIKE = {"height": 0.02, "tool": 0.5}, (1, 3)
 DESIGNS = ((0.03, 0.9), (0.038, 2.09), (0.05, 3.0), (0.02, 0.2), (0.05, 0.2))
 
 
@@ -102,18 +100,6 @@ def test_slopes_are_those_of_the_shape_even_where_modes_cross() -> None:
     np.testing.assert_allclose(found.hz[k, -2], found.hz[k, -1], rtol=1e-12)
 
 
-def test_slopes_hold_the_part_of_coordinates_that_follow_the_design() -> None:
-    target = {"mode": {"like": 2, "at": {"time": 0.4}}, "frequency": 50.0}
-    scene = scene_of(cart([[0.2, 0.3], [0.6, 0.3]], leaning=True, targets=[target]))
-    response = response_of(scene, 2, followers(scene, asked(scene)))
-    y = np.array([0.52])
-    found = response(y)
-    np.testing.assert_allclose(found.hz[:, -1], found.hz[:, 1], rtol=1e-10)
-    np.testing.assert_allclose(found.slopes[:, -1], found.slopes[:, 1], rtol=1e-9)
-    beside = extrapolated(lambda v: response(v).hz, y, 1e-3)
-    np.testing.assert_allclose(found.slopes, beside, rtol=1e-7)
-
-
 def test_a_lost_mode_is_named_with_place_design_and_nearest_candidates() -> None:
     """An elastic foot couples both: where they meet, neither is the rail's or the mast's."""
     scene = scene_of(case(BOTH, coupled=0.1))
@@ -156,63 +142,6 @@ def test_a_mode_that_coincides_with_another_has_no_shape_to_name() -> None:
     with pytest.raises(CaseError, match="modes 1 and 2 coincide there") as caught:
         require_one_shape(scene, asked(scene))
     assert caught.value.problems[0].path == "targets[0].mode"
-
-
-def test_in_plane_modes_of_a_spatial_arm_are_those_of_the_planar_one() -> None:
-    """Out of the plane the arm bends and twists, by itself: modes of both kinds cross."""
-    planar, spatial = arm("planar"), arm("spatial")
-    in_plane = planar.model()
-    scene = scene_of(spatial)
-    for y in ((0.02, 0.5), (0.03, 0.2), (0.05, 0.8)):
-        own = in_plane.frequencies(planar.trajectory.q, y, 2)
-        found = solved(scene, y)
-        np.testing.assert_allclose(found.followed, own, rtol=1e-9)
-    assert found.numbers.max() > 3
-
-
-def arm(space: str) -> Case:
-    """Two links of rectangular section in the x-y plane; in space with targets on their modes."""
-    flat = space == "planar"
-    rod = {"shape": "rectangle", "height": 0.02, "width": 0.03}
-    joint = {} if flat else {"axis": [0, 0, 1]}
-    links = {
-        name: {"length": length, "material": "al", "section": "rod", "elements": 3}
-        for name, length in (("upper", 0.5), ("fore", 0.4))
-    }
-    first, second = ({"like": like, "at": {"q": [0.0, 1.2]}, "design": NAMED} for like in LIKE)
-    targets = [{"mode": mode, "at_least": 1.0} for mode in (first, second)]
-    return case_of(
-        {
-            "mechanism": {
-                "space": space,
-                "materials": {
-                    "al": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3}
-                },
-                "sections": {"rod": rod},
-                "links": links,
-                "joints": {
-                    "a": {"type": "revolute", "base": "ground", "follower": "upper.start", **joint},
-                    "b": {
-                        "type": "revolute",
-                        "base": "upper.end",
-                        "follower": "fore.start",
-                        **joint,
-                    },
-                },
-                "bodies": {"tool": {"at": "fore.end", "mass": 0.5}},
-            },
-            "coordinates": {
-                "q1": {"joint": "a", "drive": "locked"},
-                "q2": {"joint": "b", "drive": "locked"},
-            },
-            "trajectory": {"points": [[0.0, 0.2], [0.4, 2.4]], "duration": 1.0, "samples": 12},
-            "design": {
-                "height": {"parameter": "sections.rod.height", "min": 0.01, "max": 0.06},
-                "tool": {"parameter": "bodies.tool.mass", "min": 0.1, "max": 1.0},
-            },
-            **({} if flat else {"targets": targets}),
-        }
-    )
 
 
 def test_modes_that_coincide_by_symmetry_are_followed_together() -> None:
