@@ -37,7 +37,8 @@ def cluster(address: str) -> Iterator[Workers]:
         message = "--scheduler needs dask.distributed: pip install 'eigassign[cluster]'"
         raise UsageError(message) from None
     try:
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are told here
+        for name in ("distributed", "distributed.client"):  # errors are told here
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         client = Client(address, timeout=10.0)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # no TLS, no ucx
         raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
