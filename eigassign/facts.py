@@ -128,8 +128,8 @@ def percent(fraction: float) -> str:
     return f"{100.0 * fraction:#.3g}".rstrip(".") + " %"
 
 
-def at_most(fraction: float, how: str = "at most") -> str:
-    """A bound, rounded up to two digits: ``at most 0.031 %``, ``below 0.001 %``."""
+def about(fraction: float, how: str = "about") -> str:
+    """A share that was measured, rounded up to two digits: ``about 0.031 %``, ``below 0.001 %``."""
     if not math.isfinite(fraction):
         return "an unknown amount"
     if fraction < 1e-5:

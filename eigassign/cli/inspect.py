@@ -193,7 +193,6 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         where=answer.where,
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
-        estimated=answer.estimated,
         weight=answer.weight,
         anatomies=answer.anatomies,
         note=". ".join(map(capital, (rounding_line(answer.round_off), *answer.notes))),

@@ -11,13 +11,13 @@ In reading order:
     reduced      Ritz on the Taylor vectors
     expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9))
     storage      expansions as plain arrays
-    truncation   what the reduction of links leaves out, bounded
-    discretisation  what a mesh leaves out, bounded
+    finer_meshes  what a mesh leaves out, measured by finer ones
+    solid_error  what meshes of solids leave out, estimated
     model        the model of a case, as notebooks meet it
     under_load   what the weight changes by its forces, and by bending the links
     statics      what gives way under forces at nodes and the weight, with slopes
     slow_motion  how much the neglected motion would move the frequencies
-    adaptive     the least mesh, order and reduction that meet an accuracy
+    adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
 """
 
 from eigassign.faces import face
@@ -25,10 +25,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "adaptive.cheapest": "cheapest",
-        "adaptive.mesh": "meshes",
-        "adaptive.order": "MARGIN raise_order",
-        "discretisation": "discretisation_error",
+        "adaptive_order": "MARGIN raise_order",
         "exact.clusters": "clusters",
         "exact.following": "FollowedShape ModesAtPoint MoreModesError follow places",
         "exact.inertia": "count_below",

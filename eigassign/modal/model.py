@@ -11,31 +11,36 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.build import build_pencil, has_tapers, refined, with_reduction
+from eigassign.mechanism.assembly.build import (
+    build_pencil,
+    local_links,
+    refined,
+    with_reduction,
+)
 from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
 from eigassign.mechanism.assembly.energies import EnergyForms, energy_forms
-from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks, SolidLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.mechanism.drives import DriveForces, drive_forces
+from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
-from eigassign.modal.discretisation import discretisation_error, solid_error
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing
 from eigassign.modal.exact.tracking import Tracked, track
+from eigassign.modal.finer_meshes import mesh_error, standing_frequencies
 from eigassign.modal.slopes import exact_slopes
-from eigassign.modal.truncation import compared_error, truncation_error
+from eigassign.modal.solid_error import SolidLinks, solid_error
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -68,8 +73,7 @@ class Model:
     total_mass: TotalMass
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
-    reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
-    meshed: MeshedLinks | None = None  # the links that consist of beams
+    meshes: Mapping[str, LinkMesh]  # of each link, reduced where that is asked for
     solids: SolidLinks | None = None
 
     def __repr__(self) -> str:
@@ -84,14 +88,19 @@ class Model:
         return len(self.pencil.rigid)
 
     @property
-    def is_exact(self) -> bool:
-        """True where links are rigid or superelements as they are: neither mesh nor reduction."""
-        return self.meshed is None and self.solids is None and self.reduced is None
+    def is_meshed(self) -> bool:
+        """True where a link consists of beams."""
+        return any(mesh.whole.strands for mesh in self.meshes.values())
 
     @property
-    def has_bounds(self) -> bool:
-        """True where errors of the mesh are bounds; under gravity, and of solids, estimates."""
-        return self.pencil.weight is None and self.solids is None
+    def is_reduced(self) -> bool:
+        """True where Craig-Bampton made a link smaller."""
+        return any(mesh.reduction for mesh in self.meshes.values())
+
+    @property
+    def is_exact(self) -> bool:
+        """True where links are rigid or superelements as they are: neither mesh nor reduction."""
+        return not (self.is_meshed or self.is_reduced or self.solids)
 
     @property
     def n_dof(self) -> int:
@@ -100,43 +109,35 @@ class Model:
 
     @cached_property
     def whole(self) -> Pencil:
-        """K and M with no link of beams reduced."""
-        return self.pencil if self.reduced is None else self._rebuilt(self._unreduced)
+        """K and M with no link reduced."""
+        if not self.is_reduced:
+            return self.pencil
+        whole = {name: mesh.whole for name, mesh in self.meshes.items()}
+        return self._rebuilt(with_reduction(self.poses.case, dict.fromkeys(self._reducible)), whole)
+
+    def refined(self, factor: float = 2.0) -> tuple[CaseFile, Pencil]:
+        """The case, K and M with ``factor`` times the elements in every beam, no beam reduced."""
+        if factor not in self._refined:
+            beams = {name for name, mesh in self.meshes.items() if mesh.whole.strands}
+            whole = dict.fromkeys(beams.intersection(self._reducible))
+            case = refined(with_reduction(self.poses.case, whole), factor)[0]
+            others = {name: mesh for name, mesh in self.meshes.items() if name not in beams}
+            same = factor == 1.0 and not whole
+            self._refined[factor] = case, self.pencil if same else self._rebuilt(case, others)
+        return self._refined[factor]
 
     @cached_property
-    def refinements(self) -> tuple[Pencil, ...]:
-        """Under gravity K and M of `whole` links on meshes of 1 and 2 times the elements.
-
-        And of 4 where a carriage takes the curvature at a point, which converges slowly.
-        """
-        if self.pencil.weight is None:
-            return ()
-        factors = (2.0,) if self.pencil.rails is None else (2.0, 4.0)
-        finer = [self._rebuilt(refined(self._unreduced, factor)[0]) for factor in factors]
-        return (self.whole, *finer)
-
-    @cached_property
-    def finer(self) -> tuple[CaseFile, Pencil] | None:
-        """The case, K and M with twice the elements and no link of beams reduced.
-
-        None where that gives way alike: beams of one section are exact under forces at their ends.
-        """
-        case = self.poses.case
-        if self.pencil.weight is None and self.reduced is None and not has_tapers(case):
-            return None
-        finer = refined(self._unreduced, 2.0)[0]
-        return finer, self.refinements[1] if self.refinements else self._rebuilt(finer)
+    def _refined(self) -> dict[float, tuple[CaseFile, Pencil]]:
+        return {}
 
     @property
-    def _unreduced(self) -> CaseFile:
+    def _reducible(self) -> list[str]:
         links = self.poses.case.mechanism.links.items()
-        beams = [
-            n for n, each in links if getattr(each, "reduce_to", 0) and each.type not in IMPORTED
-        ]
-        return with_reduction(self.poses.case, dict.fromkeys(beams))
+        return [name for name, link in links if getattr(link, "reduce_to", None) is not None]
 
-    def _rebuilt(self, case: CaseFile) -> Pencil:
-        return build_pencil(case, self.poses.parameters, self.motion)
+    def _rebuilt(self, case: CaseFile, known: Mapping[str, LinkMesh]) -> Pencil:
+        given = case, self.poses.parameters, self.motion
+        return build_pencil(*given, local_links(*given, known))
 
     @cached_property
     def under_load(self) -> StiffnessUnderLoad:
@@ -215,28 +216,33 @@ class Model:
         return x[0, len(self.q_names) :]
 
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
-        """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).
+        """By how much reduced links raise frequencies, relative, (n_samples, n_modes).
 
-        Zero without reduced links; infinite where nothing can be vouched for. Under gravity
-        links of beams are solved whole.
+        Measured against the whole links, each sample by an exact solve of these, which is kept;
+        zero without reduced ones, infinite where the whole ones buckle.
         """
-        x = self.x(q, y)
-        bounded, error = self.reduced, np.zeros((len(x), len(modes)))
-        if self.pencil.weight is not None and self.reduced is not None:
-            bounded = self.reduced.imported
-            if bounded is None or len(bounded.links) < len(self.reduced.links):
-                error = compared_error(self.pencil, self.whole, x, modes)
-        if bounded is not None:
-            error = (1.0 + error) * (1.0 + truncation_error(bounded, x, modes)) - 1.0
-        return error
+        x, highest = self.x(q, y), max(modes)
+        if not self.is_reduced:
+            return np.zeros((len(x), len(modes)))
+        known = self._whole_hz
+        for row in x:
+            if len(known.get(row.tobytes(), ())) < highest:
+                known[row.tobytes()] = standing_frequencies(self.whole, row[None], highest)[0]
+        exact = np.array([known[row.tobytes()][:highest] for row in x]) / (2.0 * np.pi)
+        error = np.abs(self.frequencies(q, y, highest) / exact - 1.0)[:, np.array(modes) - 1]
+        return np.where(np.isfinite(error), error, np.inf)
+
+    @cached_property
+    def _whole_hz(self) -> dict[bytes, Floats]:
+        return {}
 
     def discretisation_error(
         self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)
     ) -> Floats:
-        """By how much the mesh raises frequencies at most, relative, (n_samples, n_modes).
+        """By how much the mesh raises frequencies, about, relative, (n_samples, n_modes).
 
-        Zero without beams and solids; infinite where the mesh is so coarse that nothing can be
-        said. Under gravity an estimate from finer meshes; with solids one from recovered stresses.
+        Zero without beams and solids; of beams measured by meshes of twice the elements and more,
+        of solids estimated from recovered stresses; infinite where nothing is known.
         """
         error = self.beam_error(q, y, modes)
         if self.solids is None:
@@ -246,9 +252,18 @@ class Model:
     def beam_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """The part of the beams in `discretisation_error`."""
         x = self.x(q, y)
-        if self.meshed is None:
+        if not self.is_meshed:
             return np.zeros((len(x), len(modes)))
-        return discretisation_error(self.meshed, x, modes, self.reduced, self.refinements).total
+        certain = self.pencil.rails is None and self.pencil.weight is None
+        certain = certain and min(refined(self.poses.case, 1.0)[1]) > 1
+        return mesh_error(lambda factor: self.refined(factor)[1], x, modes, certain)
+
+    def coarsest(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) -> Ints:
+        """The samples at which twice the elements change one of the modes most."""
+        x = self.x(q, y)
+        hz = [standing_frequencies(self.refined(k)[1], x, max(modes)) for k in (1.0, 2.0)]
+        change = np.abs(hz[1] / hz[0] - 1.0)[:, np.array(modes) - 1]
+        return np.unique(change.argmax(axis=0))
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
         """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.

@@ -93,9 +93,9 @@ def compliances(
 ) -> Flexibility:
     """The way of each node along each of its directions per force along it, m/N; drives hold.
 
-    ``finer`` of `Model.finer`, where there is one.
+    ``finer``: of a mesh of twice the elements.
     """
-    case, pencil = (finer and model.finer) or (model.poses.case, model.pencil)
+    case, pencil = model.refined() if finer else (model.poses.case, model.pencil)
     found = forces(case, model.poses.parameters, model.motion, nodes)
     each = np.arange(len(found.unknowns))
     return Flexibility(pencil, found, each, each)
@@ -107,7 +107,7 @@ def sags(model: Model, node: str, finer: bool = False) -> Flexibility:
     As `under_load.sag_of_nodes` has it: the pose that the trajectory asks for is where the drives
     hold the mechanism, the weight bends links and passive joints.
     """
-    case, pencil = (finer and model.finer) or (model.poses.case, model.pencil)
+    case, pencil = model.refined() if finer else (model.poses.case, model.pencil)
     assert pencil.weight is not None
     axes = np.eye(2 if case.mechanism.space == "planar" else 3)
     found = forces(case, model.poses.parameters, model.motion, {node: axes.tolist()}, weight=True)

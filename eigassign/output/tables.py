@@ -14,7 +14,7 @@ from eigassign.case.units import is_bare
 from eigassign.facts import (
     OF_ROW,
     Fact,
-    at_most,
+    about,
     capital,
     fact,
     number,
@@ -493,7 +493,6 @@ def modes_table(
     where: str,
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
-    estimated: bool = False,
     weight: WeightRow | None = None,
     anatomies: Sequence[ModeAnatomy] = (),
     note: str = "",
@@ -501,19 +500,18 @@ def modes_table(
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
-    mesh and reduced links raise each frequency at most, relative, the former ``estimated`` or not;
-    ``weight`` is what gravity changes; ``anatomies`` are what the modes are; ``note`` is below.
+    mesh and reduced links raise each frequency, about, relative; ``weight`` is
+    what gravity changes; ``anatomies`` are what the modes are; ``note`` is below.
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
         "frequency [Hz]": [f"{hz:#.6g}".rstrip(".") for hz in frequencies_hz],
     }
     weighed = weight is not None and weight.gravity is not None
-    of_mesh = ("mesh", discretisation, "at most (estimated)" if weighed or estimated else "at most")
-    for cause, errors, about in (of_mesh, ("reduced links", truncation, "at most")):
+    for cause, errors in (("mesh", discretisation), ("reduced links", truncation)):
         if errors is not None:
-            columns[f"{cause}: too high by {about}"] = [
-                at_most(e, "") if math.isfinite(e) else "cannot be bounded" for e in errors
+            columns[f"{cause}: too high by about"] = [
+                about(e, "") if math.isfinite(e) else "not known" for e in errors
             ]
     if weight is not None:
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [

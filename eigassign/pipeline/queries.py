@@ -35,8 +35,9 @@ from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.expansions import expansion_size
 from eigassign.pipeline.run_files import new_run_folder
-from eigassign.study.accuracy import digits_lines, judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.accuracy import digits_lines
 from eigassign.study.built_case import BuiltCase, load_case
+from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
 from eigassign.study.meaning.levers import anatomies
@@ -68,7 +69,6 @@ class ModesAnswer:
     round_off: Annotated[Share, Fact("at most; infinite: not known", may_lack=True)] = 0.0
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
-    estimated: Annotated[bool, Fact("no bounds: discretisation_error is an estimate")] = False
     weight: Annotated[WeightRow | None, Fact("what gravity changes", optional=True)] = None
     anatomies: Annotated[tuple[ModeAnatomy, ...], Fact("what each mode is, and would help it")] = ()
     notes: Words = ()  # of gravity
@@ -188,8 +188,8 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     model, file = case.model(), case.file
     named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
     every = tuple(range(1, len(hz) + 1))
-    lost = model.truncation_error(q, y, every)[0] if model.reduced else None
-    coarse = model.discretisation_error(q, y, every)[0] if model.meshed or model.solids else None
+    lost = model.truncation_error(q, y, every)[0] if model.is_reduced else None
+    coarse = model.discretisation_error(q, y, every)[0] if model.is_meshed or model.solids else None
     weight = study_weight(file, model, every, q[None], y, GIVEN)
     numbers = {f"mode {mode}": np.array([mode]) for mode in every}
     found: tuple[ModeAnatomy, ...] = ()
@@ -204,7 +204,6 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
-        not model.has_bounds,
         *(weight.row, found, (*digits_lines(file), *weight.notes), weight.warnings),
     )
 
@@ -252,13 +251,13 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     if trajectory is not None or file.expansion.q != "auto":
         needed = expansion_needed(file)
         plan = plan_expansion(file, model, trajectory, needed=needed)
-        q = plan.q0[None] if trajectory is None else trajectory.q
-        notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
         y = case.initial_design
+        notes += (*plan.notes, *truncation_lines(model, plan.modes, trajectory, plan.q0, [y]))
         notes += tuple(
             mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"), model)
         )
-        weight = study_weight(file, model, plan.modes, q[:1], y, "initial")  # quick
+        q = plan.q0[None] if trajectory is None else trajectory.q[:1]
+        weight = study_weight(file, model, plan.modes, q, y, "initial")  # quick
         notes += weight.lines
         warnings += tuple(file.problem("mechanism", each) for each in weight.warnings)
     warnings += tuple(_doubts(case, asked, None if trajectory is None else trajectory.q[:1]))
@@ -281,8 +280,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
 
 
 def _size(model: Model, plan: Plan) -> RunSize:
-    size, reduced = expansion_size(model, plan), model.reduced
-    whole = [one.reduction for one in ([] if reduced is None else reduced.links)]
+    size, whole = expansion_size(model, plan), [mesh.reduction for mesh in model.meshes.values()]
     memory_mb = ALONE_MB + size.memory_mb + PART_MB * sum(r.mesh.n_local for r in whole if r)
     return RunSize(plan.modes, size.order, size.coefficients, memory_mb)
 

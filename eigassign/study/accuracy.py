@@ -6,15 +6,13 @@ but those at the few poses where mesh and reduced links are judged.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError
-from eigassign.facts import at_most
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import (
     Trajectories,
@@ -22,13 +20,14 @@ from eigassign.mechanism.trajectory.trajectory import (
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
-from eigassign.study.planning import far_from_buckling, poses_at, travelled
+from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.planning import poses_at
 from eigassign.study.results import MeshError
 from eigassign.study.scene import Scene
 from eigassign.study.weight import WeightStudy, study_weight
 
 Floats = NDArray[np.float64]
-POSES = 9  # at which the mesh is judged; each costs an exact solve
+POSES = 9  # at which the weight is judged; each costs an exact solve
 POSES_LARGE = 3  # of a model of more than `LARGE` degrees of freedom, where one takes half a second
 LARGE = 10_000
 ROUNDED = 3  # at which round-off is measured by nine solves; of a large model one
@@ -49,13 +48,16 @@ def study_accuracy(
 ) -> Accuracy:
     """Errors of mesh, reduced links and round-off, and what gravity changes, per mode.
 
-    Those of mesh and links at the ``optimum`` (n_y,), of the mesh at the initial design without
-    one. ``more`` modes than are expanded are asked for by targets.
+    Those of mesh and links at the initial design and at the ``optimum`` (n_y,). ``more`` modes than
+    are expanded are asked for by targets.
     """
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
-    mesh = judged_mesh(scene.model, scene.modes, scene.trajectory, scene.q0, y, design)
+    given = scene.model, scene.modes, scene.trajectory, scene.q0
+    first = None if optimum is None else judged_mesh(*given, scene.initial, "initial")
+    mesh = judged_mesh(*given, y, design)
     weight = weight_at(scene, y, design, more)
-    lines = [*mesh_lines(mesh, scene.model), *weight.lines]
+    lines = [line for each in (first, mesh) for line in mesh_lines(each, scene.model)]
+    lines += weight.lines
     lines += truncation_notes(scene, optimum)
     return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y), *digits_lines(scene.file)))
 
@@ -64,37 +66,6 @@ def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) 
     """`study_weight` of the expanded and ``more`` modes at the poses where the mesh is judged."""
     q = _judged_at(scene.model, scene.trajectory, scene.q0, y)
     return study_weight(scene.file, scene.model, sorted({*scene.modes, *more}), q, y, design)
-
-
-def model_errors(
-    scene: Scene, judged: MeshError | None, y: Floats, modes: Collection[int]
-) -> dict[int, float]:
-    """By how much mesh and reduced links raise each mode at most at design y (n_y,), relative.
-
-    At `judged_poses`; the mesh's part of some modes was ``judged`` before. Infinite where nothing
-    is known.
-    """
-    known = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
-    q = judged_poses(scene.model, poses_at(scene.path, y))
-    mesh, links = scene.model.discretisation_error, scene.model.truncation_error
-    found = {}
-    for mode in sorted(modes):
-        of_mesh = known.get(mode) or float(mesh(q, y, (mode,)).max())
-        found[mode] = (1.0 + of_mesh) * (1.0 + float(links(q, y, (mode,)).max())) - 1.0
-    return found
-
-
-def raised_by(model: Model, share: float) -> str:
-    """By how much mesh and reduced links raise a frequency, in words."""
-    if not np.isfinite(share):
-        return "by an unknown amount"
-    return f"by up to {100 * share:.2g} %" + ("" if model.has_bounds else " (estimated)")
-
-
-def finer(model: Model) -> str:
-    """What makes that less."""
-    solids = "mesh solids finer, or else " * (model.solids is not None)
-    return f"{solids}give the links more elements, raise reduce_to, or write auto for them"
 
 
 def _rounding_note(scene: Scene, y: Floats) -> str:
@@ -125,81 +96,17 @@ def rounding_line(lost: float) -> str:
     return f"round-off of the exact frequencies: below {lost:.1g}, relative"
 
 
-def judged_mesh(
-    model: Model,
-    modes: Sequence[int],
-    trajectory: Trajectories | None,
-    q0: Floats,
-    y: Floats,
-    design: str,
-) -> MeshError | None:
-    """What the mesh leaves out at poses of the trajectory, or at q0, for one design y (n_y,).
-
-    ``design`` is what it is called. None without beams or solids.
-    """
-    if model.meshed is None and model.solids is None:
-        return None
-    q = _judged_at(model, trajectory, q0, y)
-    error = model.discretisation_error(q, y, modes).max(axis=0)
-    return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
-
-
 def _judged_at(model: Model, trajectory: Trajectories | None, q0: Floats, y: Floats) -> Floats:
     """The poses at which design y is judged: those of its trajectory, or q0."""
     return q0[None] if trajectory is None else judged_poses(model, poses_at(trajectory, y))
 
 
 def judged_poses(model: Model, q: Floats) -> Floats:
-    """The poses of q (n, n_q) at which the mesh is judged."""
+    """The poses of q (n, n_q) at which the weight is judged."""
     return spread(q, POSES if model.n_dof <= LARGE else POSES_LARGE)
 
 
-def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
-    """`judged_mesh` in words, one line a mode; of solids, and under gravity, no bound."""
-    if found is None:
-        return []
-    where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
-    estimated = "" if model.has_bounds else " (estimated)"
-    return [
-        f"mode {mode}: the mesh raises its frequency by {at_most(error)}{estimated}, {where} of "
-        f"the {found.design} design"
-        if np.isfinite(error)
-        else f"mode {mode}: the mesh is too coarse for an error, {where} of the {found.design} "
-        f"design: {finer(model)}"
-        for mode, error in zip(found.modes, found.error, strict=True)
-    ]
-
-
 def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
-    """`truncation_lines` along the trajectory, at the initial design, both bounds, the optimum."""
-    q = scene.q0[None] if scene.trajectory is None else travelled(scene.file, scene.trajectory)
-    designs = [scene.initial, *scene.bounds, *([] if optimum is None else [optimum])]
-    return truncation_lines(scene.model, scene.modes, q, np.array(designs))
-
-
-def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: Floats) -> list[str]:
-    """By how much reduced links raise frequencies at most, at poses q (n, n_q) of every design.
-
-    Raises AccuracyError where that cannot be bounded: the links are reduced too far.
-    """
-    if model.reduced is None:
-        return []
-    few, different = spread(q, SAMPLES), np.unique(designs, axis=0)
-    x = np.array([np.hstack([q, y]) for y in different for q in few])
-    x = x[far_from_buckling(model, x, most=1.0)]  # bounds may lie beyond what stands
-    n_q = len(model.q_names)
-    if not len(x):
-        raise AccuracyError("reduced links cannot be judged: all designs buckle or fall")
-    error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0)
-    stood = len(np.unique(x[:, n_q:], axis=0))
-    where = f"{len(few)} poses" + (f" and {stood} designs" if stood > 1 else "")
-    for mode, worst in zip(modes, error, strict=True):
-        if not np.isfinite(worst):
-            raise AccuracyError(
-                f"mode {mode}: the error of the reduced links has no bound over {where}: raise "
-                "reduce_to"
-            )
-    return [
-        f"mode {mode}: reduced links raise its frequency by {at_most(worst)}, over {where}"
-        for mode, worst in zip(modes, error, strict=True)
-    ]
+    """`truncation_lines` along the trajectory, at the initial design and the optimum."""
+    designs = [scene.initial, *([] if optimum is None else [optimum])]
+    return list(truncation_lines(scene.model, scene.modes, scene.trajectory, scene.q0, designs))

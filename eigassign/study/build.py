@@ -26,9 +26,7 @@ from eigassign.mechanism.assembly.build import (
     local_links,
     whole_links,
 )
-from eigassign.mechanism.assembly.inside_links import meshed_links, reduced_links, solid_links
 from eigassign.mechanism.assembly.total_mass import total_mass
-from eigassign.mechanism.elements.craig_bampton import used_nodes
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
@@ -39,6 +37,7 @@ from eigassign.mechanism.trajectory.trajectory import (
     build_trajectory,
 )
 from eigassign.modal.model import Model
+from eigassign.modal.solid_error import solid_links
 
 Floats = NDArray[np.float64]
 
@@ -88,17 +87,12 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
         local = local_links(file, parameters, motion, links.meshes)
         pencil = build_pencil(file, parameters, motion, local)
         poses = build_link_frames(file, parameters, motion)
-        reduced = reduced_links(parameters, local[0], pencil)
-        placed = [
-            (p.link, link, local[1].meshes[p.link], used_nodes(file, p.link))
-            for p, link in zip(motion.placements, local[0], strict=True)
-        ]
-        meshed = meshed_links(parameters, placed, file.mechanism.space, pencil)
-        solids = solid_links(parameters, [each[:3] for each in placed], pencil)
+        meshes = local[1].meshes
+        solids = solid_links(parameters, local[0], meshes, pencil)
         mass = total_mass(file, parameters, links.meshes.values())
     q_names = (*parameters.coordinates, *parameters.loads)
     given = pencil, poses, motion, mass, q_names, parameters.design
-    return Model(*given, reduced, meshed, solids)
+    return Model(*given, meshes, solids)
 
 
 def build_trajectories(file: CaseFile, model: Model) -> Trajectories:

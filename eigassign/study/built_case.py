@@ -16,11 +16,9 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.loading import from_mapping, load
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
-from eigassign.modal.adaptive.link_reduction import ReductionChoice
-from eigassign.modal.adaptive.mesh import MeshChoice
 from eigassign.modal.model import Model
 from eigassign.study.build import build_trajectories, located
-from eigassign.study.settling import SettledModel, settle_model
+from eigassign.study.settling import MeshChoice, ReductionChoice, SettledModel, settle_model
 
 Floats = NDArray[np.float64]
 

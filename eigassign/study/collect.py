@@ -79,7 +79,7 @@ def collect_results(
         author=file.author,
         given=given(file, trajectory),
         in_degrees=file.in_degrees,
-        reduced=scene.model.reduced is not None,
+        reduced=scene.model.is_reduced,
         case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
         case_sha256=file.sha256,
         case_files=file.files,

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
-from eigassign.modal.adaptive.order import MARGIN
+from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.model import Model
 from eigassign.study.checks.expansions import (
     compare,

@@ -9,10 +9,10 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain, repeat
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,10 +31,7 @@ from eigassign.errors import (
 from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.adaptive.cheapest import R, cheapest
-from eigassign.modal.adaptive.link_reduction import POSES
-from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, meshes
-from eigassign.modal.adaptive.order import raise_order
+from eigassign.modal.adaptive_order import raise_order
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
@@ -234,12 +231,16 @@ def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:
     return CaseError((file.problem(key_path, message),))
 
 
+ModesAt: TypeAlias = Callable[[Model, Floats], tuple[int, ...]]  # that matter at x (n, n_x)
+
 # --- The accuracy asked for, shared between mesh, reduced links and series
 
 ACCURACY = 1e-3  # where the case asks for auto and names none
-MESH_FEW, MESH_MANY = 20, 60  # poses that a mesh is chosen at, and confirmed at
 MESH = 0.5  # where a number of elements is left to auto
 TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
+# Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
+# these where they are large half a second
+POSES, FEW_POSES = 6, 2
 
 
 def asked_accuracy(file: CaseFile) -> float:
@@ -267,7 +268,7 @@ def modes_that_matter(file: CaseFile, bands_hz: Floats) -> ModesAt:
         if not len(bands_hz):
             return wanted
         below = np.unique(count_below(model.pencil, x, bands_hz[None]))
-        last = len(model.pencil.elastic)  # of a mesh too coarse for the band: no bound on its error
+        last = len(model.pencil.elastic)  # of a mesh too coarse for the band
         above = {min(int(k) + 1, last) for k in below if k != UNCERTAIN}  # a mode is at that edge
         return tuple(sorted({*wanted, *above}))
 
@@ -281,90 +282,6 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
 
 
 STANDS = 0.8  # of the load that buckles: nearer no mesh is fine enough
-ATTEMPTS = 3  # confirmations before the choice at all that was looked at is taken
-TRIAL = 2  # elements of a link left to auto, in the model that choices are first judged on
-
-
-def settle_mesh(
-    file: CaseFile,
-    build: Callable[[Mapping[str, int]], Model],
-    trajectory: Trajectories | None,
-    q0: Floats,
-    modes_at: ModesAt,
-) -> MeshChoice:
-    """The fewest elements that leave the mesh's share of the accuracy all over the design's bounds.
-
-    They are chosen at few poses, at the initial design and the corners of the bounds, and
-    `confirmed` at more and at random designs. Raises AccuracyError where no mesh will do.
-    """
-    accuracy = mesh_share(file) - truncation_share(file)
-    y, elements = initial_design(file), automatic_elements(file)
-    at_upper = corners(len(y))
-    seen, every = (
-        at_corners(file, trajectory, q0, y, at_upper, max(1, poses // (1 + len(at_upper))))
-        for poses in (MESH_FEW, MESH_MANY)
-    )
-    if len(y):
-        every = every.joined(at_random(file, trajectory, q0, y, MESH_FEW))
-    trial = build({name: n or TRIAL for name, n in elements.items()})
-    seen, every = standing(seen, trial), standing(every, trial)
-    return confirmed(
-        lambda at, _: meshes(build, elements, at.x, accuracy, modes_at),
-        lambda found: partial(_mesh_error, build(found.elements), modes_at),
-        lambda worst: f"at most {100.0 * worst:.2g} % too high",
-        *(accuracy, file, seen, every),
-        firm=True,
-    )
-
-
-def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
-    """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
-    n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
-    if kept.any():
-        x, modes = x[kept], modes_at(model, x[kept])
-        found = model.beam_error(x[:, :n_q], x[:, n_q:], modes)
-        error[kept] = found.max(axis=1)
-    return error
-
-
-def confirmed(
-    ladder: Callable[[DesignSamples, float], Iterable[R]],
-    judge: Callable[[R], Callable[[Floats], Floats]],
-    said: Callable[[float], str],
-    accuracy: float,
-    file: CaseFile,
-    seen: DesignSamples,
-    every: DesignSamples,
-    looks: float = np.inf,
-    firm: bool = False,
-) -> R:
-    """The cheapest rung at the samples ``seen`` that holds at ``every`` one, and at worse designs.
-
-    Where one errs there, by what ``judge`` makes its errors at x (n, n_x), it is chosen anew at all
-    that was looked at; after `ATTEMPTS` of that it is taken, or where it is to be ``firm`` holds at
-    worse designs, too. Raises AccuracyError where the ladder has none that does, or more than so
-    many ``looks`` are needed.
-    """
-    reasons: list[str] = []
-    for attempt in range(1 + ATTEMPTS):
-        found: R = cheapest(ladder(seen, looks), accuracy)
-        reasons += found.reasons
-        if attempt == ATTEMPTS and not firm:
-            break
-        every, errors = with_worse_designs(every, judge(found), file)
-        worst = float(errors.max())
-        line = f"at {len(errors)} poses and designs in all: {said(worst)}"
-        if worst <= accuracy:
-            found = replace(found, error=np.full_like(found.error, worst))
-            reasons.append(line)
-            break
-        if attempt == ATTEMPTS:
-            raise AccuracyError(f"no choice met the accuracy {accuracy:.1e}: {line}")
-        reasons.append(f"{line}, chosen again")
-        seen, looks = every, looks - found.looks
-        if len(seen.x) > looks:
-            raise AccuracyError(f"the expansion chosen at few poses and designs is off: {line}")
-    return replace(found, reasons=tuple(reasons))
 
 
 def mesh_share(file: CaseFile) -> float:
@@ -395,12 +312,13 @@ def truncation_share(file: CaseFile) -> float:
 def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
     """Raise AccuracyError where reduced links use more of the accuracy than their share."""
     share, modes = truncation_share(file), wanted_modes(file)
-    if model.reduced is None:
+    if not model.is_reduced:
         return
-    few, n_q = spread(x, POSES), len(model.q_names)
+    few = spread(x, POSES if model.whole.is_dense else FEW_POSES)
+    n_q = len(model.q_names)
     worst = model.truncation_error(few[:, :n_q], few[:, n_q:], modes).max()
     if worst > share:
-        stated = f"of {worst:.1e}" if np.isfinite(worst) else "that cannot be bounded"
+        stated = f"of {worst:.1e}" if np.isfinite(worst) else "that is not known"
         raise AccuracyError(
             f"the reduced links have an error {stated}, and may have {share:.1e} of the accuracy "
             f"{asked_accuracy(file):.1e}: raise reduce_to, or write reduce_to: auto"

@@ -29,12 +29,12 @@ from eigassign.facts import (
     Key,
     Residual,
     Share,
-    at_most,
+    about,
     number,
     percent,
     positive_percent,
 )
-from eigassign.modal.adaptive.order import MARGIN
+from eigassign.modal.adaptive_order import MARGIN
 
 _DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
@@ -467,7 +467,7 @@ class ClearanceRow:
     counted: Annotated[bool, Fact("inertia confirmed the modes below at every sample")]
     raised: Annotated[
         Share | None,
-        Fact(heading="model too high by", absent="not bounded", digits=partial(at_most, how="")),
+        Fact(heading="model too high by", absent="not known", digits=partial(about, how="")),
     ]
 
 

@@ -1,8 +1,8 @@
 """What a case leaves to ``auto`` for its links, settled: numbers of elements, reduction, the model.
 
-Both are chosen from estimates at poses of the trajectory and corners of the design's box, within
-their shares of ``expansion.accuracy`` (`planning`). The order and the expansion points are settled
-later, from the model that is built here.
+Both are measured at poses of the trajectory and corners of the design's box, against finer meshes
+and whole links, to be within their shares of ``expansion.accuracy`` (`planning`). The order and the
+expansion points are settled later, from the model that is built here.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
+from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.build import (
     LOWEST,
     WholeLinks,
@@ -25,29 +26,55 @@ from eigassign.mechanism.assembly.build import (
 from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.adaptive.cheapest import cheapest
-from eigassign.modal.adaptive.link_reduction import ReductionChoice, reductions
-from eigassign.modal.adaptive.mesh import MeshChoice
+from eigassign.modal.arguments import spread
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.finer_meshes import standing_frequencies
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories
 from eigassign.study.planning import (
-    TRIAL,
+    FEW_POSES,
+    POSES,
+    ModesAt,
     at_corners,
+    at_random,
     automatic_elements,
     automatic_reduction,
+    corners,
+    far_from_buckling,
+    mesh_share,
     modes_that_matter,
-    settle_mesh,
     standing,
     truncation_share,
     with_middle_loads,
+    with_worse_designs,
 )
 
 Floats = NDArray[np.float64]
 
 
+FEWEST, MAX_ELEMENTS = 2, 256  # of a link; with more round-off, which grows as n⁴, is larger
+LOOKS = 20, 60  # poses and designs that a mesh is chosen at, and confirmed at
 # Times the highest frequency that matters: where elements are chosen imported parts with
 # `reduce_to: auto` are reduced to that, far beyond what is chosen for them then
 BEYOND = 8.0
+
+
+@dataclass(frozen=True)
+class MeshChoice:
+    """Elements of each link, by how much they raise frequencies, about, and all that was tried."""
+
+    elements: Mapping[str, int]
+    error: float
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReductionChoice:
+    """The frequency in Hz for each link, None where it stays whole; its error; what was tried."""
+
+    frequencies: Mapping[str, float | None]
+    error: float
+    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -75,43 +102,100 @@ def settle_model(file: CaseFile) -> SettledModel:
 
 
 def _chosen_elements(file: CaseFile) -> MeshChoice | None:
-    wanted = automatic_elements(file)
-    if None not in wanted.values():
-        return None
+    """More elements for the links that leave them to ``auto``, twice at most, until the error fits.
 
-    def meshed(to_hz: float, elements: Mapping[str, int]) -> Model:
-        meshed = with_elements(file, elements)
+    At poses of the initial design and corners of the bounds, then at more and at random designs.
+    """
+    elements, parts = automatic_elements(file), automatic_reduction(file)
+    if None not in elements.values():
+        return None
+    parts = tuple(name for name in parts if is_imported(file, name))
+
+    def meshed(count: int, to_hz: float = LOWEST) -> Model:
+        meshed = with_elements(file, {name: n or count for name, n in elements.items()})
         return build_model(with_reduction(meshed, dict.fromkeys(parts, to_hz)))
 
-    parts = [name for name in automatic_reduction(file) if is_imported(file, name)]
-    trial = meshed(LOWEST, {name: TRIAL for name, given in wanted.items() if given is None})
+    trial, y = meshed(FEWEST), initial_design(file)
     path, q0 = _path(file, trial)
     modes_at = modes_that_matter(file, _bands_hz(file, path))
     beyond = LOWEST
     if parts:
-        q, y = q0 if path is None else path.q[0], initial_design(file)
+        q = q0 if path is None else path.q[0]
         highest = max(modes_at(trial, trial.x(q, y)))
         beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
-    return settle_mesh(file, partial(meshed, beyond), path, q0, modes_at)
+    ends = corners(len(y))
+    seen, every = (
+        at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends)))) for poses in LOOKS
+    )
+    every = every.joined(at_random(file, path, q0, y, LOOKS[0])) if len(y) else every
+    seen, every = standing(seen, trial), standing(every, trial)
+    accuracy, reasons, count = mesh_share(file) - truncation_share(file), list[str](), FEWEST
+    while True:
+        model = meshed(count, beyond)
+        lost = rounding_error(model.pencil, seen.x[0], max(modes_at(model, seen.x)))
+        if lost > accuracy:
+            raise AccuracyError(
+                f"round-off is {lost:.1e} with {count} elements, above the accuracy "
+                f"{accuracy:.1e}, and a finer mesh makes it larger: ask for less"
+            )
+        judge = partial(_mesh_error, model, modes_at)
+        errors = judge(seen.x)
+        if errors.max() <= accuracy:
+            errors = with_worse_designs(every, judge, file)[1]
+        worst = float(errors.max())
+        said = f"about {100.0 * worst:.2g} % too high" if worst < np.inf else "not resolved"
+        reasons.append(f"{count} elements: {said}, at {len(errors)} poses and designs")
+        if worst <= accuracy:
+            chosen = {name: n or count for name, n in elements.items()}
+            return MeshChoice(chosen, worst, tuple(reasons))
+        if count == MAX_ELEMENTS:
+            raise AccuracyError(f"no mesh meets the accuracy {accuracy:.1e}: {reasons[-1]}")
+        most = 2.0 if worst == np.inf else (worst / accuracy) ** 0.25  # the order of bending
+        count = min(max(count + 1, int(np.ceil(count * min(most, 2.0)))), MAX_ELEMENTS)
+
+
+def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
+    """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
+    n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
+    if kept.any():
+        x, modes = x[kept], modes_at(model, x[kept])
+        error[kept] = model.beam_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1)
+    return error
 
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
+    """Higher and higher frequencies to reduce to, until the error against whole links fits."""
     names = automatic_reduction(file)
     if not names:
         return None
-
-    def reduced(frequency_hz: float) -> Model:
-        return build_model(with_reduction(file, dict.fromkeys(names, frequency_hz)), links)
-
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
     upright = whole
     if whole.pencil.weight is not None:  # inside imported parts it changes nothing
         at_nodes = {n: LOWEST if is_imported(file, n) else None for n in names}
         upright = build_model(with_reduction(file, at_nodes), links)
     path, q0 = _path(file, upright)
-    x = standing(at_corners(file, path, q0, initial_design(file)), upright).x
-    modes_at = modes_that_matter(file, _bands_hz(file, path))
-    return cheapest(reductions(names, whole, reduced, x, modes_at), truncation_share(file))
+    few = POSES if whole.pencil.is_dense else FEW_POSES
+    x = spread(standing(at_corners(file, path, q0, initial_design(file)), upright).x, few)
+    modes = modes_that_matter(file, _bands_hz(file, path))(whole, x)
+    exact, pick = standing_frequencies(whole.pencil, x, max(modes)), np.array(modes) - 1
+    reasons, size = list[str](), 0
+    for frequency in exact[0].max() / np.pi * 1.5 ** np.arange(16):
+        to_hz = dict.fromkeys(names, float(frequency))
+        model = build_model(with_reduction(file, to_hz), links)
+        tried = f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs"
+        if not model.is_reduced or model.n_dof > 0.5 * whole.n_dof:
+            reasons.append(tried)
+            break
+        if model.n_dof == size:  # no mode in between
+            continue
+        size = model.n_dof
+        hz = standing_frequencies(model.pencil, x, max(modes))
+        worst = float(np.abs(hz / exact - 1.0)[:, pick].max())
+        reasons.append(f"{tried}, {100 * worst:.2g} % too high")
+        if worst <= truncation_share(file):
+            return ReductionChoice(to_hz, worst, tuple(reasons))
+    reasons.append(f"not reduced, because it saves too little: {', '.join(names)}")
+    return ReductionChoice(dict.fromkeys(names), 0.0, tuple(reasons))
 
 
 def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:

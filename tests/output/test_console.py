@@ -111,9 +111,9 @@ def test_modes_are_numbered_from_the_first_elastic_one():
     assert found.title == "Modes at q1 = 1.8 rad"
     assert found.rows == (("1", "202.220"), ("2", "513.200"))
     assert found.caption == "2 rigid-body modes not counted."
-    bounded = modes_table([200.0], rigid_modes=1, where="", truncation=[math.inf], note="so it is")
-    assert bounded.rows == (("1", "200.000", "cannot be bounded"),)
-    assert bounded.caption == "1 rigid-body mode not counted. So it is."
+    unknown = modes_table([200.0], rigid_modes=1, where="", truncation=[math.inf], note="so it is")
+    assert unknown.rows == (("1", "200.000", "not known"),)
+    assert unknown.caption == "1 rigid-body mode not counted. So it is."
 
 
 def test_a_validation_says_which_line_failed():

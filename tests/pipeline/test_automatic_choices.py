@@ -48,7 +48,7 @@ def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
 
 def test_the_reasons_are_among_the_notes(tmp_path: Path) -> None:
     notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).results.notes
-    assert any(note.startswith("2 elements: mode 1 at most") for note in notes)
+    assert any(note.startswith("2 elements: about") for note in notes)
     assert any(note.startswith("order 2: about") for note in notes)
 
 
@@ -121,7 +121,7 @@ def test_the_error_of_the_mesh_is_stated_at_the_optimum(tmp_path: Path) -> None:
     results = solve_case(case).results
     stated, y = results.discretisation, [row.optimal for row in results.design]
     assert stated is not None
-    assert (stated.design, stated.modes, stated.poses) == ("optimal", (1,), 9)
+    assert (stated.design, stated.modes, stated.poses) == ("optimal", (1,), 5)
     fine = build_model(with_elements(case.file, {"upper_arm": 16, "forearm": 16}))
     q = case.trajectory.q
     true = case.model().frequencies(q, y, 1) / fine.frequencies(q, y, 1) - 1.0

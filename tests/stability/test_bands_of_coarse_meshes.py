@@ -6,13 +6,14 @@ import sys
 
 import numpy as np
 import pytest
-from meshes import DRAWS, FINER
+from weighed_draws import DRAWS
 
 from eigassign.assignment import ForbiddenBand
 from eigassign.errors import EigassignError
 from eigassign.mechanism import refined, with_elements, with_reduction
 from eigassign.study import BandMotion, automatic_elements, build_model
 
+FINER = 8.0
 EACH = 6  # bands of one mechanism
 
 
@@ -22,7 +23,7 @@ def judged(seed: int) -> tuple[int, int, list[str]]:
     Of every second mechanism the links are reduced to a frequency about that of the bands.
     """
     drawn = DRAWS[seed // 2 % len(DRAWS)](seed, 3)
-    if drawn is None or drawn.model.meshed is None:
+    if drawn is None or not drawn.model.is_meshed:
         return 0, 0, []
     rng, file = np.random.default_rng([seed, 41]), drawn.model.poses.case
     y = drawn.y0

@@ -1,7 +1,8 @@
-"""Random mechanisms under their weight, hanging and standing, from light to all but buckling."""
+"""Random mechanisms under shares of the weight that buckles them, hanging and standing."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,19 +16,14 @@ from eigassign.modal import Model
 from eigassign.study import build_model
 
 DRAWS = (draw, *FAMILIES.values())
-SHARES = (1e-3, 0.03, 0.2, 0.5, 0.8, 0.95)  # of the load that buckles the weakest of all samples
 
 
-def weighed(seed: int, samples: int) -> Drawn | None:
-    """A random mechanism under a share of its buckling load; None where none is to be had."""
-    drawn = DRAWS[seed % len(DRAWS)](seed, samples)
-    if drawn is None or not len(drawn.q):
-        return None
-    rng = np.random.default_rng([seed, 25])
+def hung(drawn: Drawn, rng: np.random.Generator, shares: Sequence[float]) -> Drawn | None:
+    """A mechanism under one of these shares of its buckling load, some direction down."""
     file = drawn.model.poses.case
     down = rng.normal(size=2 if file.mechanism.space == "planar" else 3)
     down /= np.linalg.norm(down)
-    share = float(rng.choice(SHARES))
+    share = float(rng.choice(shares))
     for case in (file, _locked(file)):
         for g in (down, -down):
             try:

@@ -153,13 +153,6 @@ def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
     return replace(case, mechanism=mechanism), tuple(counts)
 
 
-def has_tapers(case: CaseFile) -> bool:
-    """True where the section of a beam varies along it."""
-    links = case.mechanism.links.values()
-    parts = [part for link in links for part in (link, *getattr(link, "beams", {}).values())]
-    return any(not isinstance(getattr(part, "section", ""), str) for part in parts)
-
-
 def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
     if not values:
         return case
@@ -189,31 +182,38 @@ def whole_links(case: CaseFile) -> WholeLinks:
     return WholeLinks(case, numbers, motion, _meshes(case, numbers, motion))
 
 
-def _meshes(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> dict[str, LinkMesh]:
-    """The mesh of every link; copies of a beam share theirs."""
+def _meshes(
+    case: CaseFile,
+    parameters: ModelParameters,
+    motion: Kinematics,
+    given: Mapping[str, LinkMesh] | None = None,
+) -> dict[str, LinkMesh]:
+    """The mesh of every link, that ``given`` where there is one; copies of a beam share theirs."""
     known = parameters.with_passive(motion.passive)
     copies = copies_of(case, known, motion.tree)
     made: dict[object, LinkMesh] = {}
-    for name in (p.link for p in motion.placements):
+    found = dict(given or {})
+    for name in (p.link for p in motion.placements if p.link not in found):
         key = copies.get(name, name)
         if key not in made:
             made[key] = link_mesh(case, known, motion.tree, name)
-    return {p.link: made[copies.get(p.link, p.link)] for p in motion.placements}
+        found[name] = made[key]
+    return {p.link: found[p.link] for p in motion.placements}
 
 
 def local_links(
     case: CaseFile,
     parameters: ModelParameters,
     motion: Kinematics,
-    whole: Mapping[str, LinkMesh] | None = None,
+    known: Mapping[str, LinkMesh] | None = None,
 ) -> LocalLinks:
     """Every link's matrices in its own frame, and how its nodes hang on the unknowns.
 
-    Links are reduced as the case asks; ``whole`` are their meshes where they are known already.
+    Links are reduced as the case asks; ``known`` are the meshes of some or all, reduced or not.
     """
-    meshes = _meshes(case, parameters, motion) if whole is None else whole
     meshes = {
-        name: reduced_where_asked(case, parameters, name, mesh) for name, mesh in meshes.items()
+        name: reduced_where_asked(case, parameters, name, mesh)
+        for name, mesh in _meshes(case, parameters, motion, known).items()
     }
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()

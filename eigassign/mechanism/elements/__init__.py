@@ -5,7 +5,6 @@ Read in this order; each imports only from those above it:
     sections       area, moments of inertia and shear coefficient of cross-sections
     profiles       stiffnesses and masses of a beam along each element, tapered or not
     beam           stiffness and consistent mass of a beam element; its shape functions
-    inner          what a mesh leaves out: the motion inside its elements
     mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
     bodies         rigid links, point masses and rigid bodies at nodes
     sparse_factor  factors of symmetric definite sparse matrices, and their largest modes

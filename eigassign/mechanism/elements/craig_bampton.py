@@ -9,8 +9,8 @@ constant matrix of the link is projected on it. Where the link itself changes wi
 what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
 rigid-body motion is in the span at every y. Under gravity that of an imported part holds its sag as
 well, K_ii⁻¹ (M r)_i of translations r: the weight's stiffness, which joins M r to the nodes
-(`assembly.loads.imported`), is nothing then on what is left out. That is estimated in
-modal/truncation.py.
+(`assembly.loads.imported`), is nothing then on what is left out. What that changes is measured
+against the whole links (`modal.finer_meshes`).
 
 The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,
 as of rotations without inertia) do no harm.
@@ -32,9 +32,7 @@ from eigassign.case.schema.targets import StaticTarget
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.elements.sparse_factor import (
-    LOOSE,
     kept_factor,
-    largest_beside,
     largest_modes,
 )
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported, link_type
@@ -50,12 +48,12 @@ def reduced_where_asked(
 ) -> LinkMesh:
     """A link's mesh, its interior replaced by what moves below the frequency it asks for.
 
-    The mesh as it is where none is asked for (a ``reduce_to: auto`` that nobody settled), or where
-    that would not make it smaller. Raises MechanismError where the stiffness is singular with the
-    interface held.
+    The mesh as it is where none is asked for (a ``reduce_to: auto`` that nobody settled), where it
+    is reduced already, or where that would not make it smaller. Raises MechanismError where the
+    stiffness is singular with the interface held.
     """
     frequency_hz = getattr(case.mechanism.links[name], "reduce_to", None)
-    if not isinstance(frequency_hz, float):
+    if not isinstance(frequency_hz, float) or mesh.reduction is not None:
         return mesh
     path = f"mechanism.links.{name}"
     nodes = {key: mesh.nodes[key] for key in mesh.nodes if key in interface(case, name)}
@@ -299,21 +297,3 @@ def fixed_modes(
         count *= 2
     mu, phi = eigh(M.toarray(), K.toarray())
     return np.asarray(phi[:, ::-1][:, mu[::-1] >= least])
-
-
-def largest_left_out(
-    K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, W: Floats
-) -> float:
-    """The largest μ of what a reduction to W leaves out; an upper bound within `LOOSE`."""
-    n = K.shape[0]
-    if W.shape[1] >= n:
-        return 0.0
-    if (heavy := _few_with_mass(M, factor)) is not None:
-        across = W[heavy.dofs]
-        beside = heavy.flexible[heavy.dofs] - across @ np.linalg.solve(W.T @ (K @ W), across.T)
-        return float(np.linalg.eigvals(heavy.mass @ beside).real.max(initial=0.0))
-    if n > DENSE:
-        mu = largest_beside(factor, K.T, lambda v: np.asarray(M @ v), W, LOOSE)[0]
-        return mu * (1.0 + LOOSE)
-    P = np.eye(n) - W @ np.linalg.solve(W.T @ (K @ W), (K @ W).T)
-    return float(eigh(P.T @ (M @ P), K.toarray(), eigvals_only=True)[-1])

@@ -92,6 +92,11 @@ class LinkMesh:
     reduction: Reduction | None = None
     lost: Lost | None = None  # of solids
 
+    @property
+    def whole(self) -> LinkMesh:
+        """The mesh with all its dofs."""
+        return self if self.reduction is None else self.reduction.mesh
+
 
 class Lost(NamedTuple):
     """2 × the energy that a mesh of solid elements lacks, about: coefficient × energy(v).

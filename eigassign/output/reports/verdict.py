@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.facts import at_most, capital, number, percent
+from eigassign.facts import about, capital, number, percent
 from eigassign.output.tables import violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
@@ -180,7 +180,7 @@ def _trust(results: RunResults) -> Iterator[str]:
         few = judged is not None and judged.poses < results.time_s.size
         where = f" (checked at {judged.poses} samples)" if judged is not None and few else ""
         cause = "of mesh and reduced links" if results.reduced else "of the mesh"
-        most = at_most(np.inf if row.model_error is None else row.model_error)
+        most = about(np.inf if row.model_error is None else row.model_error)
         yield f"Frequencies are too high because {cause}: {most}{where}."
     yield f"{capital(row.optimality.words)}."
     if not row.finished:

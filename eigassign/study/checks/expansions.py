@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.facts import percent
-from eigassign.modal.adaptive.order import MARGIN
+from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.model import Model
 from eigassign.modal.surrogate import Surrogate
 from eigassign.study.planning import SCATTERED, unseen

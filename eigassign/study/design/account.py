@@ -17,7 +17,7 @@ from eigassign.assignment.exact.sequential import OPTIMAL, End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
-from eigassign.study.accuracy import finer, model_errors, raised_by
+from eigassign.study.checks.mesh import finer, model_errors, raised_by
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
@@ -215,7 +215,7 @@ def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
     Of what twice the elements make softer, elements beyond are taken to add a third at most.
     """
     q = scene.path.at(y)[0]
-    for one in scene.statics if scene.model.finer is not None else ():
+    for one in scene.statics if scene.model.is_meshed else ():
         w, finer = (one.way.at(q[one.rows], y, each) for each in (False, True))
         missed = float((finer + np.maximum(finer - w, 0.0) / 3.0).max()) / float(one.upper[0]) - 1.0
         if one.violation(one.amount(y), 0.0) <= ON and missed > LIMIT:
@@ -289,7 +289,7 @@ def _too_coarse(
     missed = f", so that it may be missed by {100 * worst:.3g} %" if np.isfinite(raised) else ""
     yield (
         f"{label}: mesh and reduced links raise the frequencies "
-        f"{raised_by(scene.model, raised)}{missed}; accepted are {100 * accepted:.3g} %. "
+        f"{raised_by(raised)}{missed}; accepted are {100 * accepted:.3g} %. "
         f"{capital(finer(scene.model))}"
     )
 
@@ -317,7 +317,7 @@ def _undecided(
         yield (
             target.label,
             f"{target.label}: missed by {100 * missed:.3g} %, and mesh and reduced links raise the "
-            f"frequencies {raised_by(scene.model, too_high)}. {capital(finer(scene.model))}",
+            f"frequencies {raised_by(too_high)}. {capital(finer(scene.model))}",
         )
 
 
@@ -331,7 +331,7 @@ def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
         if not of_model.clear:
             yield row.label
             continue
-        how = raised_by(scene.model, np.inf if row.raised is None else row.raised)
+        how = raised_by(np.inf if row.raised is None else row.raised)
         yield (
             f"{row.label} (the model is clear by {_percent(of_model.room)}, but mesh and reduced "
             f"links raise the mode above the band {how}: {finer(scene.model)})"

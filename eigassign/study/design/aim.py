@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.study.accuracy import raised_by
+from eigassign.study.checks.mesh import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found
@@ -53,7 +53,7 @@ def aim_row(
         if asked.trajectory:
             where = f" along {asked.trajectory!r}"
         if (too_high := of_model[asked.mode]) > WITHIN:
-            kept += f"; mesh and reduced links raise it {raised_by(scene.model, too_high)}"
+            kept += f"; mesh and reduced links raise it {raised_by(too_high)}"
         return _in_words(row, f"mode {asked.mode} is at least {row.after}{where}", kept)
     if aim == "widest":
         before, after = (min(_rooms(found, wanted, y)) for y in designs)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
 from eigassign.facts import positive_percent
-from eigassign.modal.adaptive.order import MARGIN
+from eigassign.modal.adaptive_order import MARGIN
 from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.design.search.response import reduced_about
 from eigassign.study.monotone import box_corners, corners, effects

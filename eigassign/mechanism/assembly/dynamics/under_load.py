@@ -42,7 +42,6 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     stacked,
     whole_size,
 )
-from eigassign.mechanism.assembly.inside_links import Alike
 from eigassign.mechanism.assembly.loads.beam_stress import Numbers, end_forces, stress_terms
 from eigassign.mechanism.assembly.loads.imported import CROSSED
 from eigassign.mechanism.assembly.loads.loaded import Loaded, first_moment
@@ -57,7 +56,7 @@ from eigassign.mechanism.elements.beam import (
     shear,
 )
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand
-from eigassign.mechanism.elements.profiles import SHARES, STATIONS
+from eigassign.mechanism.elements.profiles import SHARES, STATIONS, BeamValues, Profile
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -69,6 +68,19 @@ from eigassign.series.expression import Expression, Recorder, Scalar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
+
+class Alike(NamedTuple):
+    """Elements of one kind, sheared or not, tapered or not."""
+
+    h: Floats  # (n,)
+    values: Floats  # (n, n_legendre, n_values)
+    sheared: bool
+
+    def profile(self) -> Profile:
+        """Their values as arrays (n,)."""
+        rows = [BeamValues(*one) for one in np.moveaxis(self.values, 0, -1)]
+        return rows if self.sheared else [r._replace(shear_z=None, shear_y=None) for r in rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +158,7 @@ class StiffnessUnderLoad:
         for own, row in zip(z.T, zip(*self.at_rest(z), strict=True), strict=True):
             now = _Numbers._make((row[:5], *row[5:10], row[10:]))
             beams = [
-                Beams(elements, Alike(np.arange(len(h)), h, profile, sheared))
+                Beams(elements, Alike(h, profile, sheared))
                 for (elements, sheared), h, profile in zip(
                     self.strands, now.elements[::2], now.elements[1::2], strict=True
                 )
