@@ -1,7 +1,7 @@
 """Random mechanisms of few elements, and their stated mesh errors beside those against finer ones.
 
-Trees and loops in the plane and in space with riders and frames, strong tapers; some with shear, some
-with a material softened over decades, some under weight up to half of what buckles.
+Trees and loops in the plane and in space with riders and frames, strong tapers; some with shear,
+some with a material softened over decades, some under weight up to half of what buckles.
 """
 
 from __future__ import annotations
