@@ -9,10 +9,9 @@ Reading order:
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
-    checks      what is said about an answer, measured by finer computations
+    checks      what is measured of an answer: mesh and links, expansions, whether the motion is slow
     weight      what gravity changes that is not in the frequencies
     accuracy    errors of mesh, reduction and round-off
-    checks      what is measured of an answer: its expansions, whether the motion is slow
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it

@@ -8,8 +8,6 @@ from chains import model_of, two_link
 from eigassign import load_case
 from eigassign.modal import Model
 
-FREE = {"upper": None, "fore": None}
-
 
 def build(elements) -> Model:
     return model_of(two_link(elements=(elements["upper"], elements["fore"])))

@@ -16,6 +16,15 @@ from eigassign.modal import Model
 from eigassign.study import build_model
 
 DRAWS = (draw, *FAMILIES.values())
+SHARES = (1e-3, 0.03, 0.2, 0.5, 0.8, 0.95)  # of the load that buckles the weakest of all samples
+
+
+def weighed(seed: int, samples: int) -> Drawn | None:
+    """A random mechanism under a share of its buckling load; None where none is to be had."""
+    drawn = DRAWS[seed % len(DRAWS)](seed, samples)
+    if drawn is None or not len(drawn.q):
+        return None
+    return hung(drawn, np.random.default_rng([seed, 25]), SHARES)
 
 
 def hung(drawn: Drawn, rng: np.random.Generator, shares: Sequence[float]) -> Drawn | None:
