@@ -9,7 +9,7 @@ Reading order:
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
-    checks      what is measured of an answer: mesh and links, expansions, whether the motion is slow
+    checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
     weight      what gravity changes that is not in the frequencies
     accuracy    errors of mesh, reduction and round-off
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
