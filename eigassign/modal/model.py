@@ -35,7 +35,7 @@ from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing
 from eigassign.modal.exact.tracking import Tracked, track
-from eigassign.modal.finer_meshes import mesh_error, standing_frequencies
+from eigassign.modal.finer_meshes import FINE, mesh_error, standing_frequencies
 from eigassign.modal.slopes import exact_slopes
 from eigassign.modal.solid_error import SolidLinks, solid_error
 
@@ -254,9 +254,10 @@ class Model:
         x = self.x(q, y)
         if not self.is_meshed:
             return np.zeros((len(x), len(modes)))
-        certain = self.pencil.rails is None and self.pencil.weight is None
-        certain = certain and min(refined(self.poses.case, 1.0)[1]) > 1
-        return mesh_error(lambda factor: self.refined(factor)[1], x, modes, certain)
+        fewest = min(refined(self.poses.case, 1.0)[1])
+        certain = self.pencil.rails is None and self.pencil.weight is None and fewest > 1
+        fine = certain and fewest >= FINE
+        return mesh_error(lambda factor: self.refined(factor)[1], x, modes, certain, fine)
 
     def coarsest(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) -> Ints:
         """The samples at which twice the elements change one of the modes most."""

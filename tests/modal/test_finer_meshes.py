@@ -72,6 +72,14 @@ def test_where_a_finer_mesh_buckles_the_error_is_not_known() -> None:
         assert np.isfinite(found) == known
 
 
+def test_of_a_fine_mesh_round_off_of_a_finer_one_is_not_stated() -> None:
+    case = case_of(cantilever(200, "planar", section="a"))
+    assert (case.model().discretisation_error([], [], (1, 2))[0] < 1e-7).all()
+    found = stated_over_true(case_of(cantilever(16, section="a", shear=True)), [], (3, 4))
+    assert (found >= 1.0).all()
+    assert (found < 6.0).all()  # bending: the rate is 16 and not 4
+
+
 def test_rigid_links_have_no_mesh() -> None:
     tree = cantilever(1, "planar", section="a")
     tree["mechanism"]["links"]["bar"] = {"type": "rigid", "mass": 1.0, "inertia": 0.1}
