@@ -242,7 +242,7 @@ class Model:
         """By how much the mesh raises frequencies, about, relative, (n_samples, n_modes).
 
         Zero without beams and solids; of beams measured by meshes of twice the elements and more,
-        of solids estimated from recovered stresses; infinite where nothing is known.
+        of solids by functions of the next degree; infinite where nothing is known.
         """
         error = self.beam_error(q, y, modes)
         if self.solids is None:

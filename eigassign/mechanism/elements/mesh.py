@@ -99,13 +99,12 @@ class LinkMesh:
 
 
 class Lost(NamedTuple):
-    """2 × the energy that a mesh of solid elements lacks, about: coefficient × energy(v).
+    """What a mesh of solid elements lacks, by `Enriched` of its part."""
 
-    ``energy`` takes motions v (n_local, count) and gives (count, count).
-    """
-
-    coefficient: Scalar
-    energy: Callable[[Floats], Floats]
+    modulus: Scalar
+    density: Scalar
+    gram: Callable[[Floats], Floats]  # of motions (n_local, count)
+    one_layer: Callable[[], bool]  # nothing is known of such meshes of four nodes
 
 
 @dataclass(frozen=True, eq=False)

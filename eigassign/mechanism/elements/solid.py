@@ -39,10 +39,8 @@ def solid_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMe
     bodies = Entries((len(own),) * 2)
     add_bodies(case, parameters, name, bodies, nodes)
 
-    def lost(v: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        whole = np.zeros((len(part.rigid), v.shape[1]))
-        whole[own] = v
-        return part.lost(whole)
+    def gram(v: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return part.lacked.gram(part.motion[:, own] @ v)
 
     return LinkMesh(
         len(own),
@@ -51,7 +49,7 @@ def solid_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMe
         [_term(E, part.stiffness[own][:, own])],
         [_term(rho, part.mass[own][:, own]), *bodies.terms()],
         [Term(1.0, sparse.csr_array(part.rigid[own][:, kept]))],
-        lost=Lost(E, lost),
+        lost=Lost(E, rho, gram, lambda: part.lacked.one_layer),
     )
 
 

@@ -9,9 +9,10 @@ The shape functions are the polynomials of a kind that are 1 at their own node a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,22 +106,19 @@ def _monomials(count: int) -> Floats:
     return np.asarray(np.linalg.inv(_powers(kind.nodes, kind.exponents)))
 
 
-def _powers(xi: Floats, exponents: Floats) -> Floats:
-    return np.asarray(np.prod(xi[:, None] ** exponents, axis=2))
+def _powers(xi: Any, exponents: Floats) -> Any:
+    return np.prod(xi[:, None] ** exponents, axis=2)
 
 
-def shapes(count: int, xi: Floats) -> Floats:
-    """The shape functions of a kind at places xi (n, 3): (n, n_nodes)."""
+def shapes(count: int, xi: Any) -> Any:
+    """The shape functions of a kind at real or complex places xi (n, 3): (n, n_nodes)."""
     return _powers(xi, KINDS[count].exponents) @ _monomials(count)
 
 
-def slopes(count: int, xi: Floats) -> Floats:
-    """Their derivatives by ξ, (n, 3, n_nodes)."""
-    exponents, each = KINDS[count].exponents, []
-    for axis in range(3):
-        lower = np.maximum(exponents - np.eye(3)[axis], 0.0)
-        each.append(exponents[:, axis] * _powers(xi, lower) @ _monomials(count))
-    return np.stack(each, axis=1)
+def slopes(count: int, xi: Floats, functions: Callable[[int, Any], Any] = shapes) -> Floats:
+    """Their derivatives by ξ, (n, 3, n_nodes): exact, by a step along the imaginary axis."""
+    steps = 1e-30j * np.eye(3)
+    return np.stack([functions(count, xi + step).imag / 1e-30 for step in steps], axis=1)
 
 
 def jacobians(x: Floats, count: int, xi: Floats) -> Floats:
@@ -128,11 +126,11 @@ def jacobians(x: Floats, count: int, xi: Floats) -> Floats:
     return np.asarray(slopes(count, xi)[None] @ x[:, None])
 
 
-def gradients(x: Floats, count: int, xi: Floats) -> tuple[Floats, Floats]:
-    """∂N/∂x (m, n, 3, n_nodes) and det ∂x/∂ξ (m, n)."""
+def gradients(x: Floats, count: int, xi: Floats, dN: Floats) -> tuple[Floats, Floats]:
+    """∂N/∂x (m, n, 3, k) of ∂N/∂ξ (n, 3, k), and det ∂x/∂ξ (m, n)."""
     J = jacobians(x, count, xi)
-    dN = np.linalg.solve(J, np.broadcast_to(slopes(count, xi), (*J.shape[:3], count)))
-    return np.asarray(dN), np.asarray(np.linalg.det(J))
+    dN = np.asarray(np.linalg.solve(J, np.broadcast_to(dN, (*J.shape[:2], *dN.shape[1:]))))
+    return dN, np.asarray(np.linalg.det(J))
 
 
 def lame(nu: float) -> tuple[float, float]:
@@ -140,28 +138,23 @@ def lame(nu: float) -> tuple[float, float]:
     return nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu)
 
 
-def elasticity(nu: float) -> Floats:
-    """Stresses (6, 6) of strains xx, yy, zz, xy, yz, zx, shear twice, for E = 1."""
-    lam, mu = lame(nu)
-    C = np.diag([2.0 * mu] * 3 + [mu] * 3)
-    C[:3, :3] += lam
-    return C
-
-
 def stiffness(x: Floats, count: int, nu: float) -> Floats:
     """K of elements with nodes x (m, n_nodes, 3) for E = 1: (m, 3 n_nodes, 3 n_nodes)."""
-    kind, (lam, mu) = KINDS[count], lame(nu)
-    dN, det = gradients(x, count, kind.points)
-    m, k = len(x), 3 * count
-    rows = dN.transpose(0, 3, 2, 1).reshape(m, k, -1)
-    H = ((rows * (det * kind.weights)[:, None]) @ rows.transpose(0, 2, 1)).reshape(
-        m, count, 3, count, 3
-    )
+    kind = KINDS[count]
+    dN, det = gradients(x, count, kind.points, slopes(count, kind.points))
+    return strain_energy(dN, det * kind.weights, nu)
+
+
+def strain_energy(dN: Floats, volume: Floats, nu: float) -> Floats:
+    """K of functions with ∂N/∂x (m, n, 3, k) at n points of ``volume`` (m, n): (m, 3 k, 3 k)."""
+    (m, _, _, count), (lam, mu) = dN.shape, lame(nu)
+    rows = dN.transpose(0, 3, 2, 1).reshape(m, 3 * count, -1)
+    H = ((rows * volume[:, None]) @ rows.transpose(0, 2, 1)).reshape(m, count, 3, count, 3)
     same = np.einsum("mcicj->mij", H.transpose(0, 2, 1, 4, 3))
     K = lam * H + mu * H.transpose(0, 1, 4, 3, 2)
     for a in range(3):
         K[:, :, a, :, a] += mu * same
-    return K.reshape(m, k, k)
+    return K.reshape(m, 3 * count, 3 * count)
 
 
 def mass(x: Floats, count: int) -> Floats:
@@ -173,8 +166,14 @@ def mass(x: Floats, count: int) -> Floats:
     return np.asarray(((det * weights) @ products).reshape(len(x), count, count))
 
 
-def assembled(blocks: Floats, dofs: Ints, n: int) -> sparse.csr_array:
-    """Σ of the elements' matrices (m, k, k) at their ``dofs`` (m, k), (n, n)."""
-    k = dofs.shape[1]
-    rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, (1, k)).ravel()
-    return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(n, n))
+def dofs(nodes: Ints) -> Ints:
+    """The three of each node (m, k): (m, 3 k)."""
+    return (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+
+
+def assembled(blocks: Floats, rows: Ints, columns: Ints, shape: Any) -> sparse.csr_array:
+    """Σ of the elements' matrices (m, k, l) at their ``rows`` (m, k) and ``columns`` (m, l)."""
+    at = (
+        np.broadcast_to(each, blocks.shape).ravel() for each in (rows[:, :, None], columns[:, None])
+    )
+    return sparse.csr_array((blocks.ravel(), tuple(at)), shape=shape)

@@ -1,10 +1,4 @@
-"""A solid part by its mesh: K of E = 1, M of ρ = 1 and rigid motion, its nodes before its mesh.
-
-How far the mesh errs is estimated from the mode itself (Zienkiewicz and Zhu, IJNME 24 (1987) 337):
-stresses that are averaged at nodes, and have no traction where nothing pulls, are closer to the
-true ones than those of the elements, and the energy of the difference, relative to that of the
-mode, is about what the mesh adds to λ.
-"""
+"""A solid part by its mesh: K of E = 1, M of ρ = 1 and rigid motion, its nodes before its mesh."""
 
 from __future__ import annotations
 
@@ -26,18 +20,17 @@ from eigassign.mechanism.imports.parts import UNITS
 from eigassign.mechanism.solids.elements import (
     KINDS,
     assembled,
-    elasticity,
-    gradients,
+    dofs,
     jacobians,
     mass,
     stiffness,
 )
+from eigassign.mechanism.solids.enriched import Enriched, enriched
 from eigassign.mechanism.solids.mesh_file import SolidMesh, read_mesh
 from eigassign.mechanism.solids.surfaces import (
     Coupling,
     UnfitSurfaceError,
     centre,
-    free_directions,
     joined,
     pieces,
     rigid_rows,
@@ -47,7 +40,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 _log = logging.getLogger(__name__)
 SEVERAL = 50_000  # unknowns above which a factor may take half a minute and a GB
-AT_ONCE = 2_000_000  # numbers that are held at a time: strains, entries of elements' matrices
+AT_ONCE = 2_000_000  # numbers that are held at a time: entries of elements' matrices
 # Volume of an element at a point, of the box of its edges, that is none: files have few digits
 FLAT = 1e-9
 HUGE = 1e4  # m³, a cube of 21 m; a part of 10 cm³ has that in mm that are read as m
@@ -70,47 +63,10 @@ class SolidPart:
     rigid: Floats  # (n_local, 6)
     held: Ints  # nodes of the mesh that its nodes stand for
 
-    def lost(self, v: Floats) -> Floats:
-        """2 × energy (count, count) of recovered less own stresses of motions v (n_local, count).
-
-        For E = 1.
-        """
-        x, u = self.mesh.x, (self.motion @ v).reshape(len(self.mesh.x), -1)
-        mean, volume = np.zeros((len(x), 2 * u.shape[1])), np.zeros(len(x))
-        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
-            weight = np.repeat(mass(x[rows], count).sum(axis=(1, 2)), count)
-            spread = sparse.csr_array(
-                (weight, (rows.ravel(), np.arange(rows.size))), shape=(len(x), rows.size)
-            )
-            mean += spread @ _strains(x[rows], count, u[rows]).reshape(rows.size, -1)
-            volume += spread.sum(axis=1)
-        C = elasticity(self.nu)
-        mean = np.einsum("ab,nbr->nar", C, (mean / volume[:, None]).reshape(len(x), 6, -1))
-        at, possible = self.boundary
-        mean[at] = possible @ mean[at]
-        out = np.zeros((v.shape[1],) * 2)
-        for count, rows in self.mesh.pieces(AT_ONCE // (40 * u.shape[1])):
-            own = np.einsum("ab,mkbr->mkar", C, _strains(x[rows], count, u[rows]))
-            d = mean[rows] - own
-            heavy = (mass(x[rows], count) @ d.reshape(*rows.shape, -1)).reshape(d.shape)
-            strain = np.einsum("ab,mkbr->mkar", np.linalg.inv(C), heavy)
-            out += strain.reshape(-1, v.shape[1]).T @ d.reshape(-1, v.shape[1])
-        return 0.5 * (out + out.T)
-
     @cached_property
-    def boundary(self) -> tuple[Ints, Floats]:
-        """Nodes where nothing pulls, and the stresses that can be there, `free_directions`."""
-        return free_directions(self.mesh, self.held)
-
-
-def _strains(x: Floats, count: int, u: Floats) -> Floats:
-    """Strains (m, n_nodes, 6, r), shear twice, at the nodes of elements that move by u."""
-    dN, _ = gradients(x, count, KINDS[count].nodes)
-    u = u.reshape(*u.shape[:2], 3, -1)
-    G = np.einsum("mgai,mibr->mgabr", dN, u, optimize=True)
-    pairs = ((0, 1), (1, 2), (2, 0))
-    shear = [G[:, :, a, b] + G[:, :, b, a] for a, b in pairs]
-    return np.stack([*(G[:, :, a, a] for a in range(3)), *shear], axis=2)
+    def lacked(self) -> Enriched:
+        """The functions that its mesh lacks."""
+        return enriched(self.mesh, self.nu, self.held)
 
 
 def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
@@ -185,9 +141,10 @@ def _made(
     K, M = sparse.csr_array((n, n)), sparse.csr_array((n, n))
     for count, rows in mesh.pieces(AT_ONCE // 2000):
         x = mesh.x[rows]
-        dofs = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
-        K = K + assembled(stiffness(x, count, nu), dofs, n)
-        M = M + assembled(np.asarray(np.kron(mass(x, count), np.eye(3))), dofs, n)
+        to = dofs(rows)
+        K = K + assembled(stiffness(x, count, nu), to, to, (n, n))
+        heavy = np.asarray(np.kron(mass(x, count), np.eye(3)))
+        M = M + assembled(heavy, to, to, (n, n))
     held = np.concatenate([each.own for each in given.values()])
     whole = rigid_rows(mesh.x)
     rigid = np.vstack([*(_at_node(each.place) for each in given.values()), whole[free]])

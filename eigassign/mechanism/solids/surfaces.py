@@ -26,9 +26,6 @@ from eigassign.mechanism.solids.mesh_file import SolidMesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 ON_A_LINE = 1e-9  # of the second moment of a surface, about the line that its nodes lie on
-# Mean of (n · axis)² over the faces about a node from which on it lies on an edge: faces that
-# enclose 60 degrees
-EDGE = 0.25
 # each pair of dofs of a distributing surface makes an entry: 1 000 nodes take 200 MB
 MOST_DISTRIBUTING = 1000
 
@@ -89,37 +86,6 @@ def _shares(x: Floats, count: int, corners: Floats) -> Floats:
     area = w * np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
     places = np.concatenate([np.ones((*area.shape, 1)), N @ x], axis=2)
     return np.asarray(N.T @ (area[:, :, None] * places))
-
-
-def free_directions(mesh: SolidMesh, held: Ints) -> tuple[Ints, Floats]:
-    """Nodes on the boundary, without the ``held`` ones, and stresses (n, 6, 6) that can be there.
-
-    Projections of xx, yy, zz, xy, yz, zx on those without traction on the faces about a node.
-    """
-    normals: dict[tuple[int, ...], tuple[list[int], Floats]] = {}
-    for count, elements in mesh.elements.items():
-        for k, corners in enumerate(KINDS[count].faces):
-            nodes = elements[:, KINDS[count].face(k)]
-            x = mesh.x[nodes[:, : len(corners)]]
-            n = np.cross(x[:, 1] - x[:, -1], x[:, 2] - x[:, 0])
-            area = np.linalg.norm(n, axis=1, keepdims=True)
-            n = np.divide(n, area, out=np.zeros_like(n), where=area > 0.0)  # of a collapsed face
-            keys = np.sort(nodes[:, : len(corners)], axis=1).tolist()
-            for key, own, normal in zip(map(tuple, keys), nodes.tolist(), n, strict=True):
-                normals[key] = (own if key not in normals else [], normal)
-    G, count_at = np.zeros((len(mesh.x), 3, 3)), np.zeros(len(mesh.x))
-    for own, normal in normals.values():
-        G[own] += np.outer(normal, normal)
-        count_at[own] += 1.0
-    count_at[held] = 0.0
-    at = np.flatnonzero(count_at)
-    values, axes = np.linalg.eigh(G[at] / count_at[at, None, None])
-    axes = axes.transpose(0, 2, 1) * (values > EDGE)[:, :, None]
-    a, b, c = np.moveaxis(axes, 2, 0)
-    zero = np.zeros_like(a)
-    rows = [[a, zero, zero, b, zero, c], [zero, b, zero, a, c, zero], [zero, zero, c, zero, b, a]]
-    A = np.stack([np.stack(row, axis=2) for row in rows], axis=2).reshape(len(at), 9, 6)
-    return at, np.eye(6) - np.linalg.pinv(A, rcond=1e-6) @ A
 
 
 def joined(mesh: SolidMesh, couplings: Mapping[str, Coupling]) -> tuple[sparse.csr_array, Ints]:

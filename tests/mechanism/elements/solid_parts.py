@@ -44,26 +44,43 @@ def bar(
     cells: tuple[int, int, int], count: int, size: Any = (0.4, 0.02, 0.03), grading: float = 1.0
 ) -> Bar:
     """A bar along x from x = 0; with a grading above 1 its cells are shorter towards both ends."""
-    n, size = np.array(cells), np.array(size)
-    edges, bricks = (HEX, [tuple(range(8))]) if count == 20 else (TET, SIX)
+    a, b, c = size
+    edges = ((0.0, a), (-0.5 * b, 0.5 * b), (-0.5 * c, 0.5 * c))
+    return blocks(edges, tuple((n,) for n in cells), count, grading=grading)
+
+
+def blocks(
+    edges: Any, cells: Any, count: int, missing: Any = (), grading: float = 1.0, tip: int = 0
+) -> Bar:
+    """Blocks between ``edges`` of three axes, so many cells in each, some of them ``missing``.
+
+    The root is its start in x, the tip its end in x; with ``tip`` 2 its ends in x and in z.
+    """
+    kind, bricks = (HEX, [tuple(range(8))]) if count == 20 else (TET, SIX)
+    block = [np.repeat(np.arange(len(own)), own) for own in cells]
     places: dict[tuple[int, ...], int] = {}
     elements = []
-    for cell in product(*map(range, n)):
+    for cell in product(*(range(len(own)) for own in block)):
+        if tuple(int(own[k]) for own, k in zip(block, cell, strict=True)) in missing:
+            continue
         at = 2 * (np.array(cell) + CORNERS)
         for own in bricks:
             corners = at[list(own)]
-            middle = [] if count == 4 else [(corners[a] + corners[b]) // 2 for a, b in edges]
+            middle = [] if count == 4 else [(corners[a] + corners[b]) // 2 for a, b in kind]
             keys = [tuple(map(int, key)) for key in (*corners, *middle)]
             elements.append([places.setdefault(key, len(places)) for key in keys])
-    x = np.array(list(places)) / (2.0 * n)
-    rows = np.array(elements)
-    s = x[:, 0] ** grading
-    x[:, 0] = s / (s + (1.0 - x[:, 0]) ** grading)
-    x = x * size - [0.0, *(0.5 * size[1:])]
-    first = rows.shape[1] - len(edges) if count != 4 else 4
-    for k, (a, b) in enumerate(edges if count != 4 else []):
-        x[rows[:, first + k]] = 0.5 * (x[rows[:, a]] + x[rows[:, b]])
-    ends = {"root": x[:, 0] < 1e-9, "tip": x[:, 0] > size[0] - 1e-9}
+    rows, keys = np.array(elements), np.array(list(places)).T
+    starts = [2 * np.cumsum([0, *own]) for own in cells]
+    x = np.array([np.interp(*each) for each in zip(keys, starts, edges, strict=True)]).T
+    length = edges[0][-1]
+    s = (x[:, 0] / length) ** grading
+    x[:, 0] = length * s / (s + (1.0 - x[:, 0] / length) ** grading)
+    for k, (a, b) in enumerate(kind if count != 4 else []):
+        middle = rows[:, rows.shape[1] - len(kind) + k]
+        x[middle] = 0.5 * (x[rows[:, a]] + x[rows[:, b]])
+    ends = {"root": x[:, 0] < 1e-9, "tip": x[:, tip] > edges[tip][-1] - 1e-9}
+    if tip:
+        ends["root"] = x[:, 0] > length - 1e-9
     return Bar(x, rows, {name: np.flatnonzero(own) for name, own in ends.items()})
 
 
