@@ -5,8 +5,7 @@ Reading order:
     crossing      two modes that meet: the matrix of both, smooth where each alone has a kink
     requirement   what all kinds have in common, its rows, and the frequencies that they are of
     frequency     a mode has a frequency
-    lower_limit   a mode does not fall below a frequency
-    upper_limit   a mode does not exceed a frequency
+    limit         a mode does not fall below a frequency, or does not exceed it
     gap           two modes stay apart
     highest       a mode is as high as can be
     band          no mode is in a band

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.assignment.requirements.lower_limit import LowerLimit
+from eigassign.assignment.requirements.limit import LowerLimit, UpperLimit
 from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,
@@ -23,7 +23,6 @@ from eigassign.assignment.requirements.requirement import (
     Terms,
     in_hz,
 )
-from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.case.schema.targets import Harmonic, KeepOutTarget
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it

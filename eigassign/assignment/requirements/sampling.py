@@ -18,7 +18,7 @@ from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.highest import HighestFrequency
-from eigassign.assignment.requirements.lower_limit import LowerLimit
+from eigassign.assignment.requirements.limit import LowerLimit, UpperLimit
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.quantity import (
     DriveLimit,
@@ -28,7 +28,6 @@ from eigassign.assignment.requirements.quantity import (
 )
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.static_limit import Placed, static_limits
-from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted

@@ -1,11 +1,27 @@
-"""A mode does not exceed a frequency."""
+"""A mode does not fall below a frequency, or does not exceed it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from eigassign.assignment.requirements.requirement import Edges, Floats, Requirement, in_hz
-from eigassign.case.schema.targets import AtMostTarget
+from eigassign.case.schema.targets import AtLeastTarget, AtMostTarget
+
+
+class LowerLimit(Requirement):
+    """The frequency of a mode is at least ``hz``."""
+
+    form = AtLeastTarget
+
+    @staticmethod
+    def asked(target: AtLeastTarget) -> str:
+        """The words for what is asked of the mode."""
+        return f"at least {in_hz(target.at_least)}"
+
+    @staticmethod
+    def edges(target: AtLeastTarget, *hz: Floats) -> Edges:
+        """The limit, and no upper edge."""
+        return hz[0], np.full_like(hz[0], np.inf)
 
 
 class UpperLimit(Requirement):
