@@ -1,4 +1,4 @@
-"""A mode has a frequency."""
+"""A mode has a frequency, or as high a one as can be."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eigassign.assignment.requirements.requirement import (
     in_hz,
 )
 from eigassign.assignment.targets import positive_hz
-from eigassign.case.schema.targets import FrequencyTarget
+from eigassign.case.schema.targets import FrequencyTarget, HighestTarget
 
 
 class AssignedFrequency(Requirement):
@@ -48,3 +48,33 @@ class AssignedFrequency(Requirement):
     def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
         """Yield factor · (f / f_d − 1), of either sign: to miss it violates no limit."""
         yield EdgeRows(self, "lower", self.hz, factor / self.hz)
+
+
+class HighestFrequency(Requirement):
+    """The frequency of a mode is as far above 0 Hz as can be: its row of the objective is −f.
+
+    As a limit, of 0 Hz, it is always met.
+    """
+
+    form = HighestTarget
+    columns = ("initial", "exact")
+    is_aim = True
+
+    @staticmethod
+    def asked(target: HighestTarget) -> str:
+        """The words for what is asked of the mode."""
+        return "as high as can be"
+
+    @staticmethod
+    def edges(target: HighestTarget, *hz: Floats) -> Edges:
+        """0 Hz, and no upper edge."""
+        return np.zeros(1), np.full(1, np.inf)
+
+    def stake(self, solved: Solved, raised: float) -> float:
+        """The share of its frequency that a model has raised it by at most."""
+        return raised / (1.0 + raised) if np.isfinite(raised) else 1.0
+
+    @property
+    def forbidden_hz(self) -> tuple[Floats | None, Floats | None]:
+        """None: every frequency is allowed."""
+        return None, None
