@@ -2,8 +2,7 @@
 
 Reading order:
 
-    checks        refuses input that is not finite or has another shape
-    targets       wanted frequencies at the samples, weights in time, λ in Hz
+    targets       wanted frequencies at the samples, weights in time, λ in Hz; checks of input
     linear        what is linear in the design: λ along the trajectory, and limits
     requirements  what a case asks for: one type from the case file to the report
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.catalogues.branching import CatalogueSearch, ListedValues
 from eigassign.assignment.catalogues.choosing import held, solve_catalogue
-from eigassign.assignment.checks import Floats, finite, frozen
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
@@ -27,6 +26,7 @@ from eigassign.assignment.program import (
     build_program,
 )
 from eigassign.assignment.solver import solve_program
+from eigassign.assignment.targets import Floats, finite, frozen
 from eigassign.brief import Brief
 
 

@@ -7,9 +7,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.program import Bounds, QuadraticProgram, ScaledProgram
+from eigassign.assignment.targets import Floats
 from eigassign.errors import InfeasibleError
 
 T = TypeVar("T")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats, finite, limit, same_length
+from eigassign.assignment.targets import Floats, finite, limit, same_length
 from eigassign.errors import UsageError
 
 

@@ -32,7 +32,6 @@ from functools import cached_property
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.feasibility import contradiction, feasible_point, refuse_impossible
 from eigassign.assignment.program import (
     ProgramAnswer,
@@ -41,6 +40,7 @@ from eigassign.assignment.program import (
     scaled_program,
     unscaled,
 )
+from eigassign.assignment.targets import Floats
 from eigassign.errors import UsageError
 
 

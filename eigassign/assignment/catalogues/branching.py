@@ -26,9 +26,9 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.checks import Floats, finite, frozen, same_length
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.program import Bounds
+from eigassign.assignment.targets import Floats, finite, frozen, same_length
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, UsageError
 
 Rows = tuple[int, ...]  # one row of every catalogue: a combination

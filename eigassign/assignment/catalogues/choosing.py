@@ -45,7 +45,6 @@ from eigassign.assignment.catalogues.branching import (
     none_found,
     search_catalogue,
 )
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import MET, DesignProblem, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
 from eigassign.assignment.feasibility import (
@@ -59,6 +58,7 @@ from eigassign.assignment.feasibility import (
 from eigassign.assignment.optimality import best_candidate
 from eigassign.assignment.program import Bounds, QuadraticProgram, scaled_program, unscaled
 from eigassign.assignment.solver import solve_osqp, solve_program
+from eigassign.assignment.targets import Floats
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 # --- The program of eqs. (13)–(14)

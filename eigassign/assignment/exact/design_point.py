@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, UnitBox
 from eigassign.assignment.requirements.crossing import MEET, NeighbourPairs
+from eigassign.assignment.targets import Floats
 
 Indices = NDArray[np.intp]
 

@@ -35,9 +35,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats, frozen
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import End, Optimum, minimise
+from eigassign.assignment.targets import Floats, frozen
 from eigassign.errors import EigassignError
 
 Bools = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import MET, DesignProblem, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, minimise, unseen, worth
+from eigassign.assignment.targets import Floats
 from eigassign.errors import EigassignError
 
 SAME = 1e-4  # relative, in F: optima of the same worth

@@ -21,7 +21,6 @@ from functools import cached_property
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import Appraisal, Objective
 from eigassign.assignment.requirements.crossing import NeighbourPairs, joined
 from eigassign.assignment.requirements.requirement import (
@@ -32,6 +31,7 @@ from eigassign.assignment.requirements.requirement import (
     difference,
     time_shares,
 )
+from eigassign.assignment.targets import Floats
 
 
 @dataclass(frozen=True)

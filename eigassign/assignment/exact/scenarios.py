@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import Appraisal
 from eigassign.assignment.requirements.crossing import NeighbourPairs, joined
+from eigassign.assignment.targets import Floats
 
 Appraise = Callable[[Floats], Appraisal]
 

@@ -18,7 +18,6 @@ from time import monotonic
 
 import numpy as np
 
-from eigassign.assignment.checks import Floats, frozen
 from eigassign.assignment.exact.design_point import DesignPoint
 from eigassign.assignment.exact.design_problem import (
     MET,
@@ -32,6 +31,7 @@ from eigassign.assignment.exact.design_problem import (
 from eigassign.assignment.exact.stationarity import BindingLimit, first_order
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
 from eigassign.assignment.program import SNAP
+from eigassign.assignment.targets import Floats, frozen
 from eigassign.errors import EigassignError
 
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds

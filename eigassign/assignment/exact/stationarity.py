@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_point import DesignPoint, Indices
 from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
+from eigassign.assignment.targets import Floats
 
 _Held = tuple[Floats, str, int, bool]  # a limit that the design lies on: its outward normal, which
 

@@ -22,10 +22,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.checks import frozen
 from eigassign.assignment.linear import LinearConstraint, LinearModel
 from eigassign.assignment.requirements.crossing import NeighbourPairs
-from eigassign.assignment.targets import lam_from_hz
+from eigassign.assignment.targets import frozen, lam_from_hz
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import (
     AnyTarget,

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import KEEP, ListedValues
 from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, are_few, choose, combinations
-from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.optima import NOTHING, SAME, Tally
 from eigassign.assignment.exact.sequential import Optimum, minimise, worth
 from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.targets import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError, InfeasibleError
 from eigassign.study.design.clearance import check_band, wanting
