@@ -2,8 +2,7 @@
 
 In reading order:
 
-    condensation  the modes as data, and the condensed mass M_c
-    massless      counts the modes with mass, and solves nearly massless models to full precision
+    condensation  the modes as data, the condensed mass M_c, and how many modes have mass
     dense         small pencils: many samples at once, or one through LAPACK
     sparse        large pencils: Lanczos with one sparse factorisation
     standing      poses that fall under the weight, and loads beyond buckling

@@ -1,4 +1,16 @@
-"""What all exact solvers share: the modes they find, and the condensed mass M_c (eq. (1))."""
+"""The modes as data, the condensed mass M_c, and the modes that have mass.
+
+An eigenvalue μ = 1/λ of M_c z = μ K_E z that ought to be zero comes out as round-off: of the
+eigensolver, ε n μ_1, and of the condensed mass, in which M_EE and M_EF M_FF⁻¹ M_FE cancel. With
+m_i = Σ_j |θ_j (M_j)_ii| and W = M_FF⁻¹ M_FE the latter is, entry by entry,
+
+    |δM_c|_ij ≤ c n ε t_i t_j,   t_i = √m_i + Σ_f |W_fi| √m_f .
+
+Where every μ asked for is well above both, all of them have mass. Where one is not, the mass
+decides and not the size of μ: with T = diag(t), T⁻¹ M_c T⁻¹ = G Gᵀ by Cholesky with diagonal
+pivots, down to pivots of c n ε. G has as many columns as modes have mass, and the singular values
+of C⁻¹ T G, K_E = C Cᵀ, are √μ: stiff modes keep digits there that they have lost in μ.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+from scipy.linalg import lapack, svd
 
-from eigassign.errors import MechanismError
+from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
+from eigassign.mechanism.assembly.pencil import Pencil
 
 Floats = NDArray[np.float64]
 NO_MASS = (
@@ -69,3 +82,62 @@ def block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Float
     flat = (rows[:, None] * A.shape[2] + columns).ravel()
     taken = A.reshape(len(A), A.shape[1] * A.shape[2]).take(flat, axis=1)
     return np.asarray(taken.reshape(len(A), len(rows), len(columns)))
+
+
+Flags = NDArray[np.bool_]
+ROUND_OFF = 10.0 * float(np.finfo(np.float64).eps)  # c ε, times n
+STIFFEST = 1e-10  # √μ/√μ_1 down to which a singular value keeps five digits
+MARGIN = 1e3  # a μ above the eigensolver's round-off by this much keeps its digits
+INDEFINITE = 1e-9  # of the scaled mass left over by its Cholesky factor that is no round-off
+
+
+def mass_sizes(pencil: Pencil, theta: Floats, coupling: Floats) -> Floats:
+    """t² (n_samples, n_elastic); θ (n_theta, n_samples), W (n_samples, n_rigid, n_elastic)."""
+    root = np.sqrt(pencil.mass_magnitude @ np.abs(theta)).T
+    size = root[:, pencil.elastic]
+    if coupling.size:
+        size += np.einsum("kfi,kf->ki", np.abs(coupling), root[:, pencil.rigid])
+    return np.asarray(size * size)
+
+
+def may_be_roundoff(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags:
+    """Which μ (…, count), descending, may be round-off; ``noise`` ≥ zᵀ T² z of K_E-unit z.
+
+    The eigensolver's counts ``margin`` times, since singular values have less of it; that of M_c
+    stays whatever is done.
+    """
+    return np.asarray(mu <= ROUND_OFF * n * (noise + margin * mu[..., :1]))
+
+
+def modes_with_mass(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
+    """λ (count,) and mass-normalised modes (n_dof, count), signs as they come, θ (n_theta, 1).
+
+    Raises MissingMassError where fewer have mass, AccuracyError for an indefinite mass.
+    """
+    K, M = pencil.matrices(theta)
+    E = pencil.elastic
+    coupling, M_c = condense(M, E, pencil.rigid)
+    G = _factor(M_c[0], np.sqrt(mass_sizes(pencil, theta, coupling)[0]))
+    C, info = lapack.dpotrf(K[0][np.ix_(E, E)], lower=1)
+    if info:
+        raise MechanismError("mechanism", LIMP)
+    U, root, _ = svd(lapack.dtrtrs(C, G, lower=1)[0], full_matrices=False)
+    most = int((root > STIFFEST * root.max(initial=0.0)).sum())
+    if most < count:
+        raise MissingMassError(most)
+    z = lapack.dtrtrs(C, U[:, :count], lower=1, trans=1)[0] / root[:count]
+    phi = np.empty((pencil.n_dof, count))
+    phi[E], phi[pencil.rigid] = z, -coupling[0] @ z
+    return root[:count] ** -2.0, phi
+
+
+def _factor(M_c: Floats, t: Floats) -> Floats:
+    """T G (n, rank) with T G Gᵀ T = M_c up to round-off."""
+    scale = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0.0)
+    scaled = scale[:, None] * M_c * scale
+    L, pivots, rank, _ = lapack.dpstrf(scaled, tol=ROUND_OFF * len(t), lower=1)
+    G = np.zeros((len(t), rank))
+    G[pivots - 1] = np.tril(L)[:, :rank]
+    if np.abs(scaled - G @ G.T).max(initial=0.0) > INDEFINITE:
+        raise AccuracyError("the mass matrix is not positive semidefinite")
+    return np.asarray(t[:, None] * G)

@@ -19,10 +19,12 @@ from eigassign.modal.exact.condensation import (
     Modes,
     block,
     condense_blocks,
+    mass_sizes,
+    may_be_roundoff,
+    modes_with_mass,
     positive_at_top,
     rigid_coupling,
 )
-from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
 Floats = NDArray[np.float64]
 UPPER: Literal["U"] = "U"  # half of (L⁻¹ M_c) L⁻ᵀ that is read: the other has more round-off

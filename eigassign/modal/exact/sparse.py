@@ -14,8 +14,14 @@ from eigassign.mechanism.elements.sparse_factor import (
     has_positive_pivots,
     largest_modes,
 )
-from eigassign.modal.exact.condensation import Modes, positive_at_top, rigid_coupling
-from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
+from eigassign.modal.exact.condensation import (
+    Modes,
+    mass_sizes,
+    may_be_roundoff,
+    modes_with_mass,
+    positive_at_top,
+    rigid_coupling,
+)
 
 Floats = NDArray[np.float64]
 FINE = (

@@ -46,10 +46,15 @@ from scipy.sparse import linalg
 from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import definite_factor, largest_modes
-from eigassign.modal.exact.condensation import Modes, condense_blocks, positive_at_top
+from eigassign.modal.exact.condensation import (
+    Modes,
+    condense_blocks,
+    mass_sizes,
+    may_be_roundoff,
+    positive_at_top,
+)
 from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
-from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff
 from eigassign.modal.exact.sparse import block, principal, solve_sparse
 
 Floats = NDArray[np.float64]
