@@ -11,6 +11,5 @@ In reading order:
     solver        the dispatcher: dense or sparse, and as many modes as there are
     roundoff      how many digits of a frequency the matrices themselves hold
     clusters      neighbouring modes that are expanded together
-    tracking      modes followed along a path by their shapes
-    following     one mode by its shape from where it is named, or the modes nearest to it
+    tracking      modes followed by their shapes, along a path or from where they are named
 """

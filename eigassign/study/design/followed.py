@@ -23,14 +23,15 @@ from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import CaseError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.exact.following import (
+from eigassign.modal.exact.tracking import (
+    COINCIDENT,
+    EXTRA,
     FollowedShape,
     ModesAtPoint,
     MoreModesError,
     follow,
     places,
 )
-from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
 from eigassign.study.planning import shown_point
 from eigassign.study.scene import Scene
