@@ -29,7 +29,7 @@ import numpy as np
 import eigassign as ea
 from eigassign.modal.exact.solver import modes
 from eigassign.modal.taylor.coefficients import pencil_series
-from eigassign.modal.taylor.local_coordinates import local_space, vector_set
+from eigassign.modal.taylor.vectors import local_space, vector_set
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.recursion import expand_subspace
 

@@ -21,14 +21,14 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
 from eigassign.modal.exact.clusters import CLUSTER_GAP
-from eigassign.modal.taylor.local_coordinates import (
+from eigassign.modal.taylor.rayleigh import eigenvalue_series
+from eigassign.modal.taylor.vectors import (
     LocalSpace,
     local_space,
     substitute,
+    taylor_vectors,
     vector_set,
 )
-from eigassign.modal.taylor.rayleigh import eigenvalue_series
-from eigassign.modal.taylor.vectors import taylor_vectors
 from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import Polynomials, monomials, polynomials, reciprocal
 

@@ -36,7 +36,7 @@ from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.local_coordinates import local_space
+from eigassign.modal.taylor.vectors import local_space
 from eigassign.modal.under_load import buckling
 
 Floats = NDArray[np.float64]
