@@ -208,7 +208,7 @@ def validate(
     """
     from eigassign.batch.plan import cases_in
     from eigassign.output import previous
-    from eigassign.output.batch.junit import write_junit
+    from eigassign.output.batch.summary import write_junit
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []

@@ -3,8 +3,7 @@
 In reading order; each imports from those above it only:
 
     outcome  how one case ended: a row of every file below
-    summary  summary.csv and summary.json, and the table on the console
-    junit    junit.xml for CI servers
+    summary  summary.csv, summary.json and junit.xml, and the table on the console
     index    index.html: plots over what was swept, the rows to sort and filter
     files    all of these
 """

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from eigassign.output.batch.index import index_page
-from eigassign.output.batch.junit import Test, write_junit
 from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.batch.summary import summary_csv, summary_json
+from eigassign.output.batch.summary import Test, summary_csv, summary_json, write_junit
 from eigassign.output.store.atomic import replace_synced
 
 NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html")

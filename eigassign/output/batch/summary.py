@@ -1,4 +1,4 @@
-"""The rows of a batch for programs, summary.json; for spreadsheets, summary.csv; on the console."""
+"""summary.csv and summary.json, junit.xml for CI servers, and the table on the console."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ import io
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated
 
 from eigassign._version import __version__
 from eigassign.case.units import QuantityError, read_quantity
+from eigassign.errors import StorageError
 from eigassign.facts import Fact
 from eigassign.files import printable
 from eigassign.output.batch.outcome import NUMBERS, CaseOutcome, to_plain
+from eigassign.output.store.atomic import replace_synced
 from eigassign.output.tables import Table, facts_table
 
 FORMAT = 1  # of summary.json
@@ -125,3 +128,53 @@ def said(rows: Sequence[CaseOutcome]) -> str:
     """``58 ok, 2 error``."""
     counts, order = Counter[str](r.status for r in rows), ("ok", "tolerance", "failed", "error")
     return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])
+
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_MARKUP = re.compile('[&<>"\t\n\r]')
+SUITE = "eigassign"
+# Name, path of the case file, seconds; ok, error or the kind of failure; message, and output
+Test = tuple[str, str, float, str, str, str]
+
+
+def junit_xml(tests: Iterable[Test]) -> bytes:
+    """One suite, a line for each test; missed tolerances and unsolvable cases are failures."""
+    lines, totals = list[str](), Counter({"tests": 0, "failures": 0, "errors": 0})
+    time_s = 0.0
+    for name, path, seconds, status, message, output in tests:
+        line = f'<testcase name="{_escaped(name)}" classname="{SUITE}" '
+        line += f'file="{_escaped(path)}" time="{seconds:.3f}">'
+        totals["tests"] += 1
+        time_s += seconds
+        if status != "ok":
+            tag = "error" if status == "error" else "failure"
+            totals[f"{tag}s"] += 1
+            first = _escaped((message.splitlines() or [status])[0])
+            line += (
+                f'<{tag} type="{_escaped(status)}" message="{first}">{_escaped(message)}</{tag}>'
+            )
+        if output:
+            line += f"<system-out>{_escaped(output)}</system-out>"
+        lines.append(f"{line}</testcase>\n")
+    counts = f'name="{SUITE}" ' + " ".join(f'{k}="{v}"' for k, v in totals.items())
+    counts += f' time="{time_s:.3f}"'
+    header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
+    end = "</testsuite></testsuites>\n"
+    return "".join([header, 'skipped="0">\n', *lines, end]).encode()
+
+
+def write_junit(path: Path, tests: Iterable[Test]) -> None:
+    """A file of all ``tests``; raises StorageError where it cannot be written."""
+    try:
+        replace_synced(path, junit_xml(tests))
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _escaped(text: str) -> str:
+    """``text`` as content or attribute, on one line.
+
+    Characters that XML cannot hold are shown as ``\\x1b``.
+    """
+    shown = _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
+    return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", shown)
