@@ -30,7 +30,7 @@ from eigassign.case.values import key_path, short_keys
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, file_digest, folder_name
 from eigassign.modal.storage import ALGORITHM
-from eigassign.output.batch.files import NAMES
+from eigassign.output.batch.index import NAMES
 from eigassign.output.store.run_record import MARKER
 
 STUDY = "cheap"  # of what an answer means; see pipeline.run.Options

@@ -18,7 +18,7 @@ from pathlib import Path
 from eigassign.batch.plan import BatchPlan, Variant
 from eigassign.batch.work import CaseOptions
 from eigassign.errors import StorageError
-from eigassign.output.batch.files import write_files
+from eigassign.output.batch.index import write_files
 from eigassign.output.batch.outcome import CaseOutcome, from_plain
 from eigassign.output.store.atomic import lock
 from eigassign.output.store.run_record import is_whole, read_record

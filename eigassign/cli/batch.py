@@ -135,7 +135,7 @@ def _told(
 ) -> int:
     """Show how the cases ended, all of them or the first that failed; the exit code."""
     from eigassign.output import console
-    from eigassign.output.batch.files import write_tests
+    from eigassign.output.batch.index import write_tests
     from eigassign.output.batch.summary import batch_table, said
     from eigassign.output.previous import Known
 

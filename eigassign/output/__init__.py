@@ -20,8 +20,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "batch.files": "write_files",
-        "batch.index": "index_page",
+        "batch.index": "index_page write_files",
         "batch.outcome": "CaseOutcome frequency_ranges from_plain to_plain",
         "batch.summary": "batch_table summary_json",
         "console": "markdown print_assignment print_tables print_verdict progress",

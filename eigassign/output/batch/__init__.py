@@ -4,6 +4,5 @@ In reading order; each imports from those above it only:
 
     outcome  how one case ended: a row of every file below
     summary  summary.csv, summary.json and junit.xml, and the table on the console
-    index    index.html: plots over what was swept, the rows to sort and filter
-    files    all of these
+    index    index.html: plots over what was swept, the rows to sort and filter; all files together
 """

@@ -1,4 +1,4 @@
-"""index.html of a batch: what it found in a sentence, plots over what was swept, its rows.
+"""index.html, with plots over what was swept; and all files of a batch together.
 
 The page carries its rows as numbers, rounded and in units that people read; its own script draws
 them, as a map or lines over the swept keys and as points of any two columns, and sorts and filters.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,9 +19,17 @@ from eigassign.case.units import QuantityError, handy, handy_unit, number_and_un
 from eigassign.case.values import short_keys
 from eigassign.facts import capital, fact
 from eigassign.output.batch.outcome import NUMBERS, CaseOutcome
-from eigassign.output.batch.summary import bare_names, quantity
+from eigassign.output.batch.summary import (
+    Test,
+    bare_names,
+    quantity,
+    summary_csv,
+    summary_json,
+    write_junit,
+)
 from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.reports.verdict import TONES
+from eigassign.output.store.atomic import replace_synced
 
 _MANY = 100  # values of a key: more are a sample's, which need not be told apart
 _MESSAGE = 400  # characters of it: a page of a thousand rows stays below 2 MB
@@ -150,3 +158,31 @@ def _links(row: CaseOutcome, folder: Path) -> list[str]:
     wanted = (("report.html", "results.json"), ("figures/frequencies.png",))
     there = (next((f for f in names if (folder / place / f).exists()), None) for names in wanted)
     return ["" if name is None else quote(os.fsencode((place / name).as_posix())) for name in there]
+
+
+NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html")
+
+
+def write_files(folder: Path, rows: Sequence[CaseOutcome], keys: Sequence[str] = ()) -> None:
+    """Write what is made of the rows of a batch; ``keys`` are those of its sweep.
+
+    Raises OSError.
+    """
+    replace_synced(folder / "summary.csv", summary_csv(rows).encode())
+    replace_synced(folder / "summary.json", summary_json(rows).encode())
+    replace_synced(folder / "index.html", index_page(rows, folder, keys))
+    write_tests(folder, rows, {})
+
+
+def write_tests(
+    folder: Path, rows: Sequence[CaseOutcome], moves: Mapping[str, Sequence[str]]
+) -> None:
+    """junit.xml, in which what has moved of a case, by its name, is a failure too."""
+    write_junit(folder / "junit.xml", (_test(row, moves.get(row.name, ())) for row in rows))
+
+
+def _test(row: CaseOutcome, moves: Sequence[str]) -> Test:
+    output = f"run folder: {row.run_folder}" if row.run_folder else ""
+    status = "moved" if moves and row.status == "ok" else row.status
+    message = "\n".join(filter(None, (row.message, *moves)))
+    return row.name, row.path, row.seconds, status, message, output
