@@ -19,7 +19,7 @@ from eigassign.output.figures.modes import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
 from eigassign.pipeline.run import Result, solve_case
-from eigassign.pipeline.update import Updated, update_case
+from eigassign.pipeline.studies import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case

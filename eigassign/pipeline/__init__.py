@@ -9,8 +9,7 @@ Reading order:
     run                the paper's flowchart: case, model, expansion, assignment, verification
     queries            check a case, draw it; its frequencies at one point
     urdf               a robot from URDF as the content of a case
-    update             measured frequencies to the parameters that explain them
-    chart              time against accuracy of every method on one case
+    studies            measured frequencies to parameters; time against accuracy of every method
 """
 
 from eigassign.faces import face
@@ -18,11 +17,10 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "chart": "chart_case",
         "expansions": "affordable_order expand_plan expansion_key",
         "queries": "check draw modes",
         "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
         "stages": "Stages silent",
-        "update": "update_case",
+        "studies": "chart_case update_case",
     },
 )
