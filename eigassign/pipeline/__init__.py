@@ -2,14 +2,13 @@
 
 Reading order:
 
-    stages             the stages of a run: announced as they begin, timed as they end
-    expansions         both expansions of a plan, from the cache or computed
-    coefficient_files  expansion coefficients as files for other programs
-    run_files          the run folder, and the log in it
-    run                the paper's flowchart: case, model, expansion, assignment, verification
-    queries            check a case, draw it; its frequencies at one point
-    urdf               a robot from URDF as the content of a case
-    studies            measured frequencies to parameters; time against accuracy of every method
+    stages      the stages of a run: announced as they begin, timed as they end
+    expansions  both expansions of a plan, from the cache or computed; as files for other programs
+    run_files   the run folder, and the log in it
+    run         the paper's flowchart: case, model, expansion, assignment, verification
+    queries     check a case, draw it; its frequencies at one point
+    urdf        a robot from URDF as the content of a case
+    studies     measured frequencies to parameters; time against accuracy of every method
 """
 
 from eigassign.faces import face

@@ -1,4 +1,4 @@
-"""Both expansions of a plan: from the cache, bit for bit, or computed and stored there."""
+"""Both expansions of a plan, from the cache or computed, and as files for other programs."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import comb
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.errors import UsageError
-from eigassign.hdf5 import Array, content_key
+from eigassign.hdf5 import Array, content_key, pack
 from eigassign.modal.arguments import MOST_TERMS
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
+from eigassign.output.documents import dumps
 from eigassign.output.store.cache import Cache
 from eigassign.study.planning import Plan
-from eigassign.study.scene import Expansions
+from eigassign.study.scene import Expansions, Scene
 
 _log = logging.getLogger(__name__)
 
@@ -150,3 +153,56 @@ def _meta(plan: Plan) -> dict[str, str]:
         "q0": ", ".join(f"{value:.6g}" for value in plan.q0),
         "y0": ", ".join(f"{value:.6g}" for value in plan.y0),
     }
+
+
+Array = NDArray[Any]
+
+
+def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
+    """coefficients.json and coefficients.h5 of a scene's expansions.
+
+    Names are those of the Python face. For ``linearised`` and, unless ``linear_only``, ``full``:
+    ``indices`` (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
+    λ = Σ_γ λ_γ (x − x0)^γ in rad²/s², x = (q, y) in SI units; of modes that are expanded together
+    ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
+    """
+    expansions = scene.expansions
+    tables = {}
+    each = zip(expansions.linears.parts, expansions.fulls.parts, strict=True)
+    for k, (linear, full) in enumerate(each, 1):
+        where = f"_at_point_{k}" if k > 1 else ""
+        tables[f"linearised{where}"] = _table(linear)
+        if not linear_only:
+            tables[f"full{where}"] = _table(full)
+    names = [*scene.model.q_names, *scene.model.y_names]
+    point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
+    document = {
+        "case": {"title": scene.file.title, "sha256": scene.file.sha256},
+        "x_names": names,
+        **point,
+        **tables,
+    }
+    flat = {f"{part}_{name}": a for part, table in tables.items() for name, a in table.items()}
+    meta = {"case": scene.file.title, "sha256": scene.file.sha256, "x_names": ", ".join(names)}
+    return {
+        "coefficients.json": (dumps(document) + "\n").encode(),
+        "coefficients.h5": pack("coefficients", {**point, **flat}, meta),
+    }
+
+
+def _table(expansion: Expansion) -> dict[str, Array]:
+    """The arrays of an expansion, by the names of the Python face."""
+    modes = {
+        "modes": np.array(expansion.modes),
+        "order": np.array(expansion.order),
+        "q0": expansion.q0,
+        "y0": expansion.y0,
+    }
+    if all(len(cluster.modes) == 1 for cluster in expansion.clusters):
+        return {**modes, "indices": expansion.indices, "coefficients": expansion.coefficients}
+    series: dict[str, Array] = {}
+    for k, cluster in enumerate(expansion.clusters):
+        series[f"cluster_{k}_modes"] = np.array(cluster.modes)
+        series[f"cluster_{k}_coefficients"] = cluster.coefficients
+    local = {"local_indices": expansion.space.indices, "directions": expansion.directions}
+    return {**modes, **local, **series}
