@@ -18,7 +18,7 @@ from eigassign.errors import CaseError, EigassignError, Problem, StorageError, U
 from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_record import MARKER, read_record
 from eigassign.pipeline.run import Options, solve_case
-from eigassign.pipeline.run_files import new_run_folder
+from eigassign.pipeline.stages import new_run_folder
 from eigassign.process import failure_of
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.results import RunResults

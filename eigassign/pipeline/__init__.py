@@ -2,9 +2,8 @@
 
 Reading order:
 
-    stages      the stages of a run: announced as they begin, timed as they end
+    stages      the stages of a run, announced and timed; its folder, and the log in it
     expansions  both expansions of a plan, from the cache or computed; as files for other programs
-    run_files   the run folder, and the log in it
     run         the paper's flowchart: case, model, expansion, assignment, verification
     queries     check a case, draw it; its frequencies at one point
     urdf        a robot from URDF as the content of a case

@@ -34,7 +34,7 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.expansions import expansion_size
-from eigassign.pipeline.run_files import new_run_folder
+from eigassign.pipeline.stages import new_run_folder
 from eigassign.study.accuracy import digits_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines

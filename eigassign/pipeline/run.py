@@ -29,8 +29,7 @@ from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.pipeline.expansions import coefficient_files, expand_plan
-from eigassign.pipeline.run_files import new_run_folder
-from eigassign.pipeline.stages import Stages, silent
+from eigassign.pipeline.stages import Stages, new_run_folder, silent
 from eigassign.study.accuracy import study_accuracy, truncation_notes, weight_at
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results

@@ -1,4 +1,4 @@
-"""The stages of a run: announced as they begin, heard of while they last, timed as they end.
+"""The stages of a run, announced and timed; its folder, and the log in it.
 
 A stage that lasts says every few seconds how far it is, in a line of progress that begins with two
 spaces: how many of its pieces are done where they are counted, else for how long it has been going.
@@ -6,10 +6,24 @@ spaces: how many of its pieces are done where they are counted, else for how lon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter
+from types import MappingProxyType
+from typing import Any
+
+from eigassign._version import __version__
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import UsageError
+from eigassign.files import folder_name, printable
+from eigassign.output.reports import page as report
+from eigassign.output.store.run_folder import run_folder
+from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
 
 
 def silent(_line: str) -> None:
@@ -65,3 +79,106 @@ class Stages:
     def total_s(self) -> float:
         """Seconds since the first stage was to begin."""
         return perf_counter() - self._begun
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A run folder being filled; it appears at ``path`` when the run has succeeded."""
+
+    path: Path
+    hidden: Path
+
+    def write(
+        self,
+        results: RunResults,
+        formats: Sequence[str],
+        kind: str,
+        extra: Mapping[str, bytes] | None = None,
+    ) -> None:
+        """Results, report of this kind, figures in these formats; log; ``extra`` by name."""
+        report.write_run(results, self.hidden, formats, kind)
+        for name, data in {"log.txt": log_text(results).encode(), **(extra or {})}.items():
+            (self.hidden / name).write_bytes(data)
+
+
+@contextmanager
+def new_run_folder(
+    file: CaseFile,
+    out: Path | None,
+    force: bool,
+    suffix: str = "",
+    key: str | None = None,
+    outcome: Mapping[str, Any] = MappingProxyType({}),
+) -> Iterator[RunFolder]:
+    """Yield the folder to fill: ``out``, or results/<stem of the case file><suffix>.
+
+    It has the case already, as case.yaml. ``key`` (default: of the bytes of the case and of the
+    files it names) and ``outcome``, as it is at the end, stand in run.json.
+
+    Raises StorageError on entry already where the folder may not be replaced, UsageError where the
+    file has no stem.
+    """
+    if out is None and not file.path.stem.strip("."):
+        message = f"{file.path} has no name before its ending: say where the run goes, --out DIR"
+        raise UsageError(message)
+    usual = Path("results", folder_name(file.path.stem + suffix))
+    target = usual if out is None else Path(out)
+    if key is None:
+        said = json.dumps([__version__, file.sha256, dict(file.files)])
+        key = hashlib.sha256(said.encode()).hexdigest()
+    with run_folder(target, case_path=file.path, key=key, outcome=outcome, force=force) as hidden:
+        (hidden / "case.yaml").write_text(file.resolved(), encoding="utf-8")
+        yield RunFolder(target, hidden)
+
+
+def log_text(results: RunResults) -> str:
+    """Lines of what was run, chosen and warned of, and how long it took."""
+    lines = [
+        f"eigassign {results.version}",
+        f"case      {results.case_name}: {results.title}",
+        f"sha256    {results.case_sha256}",
+        *(f"sha256    {digest} {name}" for name, digest in results.case_files.items()),
+        *(f"note      {note}" for note in results.notes),
+        *(f"warning   {warning}" for warning in results.warnings),
+        *_outcome_lines(results),
+        *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
+    ]
+    return "".join(f"{printable(line)}\n" for line in lines)
+
+
+def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
+    for when in ("initial", "one_shot", "predicted", "exact"):
+        row = getattr(error, when)
+        if row is None:
+            continue
+        figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
+        yield f"distance  {when.replace('_', ' ')}{along}: {figures} from the target"
+
+
+def _outcome_lines(results: RunResults) -> Iterator[str]:
+    for row in results.design:
+        yield f"design    {row.name} = {row.optimal:.9g} {row.unit} (before: {row.initial:.9g})"
+    if results.error is not None:
+        yield from _distances(results.error, "")
+    for own in results.trajectories if len(results.trajectories) > 1 else ():
+        along = results.error_along(own.name)
+        yield from _distances(along, f" along {own.name!r}") if along is not None else ()
+    if results.assignment is not None:
+        yield from _assignment_lines(results.assignment)
+    found = results.assignment
+    if results.approximation_error is not None and found and found.method == "one_shot":
+        within = "within" if results.within_tolerance else "OVER"
+        error = f"{100 * results.approximation_error:.4g} %"
+        yield f"accuracy  predicted against exact: {error}, {within} {100 * results.tolerance:g} %"
+
+
+def _assignment_lines(row: AssignmentRow) -> Iterator[str]:
+    yield f"verdict   {row.verdict}: {row.reason}"
+    yield f"method    {row.method}, {row.objective}: {row.optimality.words}"
+    for k, step in enumerate(row.steps, 1):
+        design = ", ".join(f"{value:.9g}" for value in step.design)
+        kept = "taken" if step.taken else "given up"
+        yield (
+            f"step      {k}: objective {step.objective:.9g}, violation {step.violation:.3g}, "
+            f"region {step.radius:.3g}, {kept}, at ({design})"
+        )
