@@ -4,8 +4,7 @@ Reading order:
 
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
-    limits    the time of a case
-    work      what a worker does: check a variant, run it
+    work      what a worker does: check a variant, run it, within its time
     records   what of a batch is done; its lock, its summaries
     workers   where tasks run: this process, or processes that are gone when the parent is
     cluster   the workers of a dask.distributed scheduler
@@ -17,12 +16,11 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "limits": "OutOfTimeError limited",
         "plan": "Variant cases_in folder_names plan_of variant_problem",
         "records": "Batch",
         "runner": "run",
         "variants": "Variants variants_of",
-        "work": "CaseOptions outcome_of run_case",
+        "work": "CaseOptions OutOfTimeError limited outcome_of run_case",
         "workers": "Workers process_pool this_machine",
     },
 )
