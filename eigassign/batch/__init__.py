@@ -6,8 +6,7 @@ Reading order:
     plan      which cases, in which order; the name and the key of each
     work      what a worker does: check a variant, run it, within its time
     records   what of a batch is done; its lock, its summaries
-    workers   where tasks run: this process, or processes that are gone when the parent is
-    cluster   the workers of a dask.distributed scheduler
+    workers   where tasks run: this process, processes beside it, or the workers of a dask scheduler
     runner    all of it together: start there
 """
 

@@ -103,7 +103,7 @@ def _workers(scheduler: str | None, jobs: int | None) -> AbstractContextManager[
 
     if scheduler is None:
         return nullcontext(this_machine(jobs))
-    from eigassign.batch.cluster import cluster
+    from eigassign.batch.workers import cluster
 
     if jobs is not None:
         raise UsageError(
