@@ -7,8 +7,7 @@ Reading order:
     judgement    what a design does to the targets
     clearance    whether a band stays clear of modes all along a trajectory
     search       the design that meets the targets best, from several starts
-    aim          what an objective that is no error has come to
-    conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
+    conclusions  what may be said of an optimum, and what an objective that is no error has come to
     robust       the same for every deviation within tolerances
     answer       the answer by either method
     verdict      the word for it, its reason and shortcoming, of the facts alone

@@ -19,10 +19,9 @@ from eigassign.errors import LostModeError
 from eigassign.facts import capital
 from eigassign.study.checks.mesh import finer, model_errors, raised_by
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
-from eigassign.study.design.aim import aim_row
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
-from eigassign.study.design.conclusions import extreme, is_proved
+from eigassign.study.design.conclusions import aim_row, extreme, is_proved
 from eigassign.study.design.judgement import judged_modes
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found
