@@ -44,7 +44,7 @@ from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, requir
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
-from eigassign.study.pictures.moving import motions
+from eigassign.study.pictures.drawing import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import Motion, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene

@@ -2,6 +2,5 @@
 
 Reading order:
 
-    drawing  the mechanism as lines and symbols: in poses, and in its modes
-    moving   one mode along the trajectory, for a picture that moves
+    drawing  the mechanism as lines and symbols: in poses, in its modes, one mode along the trajectory
 """
