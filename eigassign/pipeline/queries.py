@@ -40,7 +40,7 @@ from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
-from eigassign.study.meaning.levers import anatomies
+from eigassign.study.meaning.sensitivity import anatomies
 from eigassign.study.pictures import drawing
 from eigassign.study.planning import Plan, expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import ModeAnatomy, WeightRow

@@ -43,7 +43,7 @@ __all__, __getattr__, __dir__ = face(
         "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
         "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
-        "meaning.levers": "anatomies",
+        "meaning.sensitivity": "anatomies",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",

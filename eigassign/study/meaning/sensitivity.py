@@ -1,13 +1,17 @@
-"""What an answer hangs on: slopes of the targeted frequencies, and what its limits cost.
+"""Slopes of the targeted frequencies, and where a missed mode has its energy.
 
 Both are read off the exact slopes that the answer was judged by; nothing is solved. A limit with
 multiplier μ = −dF/db, relaxed by δ, lowers F to F − μδ to first order; F is the mean square of the
 relative errors, or the largest of them, so that the rms error falls from √F to √(F − μδ).
+
+All properties that the mechanism is made of and that are not 0 become parameters of a model of
+their own, whose exact slopes say by how many per cent a frequency rises for a per cent more of
+each, the coordinates as they are. Those of the design have slopes already.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +20,19 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, 
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
+from eigassign.errors import EigassignError
+from eigassign.modal.exact.solver import modes
+from eigassign.modal.model import Model
+from eigassign.study.build import build_model
 from eigassign.study.design.search.variants import PosedProblem
-from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
+from eigassign.study.results import (
+    ActiveRow,
+    EffectRow,
+    ModeAnatomy,
+    PartRow,
+    RelaxedRow,
+    SensitivityRow,
+)
 
 Floats = NDArray[np.float64]
 STEP = 0.04  # of the range of a bound, or of a limit: how far it is relaxed, to one digit
@@ -121,3 +136,59 @@ def _room(variant: PosedProblem, row: ActiveRow, amount: float, unit: str) -> st
     more = "more" if row.side == "upper" else "less"
     named = f"{'bound' if row.kind == 'bound' else 'limit'} of {row.name}"
     return f"{handy(amount, unit)} {more} at the {row.side} {named}"
+
+
+Ints = NDArray[np.intp]
+FEW = 21  # samples of a trajectory that modes are looked at
+
+
+def anatomies(
+    model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]
+) -> Iterator[ModeAnatomy]:
+    """Yield each mode's energies and what properties do to it, at poses q (n, n_q) of a design y.
+
+    ``numbers`` (n,) are by the mode's name those that it has there, 0 where it does not matter.
+    Raises EigassignError where the model has no such modes.
+    """
+    count, x = max(int(own.max()) for own in numbers.values()), model.x(q, y)
+    found = modes(model.pencil, x, count)
+    strain, kinetic = model.energies.shares(model.pencil, x, found.lam, found.phi)
+    effects = dict(_effects(model, q, y, count))
+    for name, own in numbers.items():
+        there = np.flatnonzero(own)
+
+        def row(values: Floats, k: Ints = there, mode: Ints = own) -> tuple[float, float]:
+            along = values[k, mode[k] - 1]
+            return float(along.mean()), float(along[np.abs(along).argmax()])
+
+        none = np.zeros_like(found.lam)
+        parts = tuple(
+            PartRow(name, key, *row(strain.get(key, none)), *row(kinetic.get(key, none)))
+            for key in dict.fromkeys((*strain, *kinetic))
+        )
+        rows = [EffectRow(name, path, *row(values)) for path, values in effects.items()]
+        # to six digits, so that round-off does not decide which of two alike stands first
+        rows.sort(key=lambda one: -float(f"{abs(one.percent_per_percent):.5e}"))
+        yield ModeAnatomy(name, parts, tuple(rows))
+
+
+def _effects(model: Model, q: Floats, y: Floats, count: int) -> Iterator[tuple[str, Floats]]:
+    """Yield (p/f) ∂f/∂p (n, count) of each property p that is no design parameter, by its path.
+
+    Without lengths, places and angles where loops cannot follow them.
+    """
+    case = model.poses.case
+    try:
+        every = case.with_design(y).with_every_property()
+        made = build_model(every)
+    except EigassignError:
+        every = case.with_design(y).with_every_property(places=False)
+        made = build_model(every)
+    p = np.array([every.value_at(path) for path in made.y_names])
+    x = made.x(q, p)
+    wanted = np.arange(x.shape[1]) >= made.pencil.n_joints
+    lam, slopes = made.slopes(q, p, count, wanted)
+    names = (*made.q_names, *made.y_names)
+    for k in np.flatnonzero(wanted):
+        if names[k] not in case.design_paths:
+            yield names[k], 0.5 * x[:, k, None] * slopes[:, :, k] / lam
