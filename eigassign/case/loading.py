@@ -23,8 +23,13 @@ from typing import Any
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import Source, read_mapping, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
-from eigassign.case.rules.files import NamedFile, named_files, not_allowed, unreadable
-from eigassign.case.rules.listed import with_listed_choices
+from eigassign.case.rules.files import (
+    NamedFile,
+    named_files,
+    not_allowed,
+    unreadable,
+    with_listed_choices,
+)
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
     bounds_hold_nothing_impossible,

@@ -7,8 +7,7 @@ In reading order, each importing only from those above it:
 
     lookups       what the names in the plain data stand for: nodes, joints, parameters
     properties    design parameters: the number that a path names, and its bounds
-    files         files that the case names: whether they may and can be read
-    listed        choices in a CSV file → choices as the case file would have them
+    files         files that the case names: whether they can be read; choices listed in one
     values        values whose unit another key decides → SI, before the schema sees them
     links         rules: links, materials, sections, and what stands on nodes
     joints        rules: joints between links, coordinates, loops
