@@ -43,7 +43,7 @@ __all__, __getattr__, __dir__ = face(
         "kinematics.loop_closure": "all_moving",
         "kinematics.parameters": "parameters",
         "kinematics.topology": "JointEdge",
-        "kinematics.travel_limits": "resting_pose",
+        "kinematics.limits": "resting_pose",
         "solids.mesh_file": "read_mesh",
         "solids.part": "solid_part",
         "solids.surfaces": "Coupling joined",

@@ -29,8 +29,8 @@ from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.mechanism.drives import DriveForces, drive_forces
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.limits import Label
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
-from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing

@@ -26,8 +26,8 @@ from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.free_part import part_lines
+from eigassign.mechanism.kinematics.limits import resting_pose
 from eigassign.mechanism.kinematics.parameters import written_loads
-from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.output.figures.graph import FigurePlan

@@ -23,8 +23,8 @@ from eigassign.mechanism.assembly.build import (
     with_elements,
     with_reduction,
 )
+from eigassign.mechanism.kinematics.limits import resting_pose
 from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
-from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error

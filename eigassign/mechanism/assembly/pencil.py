@@ -21,8 +21,7 @@ from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
 if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and case
-    from eigassign.mechanism.kinematics.property_limits import PropertyLimits
-    from eigassign.mechanism.kinematics.travel_limits import Rails
+    from eigassign.mechanism.kinematics.limits import PropertyLimits, Rails
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -2,14 +2,13 @@
 
 Read in this order; each imports only from those above it:
 
-    rotations        rotation matrices and rigid transformations
-    joints           rotation, translation and motion subspace A of each type of joint
-    topology         spanning tree of links, loop-closing joints, freedoms
-    coordinates      the case's q against joint coordinates: s = A q + b
-    parameters       numbers of the mechanism, lengths and node positions; design parameters
-    forward          twists of the links, from the ground to the tips
-    loop_closure     passive freedoms p(q, y) and their rates P q̇; the assembly branch
-    travel_limits    how far carriages and nuts may travel on their beams
-    property_limits  what the properties that vary may be: no negative mass
-    link_frames      world frames of the links: for drawing and for inverse kinematics
+    rotations     rotation matrices and rigid transformations
+    joints        rotation, translation and motion subspace A of each type of joint
+    topology      spanning tree of links, loop-closing joints, freedoms
+    coordinates   the case's q against joint coordinates: s = A q + b
+    parameters    numbers of the mechanism, lengths and node positions; design parameters
+    forward       twists of the links, from the ground to the tips
+    loop_closure  passive freedoms p(q, y) and their rates P q̇; the assembly branch
+    limits        how far riders may travel on their beams, and what properties that vary may be
+    link_frames   world frames of the links: for drawing and for inverse kinematics
 """
