@@ -9,8 +9,7 @@ Read in this order; each imports only from those above it:
     bodies         rigid links, point masses and rigid bodies at nodes
     sparse_factor  factors of symmetric definite sparse matrices, and their largest modes
     craig_bampton  fixed-interface modes instead of a link's interior dofs
-    superelement   links from another finite-element program
-    solid          links from the mesh of a solid part
+    superelement   links from another finite-element program, or from the mesh of a solid part
     free_part      mass, inertia and free-free frequencies of a part, in words
     links          the mesh of any link: beam, frame, rigid, superelement or solid
 """

@@ -15,11 +15,11 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.elements.craig_bampton import DENSE, coefficients
 from eigassign.mechanism.elements.mesh import LinkMesh, total
-from eigassign.mechanism.elements.solid import solid_mesh
 from eigassign.mechanism.elements.sparse_factor import kept_factor, largest_modes
 from eigassign.mechanism.elements.superelement import (
     STRAIN_FREE,
     rigid_strain,
+    solid_mesh,
     superelement_mesh,
 )
 from eigassign.mechanism.imports.parts import imported_part

@@ -30,8 +30,7 @@ from eigassign.mechanism.elements.profiles import (
     beam_values,
     each_element,
 )
-from eigassign.mechanism.elements.solid import solid_mesh
-from eigassign.mechanism.elements.superelement import superelement_mesh
+from eigassign.mechanism.elements.superelement import solid_mesh, superelement_mesh
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology

@@ -1,7 +1,9 @@
-"""A link from another finite-element program: K, M and its interface nodes.
+"""Links from another finite-element program, or from the mesh of a solid part.
 
 The matrices are read from files and refused where they cannot be those of a part. The rigid motion
 of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that K N = 0.
+
+In a plane its nodes keep u_x, u_y and θ_z; u_z, θ_x and θ_y are held.
 """
 
 from __future__ import annotations
@@ -19,11 +21,20 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, chain_dofs, rigid_motion
+from eigassign.mechanism.elements.mesh import (
+    Entries,
+    LinkMesh,
+    Lost,
+    Term,
+    chain_dofs,
+    rigid_motion,
+)
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.imports.parts import UNITS, imported_part, matrix_keys
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import vector
+from eigassign.mechanism.kinematics.rotations import DOFS, vector
+from eigassign.mechanism.solids.part import solid_part
+from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
@@ -160,3 +171,44 @@ def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
             "whole, and of a stiffness or mass?",
         )
     return A
+
+
+def solid_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
+    """The mesh of a solid: its nodes' dofs first, node by node; then those of its mesh.
+
+    Raises MechanismError for a mesh that cannot be read, or does not fit its nodes.
+    """
+    link: Any = case.mechanism.links[name]
+    given: Any = case.mechanism.materials[link.material]
+    part, places = solid_part(link, float(given.poissons_ratio), f"mechanism.links.{name}")
+    space, count = case.mechanism.space, len(places)
+    kept = list(DOFS[space])
+    own = np.concatenate([6 * k + np.array(kept) for k in range(count)])
+    own = np.append(own, np.arange(6 * count, len(part.rigid)))
+    nodes = dict(zip(places, chain_dofs(count, space), strict=True))
+    E, rho = (
+        parameters.number(f"materials.{link.material}.{key}", getattr(given, key))
+        for key in ("youngs_modulus", "density")
+    )
+    bodies = Entries((len(own),) * 2)
+    add_bodies(case, parameters, name, bodies, nodes)
+
+    def gram(v: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return part.lacked.gram(part.motion[:, own] @ v)
+
+    return LinkMesh(
+        len(own),
+        nodes,
+        {key: vector(place.tolist()) for key, place in places.items()},
+        [_term(E, part.stiffness[own][:, own])],
+        [_term(rho, part.mass[own][:, own]), *bodies.terms()],
+        [Term(1.0, sparse.csr_array(part.rigid[own][:, kept]))],
+        lost=Lost(E, rho, gram, lambda: part.lacked.one_layer),
+    )
+
+
+def _term(coefficient: Scalar, matrix: sparse.csr_array) -> Term:
+    """coefficient × matrix, a number in the matrix."""
+    if isinstance(coefficient, Expression):
+        return Term(coefficient, sparse.csr_array(matrix))
+    return Term(1.0, sparse.csr_array(matrix * coefficient))
