@@ -23,7 +23,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "assembly.mode_shapes": "shapes",
         "assembly.pencil": "Pencil",
-        "assembly.rigid_loops": "require_consistent",
+        "assembly.node_motion": "require_consistent",
         "assembly.dynamics.under_load": "stiffness_under_load",
         "assembly.dynamics.velocity_terms": "velocity_terms",
         "drives": "DriveForces drive_forces",

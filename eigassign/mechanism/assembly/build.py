@@ -21,10 +21,9 @@ from eigassign.mechanism.assembly.affine_entries import (
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.loads.loaded import Loaded
 from eigassign.mechanism.assembly.loads.weight import add_weight
-from eigassign.mechanism.assembly.node_motion import NodeMotions
+from eigassign.mechanism.assembly.node_motion import NodeMotions, close_rigid_loops
 from eigassign.mechanism.assembly.pencil import Pencil, Weight
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
-from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh

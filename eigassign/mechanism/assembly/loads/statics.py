@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from eigassign.mechanism.assembly.loads.loaded import Loaded
-from eigassign.mechanism.assembly.rigid_loops import pivots
+from eigassign.mechanism.assembly.node_motion import pivots
 from eigassign.mechanism.assembly.springs import SpringMotion
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
