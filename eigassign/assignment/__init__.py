@@ -28,7 +28,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.optima": "Tally with_end",
         "exact.sequential": "End Optimum minimise",
         "exact.scenarios": "Tolerances with_scenarios",
-        "exact.stationarity": "first_order",
+        "exact.design_point": "first_order",
         "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",

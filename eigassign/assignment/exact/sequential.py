@@ -18,7 +18,7 @@ from time import monotonic
 
 import numpy as np
 
-from eigassign.assignment.exact.design_point import DesignPoint
+from eigassign.assignment.exact.design_point import BindingLimit, DesignPoint, first_order
 from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
@@ -28,7 +28,6 @@ from eigassign.assignment.exact.design_problem import (
     best_first,
     merit,
 )
-from eigassign.assignment.exact.stationarity import BindingLimit, first_order
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
 from eigassign.assignment.program import SNAP
 from eigassign.assignment.targets import Floats, frozen

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import choose
+from eigassign.assignment.exact.design_point import first_order
 from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
@@ -33,7 +34,6 @@ from eigassign.assignment.exact.design_problem import (
 )
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
-from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
 from eigassign.assignment.requirements.gap import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
