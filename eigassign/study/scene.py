@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.scenarios import Tolerances
+from eigassign.assignment.exact.requirements import Tolerances
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.sampling import design_limits

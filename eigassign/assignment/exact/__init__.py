@@ -7,7 +7,6 @@ Reading order:
     step            one program in a trust region, until it misses no rows
     sequential      the steps in a row, and the local optimum that they lead to
     optima          which ends of several searches are one optimum, and how many are not seen
-    scenarios       the same problem at designs that deviate
-    requirements    a set of requirements as such a problem
+    requirements    a set of requirements as such a problem, also at designs that deviate
     identification  parameters from measured frequencies, their covariance and intervals
 """

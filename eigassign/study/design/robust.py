@@ -2,7 +2,7 @@
 
 The optimum of the problem alone is the first. Of each thing that is asked the worst deviation is
 sought, from corners of the box of tolerances and from the design itself; where it is worse than all
-scenarios so far, it is one more (`assignment.exact.scenarios`), and the design is sought anew.
+scenarios so far, it is one more (`assignment.exact.requirements`), and the design is sought anew.
 A scenario less leaves more designs, so that each objective is a bound of that of the robust design,
 as far as a search finds optima. At last random deviations are solved, where least room is left.
 """

@@ -23,8 +23,7 @@ from eigassign.assignment.exact.design_problem import (
     Objective,
     best_first,
 )
-from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.exact.scenarios import Appraise, with_scenarios
+from eigassign.assignment.exact.requirements import Appraise, Requirements, with_scenarios
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import ForbiddenBand, Margin
