@@ -17,7 +17,7 @@ from eigassign.case.rules.lookups import (
     type_of,
 )
 from eigassign.case.schema.joints import RIDING
-from eigassign.case.schema.vectors import PLACE
+from eigassign.case.schema.parts import PLACE
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 _JOINTS = ("mechanism", "joints")

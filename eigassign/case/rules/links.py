@@ -15,7 +15,7 @@ from eigassign.case.rules.lookups import (
     trajectories,
 )
 from eigassign.case.schema.joints import RIDING
-from eigassign.case.schema.vectors import PLACE
+from eigassign.case.schema.parts import PLACE
 from eigassign.case.suggestions import listed, shown, unknown
 from eigassign.files import how_to_raise, raised
 

@@ -13,9 +13,8 @@ from eigassign.case.reader import KeyPath, Tree, at, entries, items, lacks, name
 from eigassign.case.schema.design import PRICE, RESERVED, column_names, is_entry
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import LINKS
-from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.parts import ANGLE, PLACE, Quantity
 from eigassign.case.schema.targets import TARGETS
-from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 from eigassign.case.units import QuantityError
 

@@ -23,6 +23,7 @@ from eigassign.case.schema.links import (
     Taper,
 )
 from eigassign.case.schema.mechanism import Body
+from eigassign.case.schema.parts import semidefinite, spread
 from eigassign.case.schema.sections import BareSection, CircleSection, Section, TubeSection
 from eigassign.case.schema.targets import (
     AtLeastTarget,
@@ -37,7 +38,6 @@ from eigassign.case.schema.trajectory import (
     TipTrajectory,
     named_trajectories,
 )
-from eigassign.case.schema.vectors import semidefinite, spread
 from eigassign.case.suggestions import listed
 from eigassign.case.units import TWO_TURNS
 

@@ -28,9 +28,8 @@ from eigassign.case.schema.design import Choices, Design
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Body, Spring
-from eigassign.case.schema.parts import Part, Quantity, quantity
+from eigassign.case.schema.parts import ANGLE, PLACE, Part, Quantity, quantity
 from eigassign.case.schema.sections import SHAPES, Material, Section
-from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import listed, suggestion, unknown
 from eigassign.case.units import QuantityError
 

@@ -17,7 +17,7 @@ from eigassign.case.rules.lookups import (
     trajectories,
 )
 from eigassign.case.schema.design import is_entry
-from eigassign.case.schema.vectors import ANGLE
+from eigassign.case.schema.parts import ANGLE
 from eigassign.case.suggestions import listed, unknown
 
 # --- Lists with one entry for each coordinate or design parameter

@@ -35,9 +35,8 @@ from eigassign.case.rules.properties import (
     properties,
 )
 from eigassign.case.schema.design import PRICE, is_entry
-from eigassign.case.schema.parts import Quantity, quantity
+from eigassign.case.schema.parts import ANGLE, PLACE, Quantity, quantity
 from eigassign.case.schema.targets import FREQUENCY
-from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import shown
 from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_rate
 

@@ -2,8 +2,7 @@
 
 In reading order, each importing only from those above it:
 
-    parts       the base of all models; field types: quantities, names, values of several kinds
-    vectors     points, directions, angles, inertia tensors
+    parts       quantities, names and vectors that the parts of a case file share
     sections    the keys `materials` and `sections` of a mechanism; the shapes of sections
     links       the key `links`
     joints      the key `joints`, and what each type of joint lets move

@@ -10,18 +10,22 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import ValidationInfo, model_validator
 
-from eigassign.case.schema.parts import KindBy, Part, kinds, must, wrong
-from eigassign.case.schema.vectors import (
+from eigassign.case.schema.parts import (
     IN_PLANE,
     IN_SPACE,
     PLACE,
     Angle,
     Direction,
+    KindBy,
     Orientation,
+    Part,
     Vector,
+    kinds,
+    must,
     only_in,
     parallel,
     space_of,
+    wrong,
 )
 from eigassign.case.suggestions import listed
 

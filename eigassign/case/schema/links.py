@@ -10,8 +10,11 @@ from typing import Annotated, Literal, Self, TypeAlias
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from eigassign.case.schema.parts import (
+    LENGTH,
+    Angle,
     File,
     FrozenDict,
+    Inertia,
     KindBy,
     Named,
     NumberOr,
@@ -19,12 +22,13 @@ from eigassign.case.schema.parts import (
     OneOrMoreNamed,
     Part,
     ValueOr,
+    Vector,
     kinds,
     needs_one_of,
+    only_in,
     quantity,
     wrong,
 )
-from eigassign.case.schema.vectors import LENGTH, Angle, Inertia, Vector, only_in
 
 Elements: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
 ReduceTo: TypeAlias = Annotated[

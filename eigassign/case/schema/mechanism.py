@@ -9,29 +9,27 @@ from pydantic import model_validator
 from eigassign.case.schema.joints import Joint
 from eigassign.case.schema.links import Link
 from eigassign.case.schema.parts import (
+    IN_PLANE,
+    IN_SPACE,
+    Angle,
     ByReference,
+    Components,
     FrozenDict,
+    Inertia,
     Named,
     OneOrList,
     OneOrMoreNamed,
     OrFile,
+    Orientation,
     Part,
     Quantity,
     ValueOr,
+    Vector,
+    only_in,
     quantity,
     wrong,
 )
 from eigassign.case.schema.sections import Material, Section
-from eigassign.case.schema.vectors import (
-    IN_PLANE,
-    IN_SPACE,
-    Angle,
-    Components,
-    Inertia,
-    Orientation,
-    Vector,
-    only_in,
-)
 from eigassign.case.units import DIMENSIONS
 
 _FAR = DIMENSIONS["angle"].largest  # rad, and m where the joint slides

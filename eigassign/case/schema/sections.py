@@ -13,8 +13,7 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import model_validator
 
-from eigassign.case.schema.parts import KindBy, Part, Quantity, kinds, quantity, wrong
-from eigassign.case.schema.vectors import LENGTH
+from eigassign.case.schema.parts import LENGTH, KindBy, Part, Quantity, kinds, quantity, wrong
 
 MODULUS = quantity("pressure or modulus", above=0)
 SECOND_MOMENT = quantity("second moment of area", above=0)

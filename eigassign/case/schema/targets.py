@@ -17,6 +17,7 @@ from eigassign.case.reader import KeyPath
 from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
     ByReference,
+    Direction,
     File,
     FrozenDict,
     NumberOr,
@@ -29,7 +30,6 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.trajectory import TIME, Coordinates, Times
-from eigassign.case.schema.vectors import Direction
 from eigassign.case.units import DIMENSIONS, SPEED, Dimension
 
 FREQUENCY = quantity("frequency", above=0)

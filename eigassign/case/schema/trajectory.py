@@ -15,18 +15,22 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from eigassign.case.reader import KeyPath
 from eigassign.case.schema.mechanism import QValue
 from eigassign.case.schema.parts import (
+    IN_PLANE,
+    IN_SPACE,
+    Angle,
     ByReference,
     File,
     FrozenDict,
     Name,
     OneOrList,
+    Orientation,
     Part,
     Quantity,
     ValueOr,
+    Vector,
     quantity,
     wrong,
 )
-from eigassign.case.schema.vectors import IN_PLANE, IN_SPACE, Angle, Orientation, Vector
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
