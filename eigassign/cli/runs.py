@@ -153,7 +153,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     the measurements cannot determine; updated.yaml is the case with the values found. Exit code 1
     if the measurements are not explained, or do not determine the parameters.
     """
-    from eigassign.pipeline import update as updating
+    from eigassign.pipeline import studies as updating
 
     with reporting(how) as reporter:
         done = updating.update(case, _options(how, reporter))
@@ -298,7 +298,7 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request
-    from eigassign.pipeline import chart as charting
+    from eigassign.pipeline import studies as charting
 
     accuracies = Request.accuracies if how["accuracy"] is None else (how["accuracy"],)
     request = Request(accuracies, how["budget_s"], how["evaluations"])

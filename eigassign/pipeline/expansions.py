@@ -6,11 +6,9 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import comb
-from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.errors import UsageError
@@ -153,9 +151,6 @@ def _meta(plan: Plan) -> dict[str, str]:
         "q0": ", ".join(f"{value:.6g}" for value in plan.q0),
         "y0": ", ".join(f"{value:.6g}" for value in plan.y0),
     }
-
-
-Array = NDArray[Any]
 
 
 def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:

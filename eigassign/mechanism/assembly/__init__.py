@@ -5,7 +5,7 @@ Read in this order; each imports only from those above it:
     pencil            K = Σ θ_j(q, y) K_j, M = Σ θ_j(q, y) M_j: what everything else evaluates
     affine_entries    where entries go, and with what function of (q, y)
     congruence        Bᵀ k B and Bᵀ m B of every link: where eq. (1) is formed
-    node_motion       Q: the elastic motion of every node from the independent unknowns u, rigid loops included
+    node_motion       Q: the elastic motion of every node, loops between rigid links included
     springs           springs between nodes
     rigid_body_modes  free motions that no spring or weight resists, made columns of their own
     loads             the stiffness that loads add in a pose, above all the weight

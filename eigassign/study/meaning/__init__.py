@@ -2,7 +2,7 @@
 
 Reading order:
 
-    sensitivity  slopes of the targeted frequencies, what limits cost, and where a missed mode has its energy
+    sensitivity  slopes of the targeted frequencies; where a missed mode has its energy
     reach        what each target can reach within the bounds, and which cannot be reached
     tolerance    what deviations of the parameters do to an answer
     overall      all of it, as far as the user asks for it

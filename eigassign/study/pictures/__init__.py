@@ -2,5 +2,5 @@
 
 Reading order:
 
-    drawing  the mechanism as lines and symbols: in poses, in its modes, one mode along the trajectory
+    drawing  the mechanism as lines and symbols: in poses, in its modes, and moving
 """
