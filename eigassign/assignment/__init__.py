@@ -20,8 +20,8 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "assign": "Assignment solve_assignment",
-        "catalogues.branching": "CatalogueProblem ListedValues Relaxed hull search_catalogue",
-        "catalogues.choosing": "choose solve_catalogue",
+        "catalogues.branching": "ListedValues",
+        "catalogues.choosing": "choose",
         "exact.design_problem": "Appraisal Cost DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Requirements Tolerances with_scenarios",

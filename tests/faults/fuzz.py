@@ -2,8 +2,8 @@
 
     python tests/faults/fuzz.py 20000 --optimize 500
 
-Half of them are shipped cases with changes, half are drawn by a grammar. Those that are optimised
-are right ones, with small limits of work. What leads to a fault is kept in a folder.
+They are shipped cases with changes. Those that are optimised are right ones, with small limits of
+work. What leads to a fault is kept in a folder.
 """
 
 from __future__ import annotations
@@ -17,21 +17,18 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from fuzz_grammar import many_cases
 from fuzz_mutations import Mutations
 from fuzz_worker import Outcome, Worker
 
 LIMITS = {"starts": "1", "steps": "2", "seconds": "1"}
 LIGHT = 0.3  # seconds of `check`: what takes longer is too large to optimise in a fuzzing run
-SHARE = 25  # cases by grammar at a time, then as many by mutation
 
 
 def texts(start: int, limits: dict[str, str] | None = None) -> Iterator[str]:
     """Case files without end, the same for the same ``start``."""
     mutations = Mutations(random.Random(start))
-    for k in range(10**9):
-        yield from (mutations.case(limits) for _ in range(SHARE))
-        yield from many_cases(SHARE, 1_000_000 * start + k)
+    while True:
+        yield mutations.case(limits)
 
 
 def checked(worker: Worker, start: int) -> Iterator[Outcome]:
