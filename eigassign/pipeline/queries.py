@@ -35,9 +35,10 @@ from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.expansions import expansion_size
 from eigassign.pipeline.stages import new_run_folder
-from eigassign.study.accuracy import digits_lines
 from eigassign.study.built_case import BuiltCase, load_case
+from eigassign.study.checks.accuracy import digits_lines
 from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.checks.weight import GIVEN, study_weight
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
 from eigassign.study.meaning.sensitivity import anatomies
@@ -45,7 +46,6 @@ from eigassign.study.pictures import drawing
 from eigassign.study.planning import Plan, expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import ModeAnatomy, WeightRow
 from eigassign.study.updating.measured import read_measurements
-from eigassign.study.weight import GIVEN, study_weight
 
 Floats = NDArray[np.float64]
 ALONE_MB = 150.0  # MB of a process, and for each unknown of a part before it is reduced: of 7 437

@@ -30,8 +30,8 @@ from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.pipeline.expansions import coefficient_files, expand_plan
 from eigassign.pipeline.stages import Stages, new_run_folder, silent
-from eigassign.study.accuracy import study_accuracy, truncation_notes, weight_at
 from eigassign.study.built_case import BuiltCase, load_case
+from eigassign.study.checks.accuracy import study_accuracy, truncation_notes, weight_at
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import (
     TRAJECTORY,

@@ -18,8 +18,8 @@ from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.reports.update import headline, update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options, prepare
 from eigassign.pipeline.stages import Stages, new_run_folder
-from eigassign.study.accuracy import truncation_notes
 from eigassign.study.built_case import BuiltCase, load_case
+from eigassign.study.checks.accuracy import truncation_notes
 from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 

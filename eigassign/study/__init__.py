@@ -10,8 +10,6 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
-    weight      what gravity changes that is not in the frequencies
-    accuracy    errors of mesh, reduction and round-off
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it

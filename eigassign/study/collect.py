@@ -13,7 +13,7 @@ from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.accuracy import Accuracy
+from eigassign.study.checks.accuracy import Accuracy
 from eigassign.study.checks.slow_motion import study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes

@@ -19,6 +19,7 @@ from eigassign.errors import LostModeError
 from eigassign.facts import capital
 from eigassign.study.checks.mesh import finer, model_errors, raised_by
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
+from eigassign.study.checks.weight import weight_doubt
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
 from eigassign.study.design.conclusions import aim_row, extreme, is_proved
@@ -42,7 +43,6 @@ from eigassign.study.results import (
     WeightRow,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.weight import weight_doubt
 
 Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off

@@ -30,12 +30,12 @@ from eigassign.case.units import handy_unit
 from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import in_hz
-from eigassign.study.accuracy import judged_poses
 from eigassign.study.built_case import BuiltCase
+from eigassign.study.checks.accuracy import judged_poses
+from eigassign.study.checks.weight import study_weight
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.search.variants import spread_designs
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
-from eigassign.study.weight import study_weight
 
 Floats = NDArray[np.float64]
 STARTS = 100  # at most

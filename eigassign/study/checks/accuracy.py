@@ -21,10 +21,10 @@ from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.checks.weight import WeightStudy, study_weight
 from eigassign.study.planning import poses_at
 from eigassign.study.results import MeshError
 from eigassign.study.scene import Scene
-from eigassign.study.weight import WeightStudy, study_weight
 
 Floats = NDArray[np.float64]
 POSES = 9  # at which the weight is judged; each costs an exact solve
