@@ -18,7 +18,6 @@ from eigassign.modal import (
     Expansion,
     Model,
     eigenvalues,
-    error_beside,
     expand_subspace,
     modes,
 )
@@ -248,10 +247,3 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
     for array in (a.coefficients, a.q0, a.clusters[0].vectors, a.clusters[0].coefficients):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
-
-
-def test_where_the_reduced_model_is_refused_the_error_is_infinite_without_a_word() -> None:
-    error = error_beside(
-        np.array([[190.0, 191.0]]), np.array([[190.0, 190.0]]), np.array([[np.inf, 0.0]])
-    )
-    np.testing.assert_allclose(error, [[np.inf, 1 / 190]])
