@@ -313,7 +313,9 @@ def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
     counts = expansions.full_order == expansions.order
     margin = MARGIN if where == BETWEEN else 1.0
     worst_taylor, worst_linearised = margin * values.worst_taylor, margin * values.worst_linearised
-    counted = [worst_linearised, *([worst_taylor] if counts else [])]
+    counted = [values.worst_linearised, *([values.worst_taylor] if counts else [])]
+    if where == BETWEEN and counts:  # so far out the linearised one is a guide of the one shot only
+        counted = [values.worst_taylor]
     return ValidationRow(
         case=scene.file.path.stem,
         mode=expansions.modes[k],

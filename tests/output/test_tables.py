@@ -54,7 +54,7 @@ def test_bands_say_how_many_modes_are_below_and_whether_that_is_checked() -> Non
     assert found is not None
     assert found.rows == (
         ("a band", "2", "1.30 %", "0.20 %", "checked"),
-        ("b", "0", "0 %", "not bounded", "NO"),
+        ("b", "0", "0 %", "not known", "NO"),
     )
 
 

@@ -30,7 +30,7 @@ def test_all_rows_of_the_shipped_case_are_within_its_two_percent() -> None:
     assert [row.where for row in validation.rows] == [
         "trajectory",
         "box of y at q0",
-        "box of q and y",
+        "between samples, all over the bounds",
     ]
     assert all(row.limit == 0.02 for row in validation.rows)
 
