@@ -128,8 +128,8 @@ class ValidationKeys(Part):
     Keys:
         max_error: how far an expansion may be from exact, relative in Hz
         q_span: half-width of the box of q about the expansion point that is sampled at random; one
-            for all coordinates, or one for each. The range of the joints' relative angles along the
-            trajectory unless given
+            for all coordinates, or one for each. All over the bounds, between the samples, unless
+            given
         samples: random points in that box
     """
 
