@@ -62,14 +62,12 @@ class DriveForces:
     ) -> tuple[Ints, Floats, Floats]:
         """Samples (m,) of the path, τ (m, n) at design y (n_y,), its slopes (m, n, n_y or 0).
 
-        Rates are differences of the samples; at a corner both sides count, and not the blow. A
-        sample alone between two corners is at rest. Instants between samples are left out.
+        At all samples and instants; at a corner both sides count, and not the blow.
         """
         samples, motions = [], []
         for part, rows in zip(path.parts, path.rows, strict=True):
             motion = rates_at(part.trajectory, y)
-            given = np.flatnonzero(~part.trajectory.inserted)
-            samples.append(rows.start + given[motion[0].samples])
+            samples.append(rows.start + motion[0].samples)
             motions.append([[m.q, m.rate, m.acceleration] for m in motion])
         here, by_design = (
             [np.concatenate(each) for each in zip(*own, strict=True)]
@@ -85,15 +83,11 @@ class DriveForces:
         return np.concatenate(samples), tau, by_y
 
     def curves(self, path: Trajectories, y: Floats) -> Floats:
-        """τ (n_t, n) at all samples: of a corner the larger side, at instants between linear."""
+        """τ (n_t, n) at all samples and instants: of a corner the larger side."""
         samples, tau, _ = self.along(path, y)
         out = np.zeros((len(path.time_s), tau.shape[1]))
         for k, row in zip(samples, tau, strict=True):
             out[k] = np.where(np.abs(row) > np.abs(out[k]), row, out[k])
-        for part, rows in zip(path.parts, path.rows, strict=True):
-            own, time_s, new = out[rows], part.trajectory.time_s, part.trajectory.inserted
-            for column in own.T:
-                column[new] = np.interp(time_s[new], time_s[~new], column[~new])
         return out
 
     def at(

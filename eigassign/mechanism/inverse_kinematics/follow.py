@@ -51,6 +51,7 @@ class Followed:
     notes: tuple[str, ...]
     problem: TipProblem
     u: Floats  # its states (n, n_q + n_p)
+    path: Trace  # what the states between the samples are found from
 
 
 def follow(
@@ -81,7 +82,7 @@ def follow(
             u0 = _own(ik, candidate[None])
             if _off(ik, course, u0, 10.0 * RESIDUAL)[0]:
                 continue
-            u = _along(ik, course, u0[0])
+            u, path = _along(ik, course, u0[0])
         except SingularityError:
             continue
         except TrajectoryError as error:
@@ -89,14 +90,23 @@ def follow(
             continue
         q = np.ascontiguousarray((u * ik.scale)[:, : ik.n_q])
         q.setflags(write=False)
-        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates), ik, u)
+        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates), ik, u, path)
     if not failures:
         raise other_assembly(ik, course)
     raise max(failures, key=lambda error: error.sample)
 
 
-def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
-    """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
+def at_parameters(followed: Followed, course: Course) -> Floats:
+    """States (n, n_z) at the parameters of a course along the path that was followed."""
+    ik, seeds = followed.problem, interpolated(followed.path, course.s)
+    return _own(ik, newton(ik, seeds, course.target(course.s), ROUND_OFF).u)
+
+
+def _along(ik: TipProblem, course: Course, u0: Floats) -> tuple[Floats, Trace]:
+    """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends.
+
+    With the trace that they are found from.
+    """
     for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
         path = trace(ik, course, u0, turn)
         n = int(np.searchsorted(course.s, path.s[-1], side="right"))
@@ -109,7 +119,7 @@ def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
     require_reached(ik, course, found.u[:n])
     if n < len(course.s):
         raise _blocked(ik, course, n, path)
-    return as_assembled(ik, course, found.u)
+    return as_assembled(ik, course, found.u), path
 
 
 def require_reached(ik: TipProblem, course: Course, u: Floats) -> None:

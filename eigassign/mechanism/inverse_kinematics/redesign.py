@@ -68,7 +68,7 @@ class PathOfDesign:
         """
         y = np.asarray(y, dtype=np.float64)
         try:
-            u = self.u if np.array_equal(y, self.design.y) else self._states(y)
+            u = self.u if np.array_equal(y, self.design.y) else self.states(y)
         except TrajectoryError as error:
             values = dict(zip(self.design.names, y.tolist(), strict=True))
             shown = {name: values[name] for name in self.moving}
@@ -103,11 +103,11 @@ class PathOfDesign:
         rows = np.linalg.svd(reduced(ik.evaluate(self.u), ik.n_q).J, full_matrices=False)[2]
         return np.asarray(np.swapaxes(rows[:, : ik.rank], 1, 2))
 
-    def _at(self, y: Floats) -> TipProblem:
+    def problem_at(self, y: Floats) -> TipProblem:
         """The problem at another design, in the measure of the first one."""
         return replace(self.problem, chain=self.design.chain(y))
 
-    def _states(self, y: Floats) -> Floats:
+    def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""
         y0, target = self.design.y, self.course.target(self.course.s)
         u, done, step = self.u, 0.0, 1.0
@@ -116,7 +116,7 @@ class PathOfDesign:
         sense = handedness(self.problem, seen, motion)
         while done < 1.0:
             ahead = min(1.0, done + step)
-            ik = self._at(y0 + ahead * (y - y0))
+            ik = self.problem_at(y0 + ahead * (y - y0))
             slopes = self._slopes(y0 + done * (y - y0), u)
             guess = u + (ahead - done) * (slopes @ (y - y0))
             found = newton(ik, guess, target, ROUND_OFF, self.directions)
@@ -132,7 +132,7 @@ class PathOfDesign:
 
     def _lost(self, y: Floats, u: Floats, strayed: Bools) -> TrajectoryError:
         """Why the first of the samples that ``strayed`` from u (n, n_z) cannot be had at y."""
-        k, ik = int(np.argmax(strayed)), self._at(y)
+        k, ik = int(np.argmax(strayed)), self.problem_at(y)
         target = self.course.target(self.course.s[[k]])
         tried, miss = levenberg(ik, np.vstack([u[k], ik.seeds]), target, 115)
         best = int(np.argmin(miss))

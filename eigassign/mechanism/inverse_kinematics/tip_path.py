@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,10 +42,12 @@ class TipPath:
         c0, c1, c2, c3 = self.coefficients
         return np.asarray(c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i])))
 
-    def derivative(self, s: ArrayLike) -> Floats:
-        """dp/ds in m, (n, d), from the right at a corner; UsageError outside [0, 1]."""
+    def derivative(self, s: ArrayLike, order: Literal[1, 2] = 1) -> Floats:
+        """dp/ds or d²p/ds² in m, (n, d), from the right at a corner; UsageError outside [0, 1]."""
         i, t = self._locate(s)
         _, c1, c2, c3 = self.coefficients
+        if order == 2:
+            return np.asarray(2.0 * c2[i] + t * 6.0 * c3[i])
         return np.asarray(c1[i] + t * (2.0 * c2[i] + t * 3.0 * c3[i]))
 
     def corners(self) -> Floats:
@@ -130,6 +133,7 @@ class Attitude:
     key: str  # of the case file: angle or orientation
     rotation: Callable[[Floats], Floats]  # s (n,) -> (n, 3, 3)
     rate: Callable[[Floats], Floats]  # s (n,) -> ω in the world, rad per unit of s, (n, 3)
+    push: Callable[[Floats], Floats]  # s (n,) -> dω/ds in the world, (n, 3)
     corners: Floats  # s at which the rate jumps
 
 
@@ -145,6 +149,7 @@ def planar_attitude(path: TipPath, angle: ArrayLike, kind: str) -> Attitude:
         "angle",
         lambda s: np.asarray(Rotation.from_rotvec(theta.point(s) * axis).as_matrix()),
         lambda s: theta.derivative(s) * axis,
+        lambda s: theta.derivative(s, 2) * axis,
         theta.corners(),
     )
 
@@ -170,20 +175,27 @@ def spatial_attitude(path: TipPath, orientation: ArrayLike, kind: str) -> Attitu
     if kind == "spline" and len(knots) > 2 and size.max() > 1e-9:
         spline = RotationSpline(knots, R)
 
-        def spin(s: Floats) -> Floats:
-            turned = spline(np.atleast_1d(s))  # the rate is in the axes of the turned link
-            return np.asarray(turned.apply(spline(np.atleast_1d(s), 1)))
+        def spin(s: Floats, order: Literal[1, 2]) -> Floats:
+            turned = spline(np.atleast_1d(s))  # rates are in the axes of the turned link
+            return np.asarray(turned.apply(spline(np.atleast_1d(s), order)))
 
-        return Attitude("orientation", lambda s: _matrices(spline, s), spin, np.zeros(0))
+        rate, push = partial(spin, order=1), partial(spin, order=2)
+        return Attitude("orientation", lambda s: _matrices(spline, s), rate, push, np.zeros(0))
     slerp, rates = Slerp(knots, R), steps / np.diff(knots)[:, None]  # R(s) = exp(ω_i (s − s_i)) R_i
     jumps = np.abs(np.diff(rates, axis=0)).max(axis=1)
     sharp = jumps > _SMOOTH * max(float(np.abs(rates).max()), 1.0)
 
-    def rate(s: Floats) -> Floats:
+    def steady(s: Floats) -> Floats:
         piece = np.searchsorted(knots, np.atleast_1d(s), side="right") - 1
         return np.asarray(rates[np.clip(piece, 0, len(rates) - 1)])
 
-    return Attitude("orientation", lambda s: _matrices(slerp, s), rate, knots[1:-1][sharp])
+    return Attitude(
+        "orientation",
+        lambda s: _matrices(slerp, s),
+        steady,
+        lambda s: np.zeros((len(np.atleast_1d(s)), 3)),
+        knots[1:-1][sharp],
+    )
 
 
 def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
@@ -216,11 +228,16 @@ class Course:
         rotation = None if self.attitude is None else self.attitude.rotation(np.atleast_1d(s))
         return TipTarget(self.path.point(s), rotation)
 
-    def rates(self, s: float) -> tuple[Floats, Floats]:
-        """dp/ds (1, d) in m and ω (1, 3) in rad, per unit of s, from the right at a corner."""
-        at = np.array([s])
-        spin = np.zeros((1, 3)) if self.attitude is None else self.attitude.rate(at)
-        return self.path.derivative(at), spin
+    def rates(self, s: ArrayLike, order: Literal[1, 2] = 1) -> tuple[Floats, Floats]:
+        """dp/ds (n, d) in m and ω (n, 3) in rad, per unit of s, from the right at a corner.
+
+        Of ``order`` 2 their derivatives d²p/ds² and dω/ds.
+        """
+        at = np.atleast_1d(np.asarray(s, dtype=np.float64))
+        if self.attitude is None:
+            return self.path.derivative(at, order), np.zeros((len(at), 3))
+        turning = self.attitude.rate if order == 1 else self.attitude.push
+        return self.path.derivative(at, order), turning(at)
 
     def corners(self) -> Floats:
         """Parameters inside (0, 1) at which either rate jumps."""

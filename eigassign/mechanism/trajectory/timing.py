@@ -108,18 +108,3 @@ def shared_times(points: Floats, duration: float) -> Floats:
     reached = np.asarray(np.concatenate([[0.0], np.cumsum(share)]) * (duration / share.sum()))
     reached[-1] = duration
     return reached
-
-
-def point_to_point(
-    points: Floats, reached_s: Floats, law: TimingLaw, n: int
-) -> tuple[Floats, Floats]:
-    """q(t) = q_k + s((t − t_k)/(t_{k+1} − t_k)) (q_{k+1} − q_k) at n equal steps of time.
-
-    Returns the times (n,) and q (n, n_q).
-    """
-    time_s = np.linspace(reached_s[0], reached_s[-1], n)
-    k = np.clip(np.searchsorted(reached_s, time_s, side="right") - 1, 0, len(points) - 2)
-    tau = (time_s - reached_s[k]) / (reached_s[k + 1] - reached_s[k])
-    s = law.position(np.clip(tau, 0.0, 1.0))[:, None]
-    # this form gives both ends exactly
-    return time_s, (1.0 - s) * points[k] + s * points[k + 1]

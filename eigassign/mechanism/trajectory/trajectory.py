@@ -3,8 +3,8 @@
 Several trajectories may be studied together. Their samples are stacked, but nothing is
 differentiated, integrated or drawn from the end of one into the start of the next.
 
-Rates q̇ and q̈ are differences within smooth parts. Where the velocity jumps (straight tip paths,
-points joined by linear timing) there is a blow and no acceleration.
+q, q̇ and q̈ are known at any time (`motion`). Where the velocity jumps (straight tip paths, points
+joined by linear timing) there is a blow and no acceleration.
 
 Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
 """
@@ -16,11 +16,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import KroghInterpolator
 
 from eigassign.brief import Brief, cut
 from eigassign.case.schema.trajectory import (
@@ -42,14 +41,21 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
     straight,
 )
 from eigassign.mechanism.trajectory.csv import read_samples
-from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
+from eigassign.mechanism.trajectory.motion import (
+    BESIDE,
+    Loaded,
+    Motion,
+    OfDesign,
+    PointMotion,
+    SampledMotion,
+    TipMotion,
+)
+from eigassign.mechanism.trajectory.timing import shared_times, timing_law
 
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Change = Callable[[Floats], Floats]
-OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 
 
 @dataclass(frozen=True, repr=False)
@@ -67,6 +73,7 @@ class Trajectory(Brief):
     corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
     of_design: OfDesign | None = None  # how q follows y; None where it does not
     sampled: Trajectory | None = None
+    known: Motion | None = None  # None where it is known at its samples only
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.q, self.tip):
@@ -79,34 +86,18 @@ class Trajectory(Brief):
             return self.q, np.zeros((*self.q.shape, len(y)))
         return self.of_design(y)
 
+    @cached_property
+    def motion(self) -> Motion:
+        """q, q̇ and q̈ at any time: as it is known, else the spline through the samples."""
+        return self.known or SampledMotion(self.time_s, self.q, self.corners_s)
+
     def joined(self, loads: Floats) -> Trajectory:
         """The same with ``loads`` (n_loads,), which neither time nor design change, behind q."""
-
-        def behind(values: Floats, own: Floats) -> Floats:
-            shape = (len(values), len(loads), *values.shape[2:])
-            return np.concatenate([values, np.broadcast_to(own, shape)], axis=1)
-
-        return self._moving(lambda q: behind(q, loads), lambda slopes: behind(slopes, np.zeros(1)))
+        return self._at_times(self.time_s, Loaded(self.motion, loads))
 
     def chosen(self, samples: Ints) -> Trajectory:
         """Some of the samples only, given by ascending numbers."""
-
-        def some(values: Floats) -> Floats:
-            return values[samples]
-
-        tip = None if self.tip is None else some(self.tip)
-        kept = replace(self, time_s=self.time_s[samples], tip=tip, sampled=None)
-        return kept._moving(some, some)
-
-    def _moving(self, of_q: Change, of_slopes: Change) -> Trajectory:
-        """The same with other coordinates and slopes, made of these for every design."""
-        whole = self.of_design
-
-        def own(y: Floats) -> tuple[Floats, Floats]:
-            q, slopes = self.at(y)
-            return of_q(q), of_slopes(slopes)
-
-        return replace(self, q=of_q(self.q), of_design=None if whole is None else own)
+        return replace(self._at_times(self.time_s[samples], self.motion), sampled=None)
 
     @property
     def given(self) -> Trajectory:
@@ -119,20 +110,21 @@ class Trajectory(Brief):
         return ~np.isin(self.time_s, self.given.time_s)
 
     def with_instants(self, times_s: ArrayLike) -> Trajectory:
-        """The same with instants between its samples, where q is linear in time for any design."""
+        """The same with instants between its samples."""
         time_s = np.union1d(self.time_s, times_s)
         if len(time_s) == len(self.time_s):
             return self
-        after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
-        first, last = self.time_s[after - 1], self.time_s[after]
-        share = (time_s - first) / (last - first)  # 0 or 1 at a sample, and its values to the bit
+        return replace(self._at_times(time_s, self.motion), sampled=self.given)
 
-        def between(values: Floats) -> Floats:
-            s = share.reshape(-1, *(1 for _ in values.shape[1:]))
-            return np.asarray((1.0 - s) * values[after - 1] + s * values[after])
-
-        tip = None if self.tip is None else between(self.tip)
-        return replace(self, time_s=time_s, tip=tip, sampled=self.given)._moving(between, between)
+    def _at_times(self, time_s: Floats, motion: Motion) -> Trajectory:
+        """The motion at these times; where they are known q and the tip stay as they are."""
+        q = motion.moving(time_s).q
+        known, at = np.isin(time_s, self.time_s), np.searchsorted(self.time_s, time_s)
+        n_q = self.q.shape[1]
+        q[known, :n_q] = self.q[at[known]]
+        tip = None if self.tip is None else motion.tip(time_s)
+        of_design = motion.of_design(time_s)
+        return replace(self, time_s=time_s, q=q, tip=tip, of_design=of_design, known=motion)
 
 
 def build_trajectory(
@@ -172,7 +164,8 @@ def _from_tip_path(
         attitude = spatial_attitude(path, spec.orientation, spec.path)
     chain = tip_chain(spec.tip, attitude is not None)
     tau = np.linspace(0.0, 1.0, spec.samples)
-    s = timing_law(spec.timing, spec.acceleration_share).position(tau)
+    law = timing_law(spec.timing, spec.acceleration_share)
+    s = law.position(tau)
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
     course = Course(path, s, spec.duration * tau, attitude)
     followed = follow(chain, course, spec.branch, spec.start)
@@ -182,7 +175,13 @@ def _from_tip_path(
         of_design = path_of_design(followed, course)
         notes = (*notes, f"{of_design.said}; q is written for the initial design")
     return Trajectory(
-        course.time_s, followed.q, followed.tip, notes, tuple(corners.tolist()), of_design
+        course.time_s,
+        followed.q,
+        followed.tip,
+        notes,
+        tuple(corners.tolist()),
+        of_design,
+        known=TipMotion(followed, course, law, of_design is not None),
     )
 
 
@@ -219,10 +218,11 @@ def _from_points(spec: PointTrajectory) -> Trajectory:
         )
     else:
         reached, said = np.array(spec.times, dtype=np.float64), ()
-    law = timing_law(spec.timing, spec.acceleration_share)
-    time_s, q = point_to_point(points, reached, law, spec.samples)
+    motion = PointMotion(points, reached, timing_law(spec.timing, spec.acceleration_share))
+    time_s = np.linspace(reached[0], reached[-1], spec.samples)
     corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
-    return Trajectory(time_s, q, None, said if len(points) > 2 else (), corners)
+    said = said if len(points) > 2 else ()
+    return Trajectory(time_s, motion.moving(time_s).q, None, said, corners, known=motion)
 
 
 def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
@@ -447,60 +447,41 @@ class Rates:
     acceleration: Floats
 
 
-AT_ENDS = 6  # samples through which a polynomial is exact for every timing law
+def rates(trajectory: Trajectory, y: Floats | None = None) -> Rates:
+    """q, q̇ and q̈ at every sample and instant, at design y (n_y,), the initial one if None.
 
-
-def rates(trajectory: Trajectory, everywhere: bool = False) -> Rates:
-    """Rates by differences within each smooth part; of a part with one sample nothing is known.
-
-    Samples of such parts alone are left out, or stand still where ``everywhere`` is asked for.
-    Instants between samples have no part in them: there q is linear, and its corners are none.
+    Where q̇ or q̈ jumps they are taken `BESIDE` the jump, before and behind it.
     """
-    trajectory = trajectory.given
-    parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
-    samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
-    q, time_s = trajectory.q, trajectory.time_s
-    alone = np.setdiff1d(np.arange(len(q) * everywhere), samples)
-    first: list[Floats] = [np.zeros((0, q.shape[1]))]
-    second = first[:]
-    for part in parts:  # of two samples their difference, and no acceleration
-        order: Literal[1, 2] = 2 if len(part) > 2 else 1
-        rate = np.gradient(q[part], time_s[part], axis=0, edge_order=order)
-        push = np.gradient(rate, time_s[part], axis=0, edge_order=order)
-        if len(part) >= AT_ENDS:  # differences to one side err most where a motion sets off
-            for some, at in ((part[:AT_ENDS], [0, 1]), (part[-AT_ENDS:], [-2, -1])):
-                near = KroghInterpolator(time_s[some], q[some])
-                rate[at] = near.derivative(time_s[part[at]], 1)
-                push[at] = near.derivative(time_s[part[at]], 2)
-        first.append(rate)
-        second.append(push)
-    still, samples = np.zeros((len(alone), q.shape[1])), np.append(samples, alone)
-    rate, acceleration = np.concatenate([*first, still]), np.concatenate([*second, still])
-    resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
-    rate[:, resting] = acceleration[:, resting] = 0.0
-    # what q rounded to 1e-16 leaves of second differences where the velocity does not change
-    step = np.diff(time_s).min(initial=np.inf)
-    rounded = 1e-15 * np.abs(q).max(axis=0) / step**2
-    acceleration[np.abs(acceleration) <= rounded] = 0.0
-    return Rates(samples, q[samples], rate, acceleration)
+    time_s, motion = trajectory.time_s, trajectory.motion
+    beside, n = BESIDE * float(np.ptp(time_s)), len(time_s)
+    apart = np.abs(time_s[:, None] - motion.breaks_s).min(axis=1, initial=np.inf)
+    inside = (time_s > time_s[0]) & (time_s < time_s[-1])
+    sides = 1 + ((apart <= beside) & inside)
+    samples = np.repeat(np.arange(n), sides)
+    first = np.append(True, np.diff(samples) > 0)
+    aside = np.where(first, -2.0, 2.0) * (sides[samples] - 1) * beside
+    q, rate, push = motion.moving(time_s[samples] + aside, y)
+    if y is None:
+        q = trajectory.q[samples]
+    return Rates(samples, q, rate, push)
 
 
 def rates_at(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
-    """Rates everywhere at design y (n_y,), and the slopes of q, q̇ and q̈, each (m, n_q, n_y)."""
-    own = trajectory.given
-    q, slopes = own.at(y)
-    found, flat = (
-        rates(replace(own, q=each), everywhere=True) for each in (q, slopes.reshape(len(q), -1))
-    )
-    shape = (len(found.samples), *slopes.shape[1:])
-    by_design = (each.reshape(shape) for each in (flat.q, flat.rate, flat.acceleration))
-    return found, Rates(found.samples, *by_design)
+    """`rates` at design y (n_y,), and the slopes of q, q̇ and q̈ in y, each (m, n_q, n_y).
+
+    Those along paths that follow the design are central differences, of steps that move q by 1e-4.
+    """
+    found = rates(trajectory, None if trajectory.of_design is None else y)
+    slopes = np.zeros((3, *found.q.shape, len(y)))
+    if trajectory.of_design is not None:
+        by_design = np.abs(trajectory.at(y)[1]).max(axis=(0, 1))
+        for j in np.flatnonzero(by_design):
+            step = np.eye(len(y))[j] * 1e-4 / by_design[j]
+            ahead, behind = rates(trajectory, y + step), rates(trajectory, y - step)
+            pairs = zip(_values(ahead), _values(behind), strict=True)
+            slopes[..., j] = [(a - b) / (2.0 * step[j]) for a, b in pairs]
+    return found, Rates(found.samples, *slopes)
 
 
-def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
-    """The samples from each corner to the next."""
-    time_s = trajectory.time_s
-    # a sample within 1e-9 of the duration of a corner is on it, and ends both parts
-    near = 1e-9 * float(np.ptp(time_s))
-    cuts = [time_s[0], *trajectory.corners_s, time_s[-1]]
-    return [np.flatnonzero((time_s >= a - near) & (time_s <= b + near)) for a, b in pairwise(cuts)]
+def _values(found: Rates) -> tuple[Floats, Floats, Floats]:
+    return found.q, found.rate, found.acceleration

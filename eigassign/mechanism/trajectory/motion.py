@@ -1,0 +1,280 @@
+"""q, q̇ and q̈ at any time of a trajectory, exactly.
+
+    points           q = q_k + s(τ) Δq,           q̇ = s'(τ) Δq/T,   q̈ = s''(τ) Δq/T²
+    sampled          the not-a-knot cubic spline through the samples, from corner to corner
+    path of a tip    u̇ = W(u) ṗ,   ü = (∂W/∂u · u̇) ṗ + W(u) p̈,   p(t) = path(s(t/T))
+
+u holds the coordinates and the passive freedoms of loops, p the position and the turning of the
+tip; W(u) = J⁺ closes the loops and takes the least motion where there is a choice. ∂W/∂u · u̇ is
+its derivative along u̇, by differences of fourth order in u, in which W is analytic.
+
+Shapes: n times, n_q coordinates, n_z entries of a state u. SI units, angles in rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.inverse_kinematics.chain import reduced
+from eigassign.mechanism.inverse_kinematics.follow import Followed, at_parameters
+from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign
+from eigassign.mechanism.inverse_kinematics.solver import least_norm
+from eigassign.mechanism.inverse_kinematics.state import TipProblem
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, smooth
+from eigassign.mechanism.trajectory.timing import TimingLaw
+
+Floats = NDArray[np.float64]
+OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
+BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
+_STEP = 1e-3  # of u: differences of fourth order err by its fourth power, round-off is 1e-13
+
+
+class Moving(NamedTuple):
+    """q, q̇ and q̈, (n, n_q) each."""
+
+    q: Floats
+    rate: Floats
+    acceleration: Floats
+
+
+class Motion:
+    """q(t) of given coordinates, the same for every design; `TipMotion` and `Loaded` differ."""
+
+    @property
+    def breaks_s(self) -> Floats:
+        """Times inside it at which q̇ or q̈ jumps, (k,) ascending."""
+        raise NotImplementedError
+
+    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+        """At times (n,) within the motion and a design y (n_y,), the initial one if None."""
+        raise NotImplementedError
+
+    def tip(self, _time_s: Floats) -> Floats | None:
+        """Where the tip is at the initial design, (n, 2 or 3) in m; None without its path."""
+        return None
+
+    def of_design(self, _time_s: Floats) -> OfDesign | None:
+        """How q at times (n,) follows the design; None where it does not."""
+        return None
+
+
+# --- points, and samples
+
+
+@dataclass(frozen=True, eq=False)
+class PointMotion(Motion):
+    """From point to point (m, n_q), reached at these times, each move by the same timing law."""
+
+    points: Floats
+    reached_s: Floats
+    law: TimingLaw
+
+    @property
+    def breaks_s(self) -> Floats:
+        """Where the law's own pieces meet, and the points between."""
+        ends = np.array([0.0, *self.law.ends])
+        times = self.reached_s[:-1, None] + np.diff(self.reached_s)[:, None] * ends
+        return np.asarray(times.ravel()[1:])
+
+    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+        """q, q̇ and q̈ at times (n,), the same for every design."""
+        k = np.searchsorted(self.reached_s, time_s, side="right") - 1
+        k = np.clip(k, 0, len(self.points) - 2)
+        took = np.diff(self.reached_s)[k]
+        tau = np.clip((time_s - self.reached_s[k]) / took, 0.0, 1.0)
+        way = (self.points[k + 1] - self.points[k]) / took[:, None]
+        s, rate, push = (
+            each[:, None]
+            for each in (self.law.position(tau), self.law.velocity(tau), self.law.acceleration(tau))
+        )
+        # this form gives both ends exactly
+        q = (1.0 - s) * self.points[k] + s * self.points[k + 1]
+        return Moving(q, rate * way, push * way / took[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class SampledMotion(Motion):
+    """The cubic spline through samples q (n, n_q), one for each part between known corners."""
+
+    time_s: Floats
+    q: Floats
+    corners_s: tuple[float, ...] = ()
+
+    @property
+    def breaks_s(self) -> Floats:
+        """The corners."""
+        return np.array(self.corners_s)
+
+    @cached_property
+    def parts(self) -> list[tuple[float, float, TipPath]]:
+        """From when to when, and the spline over its share of that."""
+        cuts = [self.time_s[0], *self.corners_s, self.time_s[-1]]
+        near, found = BESIDE * float(np.ptp(self.time_s)), []
+        for start, end in pairwise(cuts):
+            own = (self.time_s >= start - near) & (self.time_s <= end + near)
+            if own.sum() > 1:
+                times = self.time_s[own]
+                share = (times - times[0]) / (times[-1] - times[0])
+                found.append((float(times[0]), float(times[-1]), smooth(share, self.q[own])))
+        return found
+
+    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+        """q, q̇ and q̈ at times (n,), the same for every design; a lone sample is at rest."""
+        shape = len(time_s), self.q.shape[1]
+        q, rate, push = np.broadcast_to(self.q[0], shape).copy(), np.zeros(shape), np.zeros(shape)
+        starts = [start for start, _, _ in self.parts]
+        for k, (start, end, spline) in enumerate(self.parts):
+            last = np.inf if k + 1 == len(starts) else starts[k + 1]
+            own = (time_s < last) & ((time_s >= start) | (k == 0))
+            took = end - start
+            share = np.clip((time_s[own] - start) / took, 0.0, 1.0)
+            q[own], rate[own] = spline.point(share), spline.derivative(share) / took
+            push[own] = spline.derivative(share, 2) / took**2
+        # what q rounded to 1e-16 leaves of second differences where the velocity does not change
+        step = np.diff(self.time_s).min(initial=np.inf)
+        push[np.abs(push) <= 4e-15 * np.abs(self.q).max(axis=0) / step**2] = 0.0
+        return Moving(q, rate, push)
+
+
+# --- along a path of the tip
+
+
+@dataclass(frozen=True, eq=False)
+class TipMotion(Motion):
+    """The motion of a tip along its path, as it was followed, by a timing law over its duration."""
+
+    followed: Followed
+    course: Course  # with the samples of the trajectory
+    law: TimingLaw
+    follows_design: bool
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample, at 0 s, to the last."""
+        return float(self.course.time_s[-1])
+
+    @property
+    def breaks_s(self) -> Floats:
+        """Where the path or the law has a corner, or a jump of its curvature."""
+        s = self.course.corners()
+        of_path = np.array([self._when(each) for each in s]) * self.duration_s
+        return np.union1d(of_path, np.array(self.law.ends) * self.duration_s)
+
+    def _when(self, s: float) -> float:
+        """τ at which the law has come to s, by bisection; s(τ) does not fall."""
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.law.position(middle) < s else (low, middle)
+        return high
+
+    def course_at(self, time_s: Floats) -> Course:
+        """The course with other instants (n,)."""
+        tau = np.clip(time_s / self.duration_s, 0.0, 1.0)
+        s = np.clip(self.law.position(tau), 0.0, 1.0)
+        return replace(self.course, s=s, time_s=time_s)
+
+    def tip(self, time_s: Floats) -> Floats:
+        """On the path."""
+        course = self.course_at(time_s)
+        return self.followed.problem.evaluate(at_parameters(self.followed, course)).point
+
+    def of_design(self, time_s: Floats) -> PathOfDesign | None:
+        """How q at times (n,) follows the design, where that moves the tip."""
+        design, course = self.followed.problem.chain.design, self.course_at(time_s)
+        if design is None or not self.follows_design:
+            return None
+        u = at_parameters(self.followed, course)
+        return PathOfDesign(course, self.followed.problem, design, u)
+
+    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+        """q, q̇ and q̈ at times (n,) and design y (n_y,), the initial one if None.
+
+        Where the tip leaves a choice, those of another design are of the spline through the
+        samples. Raises TrajectoryError where the tip cannot follow its path with that design.
+        """
+        ik, course = self.followed.problem, self.course_at(time_s)
+        path = self.of_design(time_s)
+        if y is None or path is None:
+            u = at_parameters(self.followed, course)
+        elif ik.rank < ik.n_q:
+            samples = self.course.time_s
+            q = PathOfDesign(self.course, ik, path.design, self.followed.u)(y)[0]
+            return SampledMotion(samples, q, tuple(self.breaks_s)).moving(time_s)
+        else:
+            u, ik = path.states(y), path.problem_at(y)
+        n, found = ik.n_q, (u, *self._rates(ik, course, u))
+        return Moving(*(np.array((each * ik.scale)[:, :n]) for each in found))
+
+    def _rates(self, ik: TipProblem, course: Course, u: Floats) -> tuple[Floats, Floats]:
+        """u̇ and ü (n, n_z); see the module."""
+        tau = np.clip(course.time_s / self.duration_s, 0.0, 1.0)
+        ds = self.law.velocity(tau)[:, None] / self.duration_s
+        dds = self.law.acceleration(tau)[:, None] / self.duration_s**2
+        first, second = self._task(ik, course, 1), self._task(ik, course, 2)
+        rate, push = first * ds, second * ds**2 + first * dds
+        u_rate = _motion(ik, u, rate)
+        size = np.abs(u_rate).max(axis=1, initial=0.0, keepdims=True)
+        h = _STEP / np.where(size > 0.0, size, 1.0)
+        at = {k: _motion(ik, u + k * h * u_rate, rate) for k in (-2, -1, 1, 2)}
+        turning = (8.0 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12.0 * h)
+        return u_rate, turning + _motion(ik, u, push)
+
+    def _task(self, ik: TipProblem, course: Course, order: Literal[1, 2]) -> Floats:
+        """dp/ds or d²p/ds² (n, m): the point in m, the turning times the lever."""
+        velocity, spin = course.rates(course.s, order)
+        return np.hstack([velocity, ik.lever * spin[:, list(ik.chain.turned_by)]])
+
+
+def _motion(ik: TipProblem, u: Floats, task: Floats) -> Floats:
+    """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
+    motion = reduced(ik.evaluate(u), ik.n_q)
+    own = least_norm(motion.J, task, ik.rank)
+    return np.hstack([own, np.einsum("npq,nq->np", motion.following, own)])
+
+
+# --- with more behind q
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded(Motion):
+    """A motion with ``loads`` (n_loads,), which neither time nor design change, behind q."""
+
+    motion: Motion
+    loads: Floats
+
+    @property
+    def breaks_s(self) -> Floats:
+        """Those of the motion."""
+        return self.motion.breaks_s
+
+    def tip(self, time_s: Floats) -> Floats | None:
+        """That of the motion."""
+        return self.motion.tip(time_s)
+
+    def of_design(self, time_s: Floats) -> OfDesign | None:
+        """With slopes of the loads, which are 0."""
+        own = self.motion.of_design(time_s)
+        if own is None:
+            return None
+
+        def loaded(y: Floats) -> tuple[Floats, Floats]:
+            q, slopes = own(y)
+            behind = np.broadcast_to(self.loads, (len(q), len(self.loads)))
+            still = np.zeros((len(q), len(self.loads), len(y)))
+            return np.hstack([q, behind]), np.concatenate([slopes, still], axis=1)
+
+        return loaded
+
+    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+        """q with the loads behind, which do not move."""
+        found, shape = self.motion.moving(time_s, y), (len(time_s), len(self.loads))
+        behind = np.broadcast_to(self.loads, shape), np.zeros(shape), np.zeros(shape)
+        return Moving(*(np.hstack([a, b]) for a, b in zip(found, behind, strict=True)))
