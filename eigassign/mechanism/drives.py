@@ -29,7 +29,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import DOFS, multiply
-from eigassign.mechanism.trajectory.trajectory import Trajectories, rates_at
+from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory, rates_at
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays
 
@@ -81,6 +81,12 @@ class DriveForces:
             parts.append(self.at(q, q_by_y, y, slopes))
         tau, by_y = (np.concatenate(each) for each in zip(*parts, strict=True))
         return np.concatenate(samples), tau, by_y
+
+    def exerted(self, trajectory: Trajectory, time_s: Floats, y: Floats) -> Floats:
+        """τ (n, n_q) at any times (n,) of a trajectory, at design y (n_y,)."""
+        motion = trajectory.motion.moving(time_s, y)
+        still = [np.zeros((*each.shape, len(y))) for each in motion]
+        return self.at([*motion], still, y, slopes=False)[0]
 
     def curves(self, path: Trajectories, y: Floats) -> Floats:
         """τ (n_t, n) at all samples and instants: of a corner the larger side."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.requirements import Tolerances
 from eigassign.assignment.linear import LinearConstraint
-from eigassign.assignment.requirements.quantity import LimitedQuantity
+from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity
 from eigassign.assignment.requirements.sampling import design_limits
 from eigassign.assignment.requirements.static_limit import StaticLimit
 from eigassign.brief import Brief
@@ -147,6 +147,11 @@ class Scene:
     def statics(self) -> tuple[StaticLimit, ...]:
         """Those of static targets."""
         return tuple(one for one in self.limits if isinstance(one, StaticLimit))
+
+    @property
+    def followed_limits(self) -> tuple[LimitedQuantity, ...]:
+        """The limits that are looked at between the samples: static targets and drives."""
+        return tuple(one for one in self.limits if isinstance(one, StaticLimit | DriveLimit))
 
     @property
     def constraints(self) -> tuple[LinearConstraint, ...]:

@@ -105,6 +105,7 @@ class Requirement(Brief):
     along: tuple[tuple[str, slice], ...] = ()
     weight: float = 1.0
     trajectory: str | None = None  # the only one on which it holds
+    seconds: Floats | None = None  # ω (n,) of the integral over its own part; None: of all samples
     followed: tuple[FollowedMode, ...] = ()
     part_of: str = ""  # the label of the whole, where it is a part of a band
 
@@ -156,6 +157,10 @@ class Requirement(Brief):
         """The highest numbered mode of its terms; 1 if there is none."""
         return max((1, *(mode for mode, _ in self.mode_terms)))
 
+    def time_weights(self, of_all: Floats) -> Floats:
+        """ω (n,) in s of the integral over its own rows; ``of_all`` (n_t,) are those of all."""
+        return of_all[self.rows] if self.seconds is None else self.seconds
+
     def part(self, name: str, own: slice) -> Self:
         """The same along one trajectory only, at these of its own samples."""
         first, n = self.rows.start + own.start, own.stop - own.start
@@ -165,6 +170,7 @@ class Requirement(Brief):
             lower=self.lower[own],
             upper=self.upper[own],
             along=((name, slice(0, n)),),
+            seconds=None if self.seconds is None else self.seconds[own],
         )
 
     # --- Its curve and errors, where modes have some frequencies or lie between two
@@ -374,9 +380,10 @@ def difference(a: Floats, b: Floats) -> Floats:
 
 
 def time_shares(goals: Sequence[Requirement], time_weights: Floats) -> tuple[Floats, ...]:
-    """w ω_k / Σ w ω (n,) of each goal, ``time_weights`` (n_t,) being ω: 1 together."""
-    total = sum(one.weight * time_weights[one.rows].sum() for one in goals)
-    return tuple(one.weight / total * time_weights[one.rows] for one in goals)
+    """w ω_k / Σ w ω (n,) of each goal, 1 together; ``time_weights`` (n_t,) are ω of all samples."""
+    own = [one.weight * one.time_weights(time_weights) for one in goals]
+    total = sum(weights.sum() for weights in own)
+    return tuple(weights / total for weights in own)
 
 
 def in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:

@@ -1,9 +1,9 @@
 """What a case asks for as requirements: targets at the samples of its trajectories, and limits.
 
 A requirement is at all samples, those of one trajectory, or a part of it. What is asked between
-samples counts: the first and the last time of a part, and the points of a profile that is not
-linear from sample to sample, become instants of the trajectory (`with_instants`). From one of all
-these to the next q and the edges are linear in time.
+samples counts: the first and the last time of a part, the points of a profile that is not linear
+from sample to sample, and where drives are limited the jumps of q̈, become instants of the
+trajectory (`with_instants`). From one of all these to the next the edges are linear in time.
 """
 
 from __future__ import annotations
@@ -105,6 +105,10 @@ def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
         for part, found in zip(path.parts, times, strict=True):
             if target.trajectory in (None, part.name):
                 found += _instants(part.trajectory.time_s, target.during, curves)
+    if file.design.torque:
+        for part, found in zip(path.parts, times, strict=True):
+            breaks, near = part.trajectory.motion.breaks_s, _SLACK * np.ptp(part.trajectory.time_s)
+            found += [t for t in breaks if np.abs(part.trajectory.time_s - t).min() > near]
     return path.with_instants(times)
 
 
@@ -164,6 +168,7 @@ def _of_target(
             along=along,
             weight=target.weight,
             trajectory=target.trajectory,
+            seconds=None if target.during is None else _seconds(path, rows),
             followed=tuple(sorted(followed, key=own.index)),
         )
 
@@ -201,6 +206,14 @@ def _along(path: Trajectories, rows: slice) -> Iterator[tuple[str, slice]]:
         first, last = max(own.start, rows.start), min(own.stop, rows.stop)
         if first < last:
             yield part.name, slice(first - rows.start, last - rows.start)
+
+
+def _seconds(path: Trajectories, rows: slice) -> Floats:
+    """ω (n,) in s of the integral over these rows of every trajectory, and no more."""
+    parts = {part.name: part.weight for part in path.parts}
+    time_s = path.time_s[rows]
+    along = _along(path, rows)
+    return np.concatenate([parts[name] * trapezoidal_weights(time_s[own]) for name, own in along])
 
 
 def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:

@@ -56,6 +56,10 @@ class Motion:
         """At times (n,) within the motion and a design y (n_y,), the initial one if None."""
         raise NotImplementedError
 
+    def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
+        """q (n, n_q) alone."""
+        return self.moving(time_s, y).q
+
     def tip(self, _time_s: Floats) -> Floats | None:
         """Where the tip is at the initial design, (n, 2 or 3) in m; None without its path."""
         return None
@@ -194,6 +198,14 @@ class TipMotion(Motion):
         u = at_parameters(self.followed, course)
         return PathOfDesign(course, self.followed.problem, design, u)
 
+    def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
+        """q (n, n_q) alone."""
+        path, ik = self.of_design(time_s), self.followed.problem
+        if y is not None and path is not None:
+            return path(y)[0]
+        u = at_parameters(self.followed, self.course_at(time_s))
+        return np.array((u * ik.scale)[:, : ik.n_q])
+
     def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
         """q, q̇ and q̈ at times (n,) and design y (n_y,), the initial one if None.
 
@@ -254,6 +266,11 @@ class Loaded(Motion):
     def breaks_s(self) -> Floats:
         """Those of the motion."""
         return self.motion.breaks_s
+
+    def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
+        """q (n, n_q) alone, with the loads."""
+        behind = np.broadcast_to(self.loads, (len(time_s), len(self.loads)))
+        return np.hstack([self.motion.poses(time_s, y), behind])
 
     def tip(self, time_s: Floats) -> Floats | None:
         """That of the motion."""

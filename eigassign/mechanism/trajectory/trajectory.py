@@ -118,7 +118,7 @@ class Trajectory(Brief):
 
     def _at_times(self, time_s: Floats, motion: Motion) -> Trajectory:
         """The motion at these times; where they are known q and the tip stay as they are."""
-        q = motion.moving(time_s).q
+        q = motion.poses(time_s)
         known, at = np.isin(time_s, self.time_s), np.searchsorted(self.time_s, time_s)
         n_q = self.q.shape[1]
         q[known, :n_q] = self.q[at[known]]
@@ -324,6 +324,23 @@ class Trajectories:
                 message = f"trajectory {part.name!r}: {error.message}"
                 raise TrajectoryError(error.path, message, error.sample) from None
         return _stacked([q for q, _ in found]), _stacked([slopes for _, slopes in found])
+
+    def between(self, rows: slice, y: Floats) -> Callable[[Floats], Floats]:
+        """q (n, n_q) at places along some rows of one trajectory, at design y (n_y,).
+
+        Place 1.5 is midway in time between the second row and the third.
+        """
+        part, own = self._at(rows.start)
+        time_s, known = self.time_s[rows], part.trajectory.at(y)[0]
+        known = known[rows.start - own.start : rows.stop - own.start]
+
+        def poses(at: Floats) -> Floats:
+            q = part.trajectory.motion.poses(np.interp(at, np.arange(len(time_s)), time_s), y)
+            on = at == np.rint(at)
+            q[on] = known[at[on].astype(int)]
+            return q
+
+        return poses
 
     @cached_property
     def tip(self) -> Floats | None:

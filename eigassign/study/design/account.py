@@ -191,11 +191,10 @@ def _missed_between(
 
     The first of the designs is the answer, others are deviations.
     """
-    y, poses = designs[0], [scene.path.at(y)[0] for y in designs]
-    statics = [one for one in scene.statics if one.violation(one.amount(y), 0.0) <= ON]
+    y = designs[0]
+    statics = [one for one in scene.followed_limits if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
-        each = zip(poses, designs, strict=True)
-        error = -min(lowest_room(scene.model, one, *design).room for design in each)
+        error = -min(lowest_room(scene.model, one, scene.path, each).room for each in designs)
         try:
             error = max(error, *(followed_between(scene, one, y) for y in designs))
         except LostModeError as lost:

@@ -136,7 +136,7 @@ def _between_samples(
         missed = found.best.seen.violation > ON
         if finer == FINER or missed or found.best.end in (End.SECONDS, End.INTERRUPTED):
             break
-        limits = [one for one in (*wanted, *scene.statics) if not one.is_goal]
+        limits = [one for one in (*wanted, *scene.followed_limits) if not one.is_goal]
         path = finer_path(scene.path, scene.model, limits, found.task.designs(found.best.y))
         if len(path.q) == len(scene.path.q):
             break

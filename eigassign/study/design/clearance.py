@@ -2,15 +2,15 @@
 
 On a connected trajectory a band is clear if and only if the number k of modes below it is the same
 at both of its edges everywhere. At every sample k is counted by Sylvester's law of inertia, so that
-a mode nobody asked for counts too. Between samples, where the coordinates and the edges are linear
-in time, the room that the modes k and k + 1 leave,
+a mode nobody asked for counts too. Between samples, where the motion is known and the edges are
+linear in time, the room that the modes k and k + 1 leave,
 
     g(t) = min( 1 − f_k / lower ,  f_{k+1} / ((1 + e) upper) − 1 ),
 
 is followed on points between which no coordinate goes on by more than 5° or 2.5 % of its way, and
 which are made denser until half the second difference of g there and beside, twice what a parabola
 and as much as a kink can deviate from the chord, is less than the room that is left: that is
-checked, not proved. Other targets are looked at between the samples likewise.
+checked, not proved. Other targets, and what drives exert, are looked at there likewise.
 
 Mesh and reduced links raise frequencies, by e at most, relative: mode k is below the band with more
 right than its number says, and mode k + 1 has to stay above it without e. Where e has no bound, or
@@ -29,10 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.band import ForbiddenBand
+from eigassign.assignment.requirements.quantity import DriveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit
 from eigassign.errors import LostModeError, MissingMassError
-from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.checks.mesh import judged_poses
@@ -67,10 +68,11 @@ def check_band(
     e is ``raised``, or else what can be proved of it. A band of a followed mode is not clear where
     the shape of its mode is lost between samples. Raises what the exact solves raise.
     """
-    q = scene.path.at(y)[0][band.rows]
+    q, poses = scene.path.at(y)[0][band.rows], scene.path.between(band.rows, y)
     shapes = (_Shape(band, scene.path, one, y) for one in own if one.mode in band.followed)
     try:
-        return BandMotion(scene.model, band, below, q, y, raised, next(shapes, None)).judged()
+        shape = next(shapes, None)
+        return BandMotion(scene.model, band, below, q, y, raised, shape, poses).judged()
     except LostModeError:
         return ClearanceRow(band.label, below, False, 0.0, False, None)
 
@@ -110,10 +112,7 @@ class _Shape:
 
 
 def _refined(path: Trajectories, rows: slice, at: Floats) -> tuple[Trajectories, Ints]:
-    """One trajectory with instants at places along some of its rows, and their numbers (n,) in it.
-
-    From sample to sample q is linear in time for any design.
-    """
+    """One trajectory with instants at places along some of its rows, and their numbers (n,)."""
     name = path.name_of(rows.start)
     time_s = _between(at, path.time_s[rows, None])[:, 0]
     fine = path.with_instants([time_s if one.name == name else () for one in path.parts])
@@ -133,6 +132,7 @@ class BandMotion:
     y: Floats
     given: float | None = None  # e
     shape: _Shape | None = None
+    poses: Callable[[Floats], Floats] | None = None  # of places; None where q is linear between
 
     def judged(self) -> ClearanceRow:
         """What is found of it."""
@@ -174,7 +174,8 @@ class BandMotion:
 
     def room(self, at: Floats) -> Floats:
         """g (n,) at places ``at`` along the samples: 1.5 is midway between second and third."""
-        k, above, q = self.below, self.above, _between(at, self.q)
+        k, above = self.below, self.above
+        q = _between(at, self.q) if self.poses is None else self.poses(at)
         lower, upper = (_between(at, e[:, None])[:, 0] for e in (self.band.lower, self.band.upper))
         if self.shape is None:
             low = self.band.counted[k - 1] if self.band.counted and k else k
@@ -259,36 +260,58 @@ def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
     return found
 
 
-def lowest_room(model: Model, asked: Requirement, q: Floats, y: Floats) -> Lowest:
+def lowest_room(model: Model, asked: Requirement, path: Trajectories, y: Floats) -> Lowest:
     """The least room that a target leaves along its trajectories, relative, and the place of it.
 
-    Of poses q (n, n_q) of all samples and a design y (n_y,), within `WITHIN`. The room of a wanted
+    At a design y (n_y,), within `WITHIN`. The room of a wanted
     frequency is its error, negative; that of what shall be highest is its frequency in Hz. Bands
     are checked for themselves, modes that are followed by their shape are known at samples only.
     """
     if not asked.terms or asked.followed:
         return Lowest(0.0, 0.0)
-    found = []
+    q, found = path.at(y)[0], []
+    if isinstance(asked, DriveLimit):
+        for one, rows in zip(path.parts, path.rows, strict=True):
+            low = least_along(_DriveRoom(model, asked, one.trajectory, y), q[rows], WITHIN)
+            found.append(Lowest(low.room, rows.start + low.at))
+        return min(found)
     for name, own in asked.along:
         part = asked.part(name, own)
-        low = least_along(_Room(model, part, q[part.rows], y), q[part.rows], WITHIN)
+        room = _Room(model, part, path.between(part.rows, y), y)
+        low = least_along(room, q[part.rows], WITHIN)
         found.append(Lowest(low.room, part.rows.start + low.at))
     return min(found)
 
 
 @dataclass(frozen=True, eq=False)
+class _DriveRoom:
+    """1 − |τ|/max (n,) of one drive at places along the samples of a trajectory."""
+
+    model: Model
+    asked: DriveLimit
+    trajectory: Trajectory
+    y: Floats
+
+    def __call__(self, at: Floats) -> Floats:
+        times = self.trajectory.time_s
+        time_s = np.interp(at, np.arange(len(times)), times)
+        tau = self.model.drives.exerted(self.trajectory, time_s, self.y)
+        return np.asarray(1.0 - np.abs(tau[:, self.asked.load.column]) / self.asked.allowed[1])
+
+
+@dataclass(frozen=True, eq=False)
 class _Room:
-    """The room (n,) of one part of a target at places along its samples, of poses q (n, n_q)."""
+    """The room (n,) of one part of a target at places along its samples."""
 
     model: Model
     asked: Requirement
-    q: Floats
+    poses: Callable[[Floats], Floats]
     y: Floats
 
     def __call__(self, at: Floats) -> Floats:
         edges = _between(at, np.column_stack([self.asked.lower, self.asked.upper]))
         fine = replace(self.asked, lower=edges[:, 0], upper=edges[:, 1], along=())
-        fine, q = replace(fine, rows=slice(0, len(at))), _between(at, self.q)
+        fine, q = replace(fine, rows=slice(0, len(at))), self.poses(at)
         if isinstance(fine, StaticLimit):
             curve = fine.way.at(q, self.y)
             if fine.way.target.limit == "at_least":  # of the stiffness, not of its inverse
@@ -300,11 +323,15 @@ class _Room:
         return np.asarray(-np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0))
 
 
-def least_room(model: Model, band: ForbiddenBand, row: ClearanceRow, q: Floats, y: Floats) -> float:
+def least_room(
+    model: Model, band: ForbiddenBand, row: ClearanceRow, path: Trajectories, y: Floats
+) -> float:
     """The room of a band that was found to be clear, within `WITHIN` of itself."""
     if not row.clear:
         return row.room
-    return least_along(BandMotion(model, band, row.below, q, y, row.raised).room, q, WITHIN).room
+    q, poses = path.at(y)[0][band.rows], path.between(band.rows, y)
+    motion = BandMotion(model, band, row.below, q, y, row.raised, None, poses)
+    return least_along(motion.room, q, WITHIN).room
 
 
 def finer_path(
@@ -316,11 +343,10 @@ def finer_path(
     """
     times: list[list[float]] = [[] for _ in path.parts]
     for one, y in itertools.product(asked, designs):
-        q = path.at(y)[0]
-        low = lowest_room(model, one, q, y)
+        low = lowest_room(model, one, path, y)
         room = low.room
         if one.is_aim:  # what it has at samples is what counts
-            own = _Room(model, one, q[one.rows], y)(np.arange(len(one.lower), dtype=np.float64))
+            own = _Room(model, one, path.between(one.rows, y), y)(np.arange(len(one.lower)))
             room = low.room / float(own.min()) - 1.0
         if room < -LIMIT:
             k = int(low.at)

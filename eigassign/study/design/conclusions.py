@@ -93,8 +93,7 @@ def _in_words(row: AimRow, reached: str, kept: str) -> AimRow:
 def _least(found: Found, asked: Requirement, y: Floats) -> float:
     """The least of a curve, or the least room of a gap, of a design and of its scenarios."""
     model, path = found.task.scene.model, found.task.scene.path
-    each = ((path.at(one)[0], one) for one in found.task.designs(y))
-    return min(lowest_room(model, asked, *own).room for own in each)
+    return min(lowest_room(model, asked, path, one).room for one in found.task.designs(y))
 
 
 def _rooms(found: Found, wanted: Sequence[Requirement], y: Floats) -> Iterator[float]:
@@ -105,9 +104,8 @@ def _rooms(found: Found, wanted: Sequence[Requirement], y: Floats) -> Iterator[f
         yield from (-float(errors.min()) for errors in lacking(found.task, y))
         return
     for one in found.task.designs(y):
-        q = path.at(one)[0]
         for band, row in zip(found.task.bands, found.clearances, strict=True):
-            yield least_room(model, band, row, q[band.rows], one)
+            yield least_room(model, band, row, path, one)
 
 
 MOST_DIVIDED = 60  # searches to say whether some limits can be met together, with bands among them

@@ -59,7 +59,7 @@ def study_targets(
     """
     weights = time_weights(path)
     return tuple(
-        _studied(one, solved, curve, weights[one.rows], max_error)
+        _studied(one, solved, curve, one.time_weights(weights), max_error)
         for one, curve in zip(wanted, predicted, strict=True)
     )
 
