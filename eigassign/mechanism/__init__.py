@@ -48,6 +48,7 @@ __all__, __getattr__, __dir__ = face(
         "solids.part": "solid_part",
         "solids.surfaces": "Coupling joined",
         "trajectory.csv": "read_samples",
+        "trajectory.motion": "PointMotion",
         "trajectory.timing": "timing_law",
         "trajectory.trajectory": ("NamedTrajectory Trajectories Trajectory build_trajectory rates"),
     },

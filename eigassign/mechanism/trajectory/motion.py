@@ -168,10 +168,10 @@ class TipMotion(Motion):
     def breaks_s(self) -> Floats:
         """Where the path or the law has a corner, or a jump of its curvature."""
         s = self.course.corners()
-        of_path = np.array([self._when(each) for each in s]) * self.duration_s
+        of_path = np.array([self.when(each) for each in s]) * self.duration_s
         return np.union1d(of_path, np.array(self.law.ends) * self.duration_s)
 
-    def _when(self, s: float) -> float:
+    def when(self, s: float) -> float:
         """τ at which the law has come to s, by bisection; s(τ) does not fall."""
         low, high = 0.0, 1.0
         for _ in range(60):

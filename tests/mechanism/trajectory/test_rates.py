@@ -1,4 +1,4 @@
-"""Rates of sampled motions: within smooth parts only."""
+"""q, q̇ and q̈ at any time, against differences of eighth order of q, and at corners."""
 
 from __future__ import annotations
 
@@ -6,25 +6,76 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planar_arms import serial_arm
 
-from eigassign import load_case
-from eigassign.case import PointTrajectory
+from eigassign.case import PointTrajectory, TipTrajectory
 from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates
 
 CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
-WAYPOINTS = [[0.30, 0.19], [0.108, 0.2104], [0.02, 0.1845]]
+LAWS = ("linear", "cubic", "quintic", "trapezoidal")
 
 
 def no_arm(node: str, oriented: bool) -> TipChain:
     raise AssertionError("points need no kinematics")
 
 
-def test_a_smooth_motion_is_differentiated_as_a_whole() -> None:
-    t = np.linspace(0.0, 1.0, 21)
-    found = rates(Trajectory(t, np.stack([t**2, 3.0 - t], axis=1), None))
-    np.testing.assert_array_equal(found.samples, np.arange(21))
-    np.testing.assert_allclose(found.rate, np.stack([2 * t, -np.ones(21)], axis=1), atol=1e-12)
-    np.testing.assert_allclose(found.acceleration, [[2.0, 0.0]] * 21, atol=1e-10)
+def agree(trajectory: Trajectory, away_from_s: np.ndarray, accuracy: float = 1e-6) -> None:
+    """Rates at 100 times, none of whose differences reaches over a time to stay away from."""
+    duration, motion = float(np.ptp(trajectory.time_s)), trajectory.motion
+    h = 2e-3 * duration
+    t = trajectory.time_s[0] + duration * np.linspace(0.013, 0.987, 100)
+    t = t[np.abs(t[:, None] - away_from_s).min(axis=1, initial=np.inf) > 4.1 * h]
+    assert len(t) > 20
+    q = {k: motion.poses(t + k * h) for k in range(-4, 5)}
+    first = sum(c * (q[k] - q[-k]) for k, c in enumerate((4 / 5, -1 / 5, 4 / 105, -1 / 280), 1))
+    second = sum(c * (q[k] + q[-k]) for k, c in enumerate((8 / 5, -1 / 5, 8 / 315, -1 / 560), 1))
+    found = motion.moving(t)
+    np.testing.assert_array_equal(found.q, q[0])
+    pairs = (found.rate, first / h), (found.acceleration, (second - 205 / 72 * q[0]) / h**2)
+    for exact, wanted in pairs:  # of a constant velocity round-off is left
+        np.testing.assert_allclose(exact, wanted, atol=accuracy * np.abs(wanted).max() + 1e-9)
+
+
+@pytest.mark.parametrize("timing", LAWS)
+def test_points_move_by_the_law(timing: str) -> None:
+    spec = PointTrajectory(
+        points=((0.0, 1.0), (1.0, 0.5), (0.2, 0.9)), times=(0.0, 0.7, 2.0), timing=timing, samples=7
+    )
+    found = build_trajectory(spec, ["q1", "q2"], no_arm)
+    agree(found, found.motion.breaks_s)
+
+
+@pytest.mark.parametrize("timing", LAWS)
+@pytest.mark.parametrize("path", ["straight", "spline"])
+@pytest.mark.parametrize("seed", range(1, 11))
+def test_tips_move_by_path_and_law(seed: int, path: str, timing: str) -> None:
+    """Two links, or three that leave a choice; J is that of the chain of the tests."""
+    random = np.random.default_rng(seed)
+    lengths = (0.6, 0.45) if seed % 2 else (0.5, 0.4, 0.3)
+    turns = random.uniform(0.0, 2.0 * np.pi) + np.linspace(0.0, 1.2, 4)
+    points = random.uniform(0.55, 0.85, 4)[:, None] * np.stack([np.cos(turns), np.sin(turns)], 1)
+    waypoints = tuple(map(tuple, points.tolist()))
+    spec = TipTrajectory(
+        tip="x.end", waypoints=waypoints, path=path, timing=timing, samples=9, duration=1.4
+    )
+    found = build_trajectory(
+        spec, ["q1", "q2", "q3"][: len(lengths)], lambda *_: serial_arm(*lengths)
+    )
+    motion = found.motion
+    knots = [motion.when(s) * 1.4 for s in motion.course.path.knots[1:-1]]
+    agree(found, np.union1d(motion.breaks_s, knots))
+
+
+def test_samples_move_by_the_spline_through_them() -> None:
+    """A polynomial of third degree is its own spline."""
+    t = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 9))
+    cubic = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7])
+    found = Trajectory(t, np.stack([cubic(t), 3.0 - t], axis=1), None)
+    at = np.linspace(t[0], t[-1], 50)
+    q, rate, push = found.motion.moving(at)
+    np.testing.assert_allclose(q, np.stack([cubic(at), 3.0 - at], axis=1), atol=1e-12)
+    np.testing.assert_allclose(rate, np.stack([cubic.deriv()(at), -1.0 + 0 * at], 1), atol=1e-11)
+    np.testing.assert_allclose(push, np.stack([cubic.deriv(2)(at), 0 * at], 1), atol=1e-9)
 
 
 @pytest.mark.parametrize("samples", [21, 22, 4])  # a corner on a sample, between two, few samples
@@ -47,24 +98,8 @@ def test_a_corner_on_a_sample_is_seen_from_both_sides() -> None:
     np.testing.assert_allclose(found.rate[:, 0], [-1, -1, -1, 1, 1, 1], atol=1e-12)
 
 
-def test_a_lone_sample_between_two_corners_tells_no_rate() -> None:
-    t = np.linspace(0.0, 1.0, 5)
-    found = rates(Trajectory(t, t[:, None], None, (), (0.4, 0.6)))
-    np.testing.assert_array_equal(found.samples, [0, 1, 3, 4])
-
-
-def test_a_straight_tip_path_says_when_it_turns_its_corners(tmp_path: Path) -> None:
-    """Passed at speed: accelerations stay those of the straight parts, however fine the samples."""
-    text = CASE.read_text(encoding="utf-8").replace("path: spline", "path: straight")
-    largest = []
-    for samples in (152, 608):
-        path = tmp_path / f"{samples}.yaml"
-        path.write_text(text.replace("samples: 152", f"samples: {samples}"), encoding="utf-8")
-        trajectory = load_case(path).trajectories[0].trajectory
-        corners = np.array(trajectory.corners_s)
-        assert len(corners) == 3
-        tips = [np.interp(corners, trajectory.time_s, x) for x in trajectory.tip.T]
-        # two samples at most 4 mm apart cut the corner
-        np.testing.assert_allclose(np.transpose(tips), WAYPOINTS, atol=2e-3)
-        largest.append(np.abs(rates(trajectory).acceleration).max())
-    assert largest[1] == pytest.approx(largest[0], rel=0.1)
+def test_both_sides_of_where_a_trapezoidal_law_stops_accelerating_count() -> None:
+    spec = PointTrajectory(points=((0.0,), (1.0,)), duration=1.0, timing="trapezoidal", samples=4)
+    found = rates(build_trajectory(spec, ["q1"], no_arm))
+    np.testing.assert_array_equal(found.samples, [0, 1, 1, 2, 2, 3])
+    np.testing.assert_allclose(found.acceleration[:, 0], [4.5, 4.5, 0, 0, -4.5, -4.5], atol=1e-9)
