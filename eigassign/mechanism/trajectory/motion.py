@@ -33,6 +33,7 @@ from eigassign.mechanism.trajectory.timing import TimingLaw
 Floats = NDArray[np.float64]
 OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
+SOLUTIONS = 400  # between which the spline is off the path by some 1e-9 of its length
 _STEP = 1e-3  # of u: differences of fourth order err by its fourth power, round-off is 1e-13
 
 
@@ -200,36 +201,52 @@ class TipMotion(Motion):
 
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone."""
-        path, ik = self.of_design(time_s), self.followed.problem
-        if y is not None and path is not None:
-            return path(y)[0]
-        u = at_parameters(self.followed, self.course_at(time_s))
-        return np.array((u * ik.scale)[:, : ik.n_q])
+        if self.has_choice:
+            return self.moving(time_s, y).q
+        return self._states(time_s, y)[1]
 
     def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
         """q, q̇ and q̈ at times (n,) and design y (n_y,), the initial one if None.
 
-        Where the tip leaves a choice, those of another design are of the spline through the
-        samples. Raises TrajectoryError where the tip cannot follow its path with that design.
+        Where the tip leaves a choice they are those of the spline, in s, through `SOLUTIONS` poses.
+        Raises TrajectoryError where the tip cannot follow its path with that design.
         """
-        ik, course = self.followed.problem, self.course_at(time_s)
-        path = self.of_design(time_s)
-        if y is None or path is None:
-            u = at_parameters(self.followed, course)
-        elif ik.rank < ik.n_q:
-            samples = self.course.time_s
-            q = PathOfDesign(self.course, ik, path.design, self.followed.u)(y)[0]
-            return SampledMotion(samples, q, tuple(self.breaks_s)).moving(time_s)
-        else:
-            u, ik = path.states(y), path.problem_at(y)
-        n, found = ik.n_q, (u, *self._rates(ik, course, u))
-        return Moving(*(np.array((each * ik.scale)[:, :n]) for each in found))
+        ds, dds, course = *self._speed(time_s), self.course_at(time_s)
+        if self.has_choice:
+            s = np.union1d(np.linspace(0.0, 1.0, SOLUTIONS), self.course.corners())
+            q = self._states(s, y, replace(self.course, s=s, time_s=s))[1]
+            found = SampledMotion(s, q, tuple(self.course.corners())).moving(course.s)
+            push = found.acceleration * ds**2 + found.rate * dds
+            return Moving(found.q, found.rate * ds, push)
+        ik, q, u = self._states(time_s, y)
+        rates = self._rates(ik, course, u, ds, dds)
+        return Moving(q, *(np.array((each * ik.scale)[:, : ik.n_q]) for each in rates))
 
-    def _rates(self, ik: TipProblem, course: Course, u: Floats) -> tuple[Floats, Floats]:
+    @property
+    def has_choice(self) -> bool:
+        """True where the tip fixes fewer directions than there are coordinates."""
+        return self.followed.problem.rank < self.followed.problem.n_q
+
+    def _states(
+        self, time_s: Floats, y: Floats | None, course: Course | None = None
+    ) -> tuple[TipProblem, Floats, Floats]:
+        """The problem at design y, q (n, n_q) and the states u (n, n_z), at times or a course."""
+        course = self.course_at(time_s) if course is None else course
+        u, ik = at_parameters(self.followed, course), self.followed.problem
+        if y is not None and self.follows_design and ik.chain.design is not None:
+            path = PathOfDesign(course, ik, ik.chain.design, u)
+            u, ik = path.states(y), path.problem_at(y)
+        return ik, np.array((u * ik.scale)[:, : ik.n_q]), u
+
+    def _speed(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """ṡ and s̈ (n, 1), in 1/s and 1/s²."""
+        tau, T = np.clip(time_s / self.duration_s, 0.0, 1.0), self.duration_s
+        return self.law.velocity(tau)[:, None] / T, self.law.acceleration(tau)[:, None] / T**2
+
+    def _rates(
+        self, ik: TipProblem, course: Course, u: Floats, ds: Floats, dds: Floats
+    ) -> tuple[Floats, Floats]:
         """u̇ and ü (n, n_z); see the module."""
-        tau = np.clip(course.time_s / self.duration_s, 0.0, 1.0)
-        ds = self.law.velocity(tau)[:, None] / self.duration_s
-        dds = self.law.acceleration(tau)[:, None] / self.duration_s**2
         first, second = self._task(ik, course, 1), self._task(ik, course, 2)
         rate, push = first * ds, second * ds**2 + first * dds
         u_rate = _motion(ik, u, rate)

@@ -45,25 +45,42 @@ def test_points_move_by_the_law(timing: str) -> None:
     agree(found, found.motion.breaks_s)
 
 
-@pytest.mark.parametrize("timing", LAWS)
-@pytest.mark.parametrize("path", ["straight", "spline"])
-@pytest.mark.parametrize("seed", range(1, 11))
-def test_tips_move_by_path_and_law(seed: int, path: str, timing: str) -> None:
-    """Two links, or three that leave a choice; J is that of the chain of the tests."""
+def along_a_tip(seed: int, path: str, timing: str, *lengths: float) -> Trajectory:
     random = np.random.default_rng(seed)
-    lengths = (0.6, 0.45) if seed % 2 else (0.5, 0.4, 0.3)
     turns = random.uniform(0.0, 2.0 * np.pi) + np.linspace(0.0, 1.2, 4)
     points = random.uniform(0.55, 0.85, 4)[:, None] * np.stack([np.cos(turns), np.sin(turns)], 1)
     waypoints = tuple(map(tuple, points.tolist()))
     spec = TipTrajectory(
         tip="x.end", waypoints=waypoints, path=path, timing=timing, samples=9, duration=1.4
     )
-    found = build_trajectory(
-        spec, ["q1", "q2", "q3"][: len(lengths)], lambda *_: serial_arm(*lengths)
-    )
+    names = ["q1", "q2", "q3"][: len(lengths)]
+    return build_trajectory(spec, names, lambda *_: serial_arm(*lengths))
+
+
+@pytest.mark.parametrize("timing", LAWS)
+@pytest.mark.parametrize("path", ["straight", "spline"])
+@pytest.mark.parametrize("seed", range(10))
+def test_tips_move_by_path_and_law(seed: int, path: str, timing: str) -> None:
+    found = along_a_tip(seed, path, timing, 0.6, 0.45)
     motion = found.motion
     knots = [motion.when(s) * 1.4 for s in motion.course.path.knots[1:-1]]
     agree(found, np.union1d(motion.breaks_s, knots))
+
+
+def test_where_the_tip_leaves_a_choice_it_keeps_to_its_path_and_rates_are_those_of_q() -> None:
+    found = along_a_tip(1, "spline", "quintic", 0.5, 0.4, 0.3)
+    t, h = np.linspace(0.1, 1.3, 200), 1e-4
+    motion = found.motion
+    ahead, here, behind = (motion.moving(t + k * h) for k in (1, 0, -1))
+    np.testing.assert_allclose(here.rate, (ahead.q - behind.q) / (2 * h), atol=1e-5)
+    # q̈ is linear between two of the poses: across one a difference errs by h times a jump
+    np.testing.assert_allclose(here.acceleration, (ahead.rate - behind.rate) / (2 * h), atol=0.1)
+    x, y = (
+        np.cumsum([length * part(here.q[:, k]) for k, length in enumerate((0.5, 0.4, 0.3))], 0)[-1]
+        for part in (np.cos, np.sin)
+    )
+    wanted = motion.course_at(t).target(motion.course_at(t).s).point
+    np.testing.assert_allclose(np.stack([x, y], 1), wanted, atol=1e-7)
 
 
 def test_samples_move_by_the_spline_through_them() -> None:
