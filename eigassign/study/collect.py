@@ -148,30 +148,36 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
 def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     """What every drive exerts before and after; none where there is no weight and no motion."""
     file, path, g = scene.file, scene.path, scene.file.mechanism.gravity
-    curves = [scene.model.drives.curves(path, each) for each in (scene.initial, y)]
+    fine = path.finely  # peaks are between samples too
+    curves, along = (
+        [scene.model.drives.curves(each, design) for design in (scene.initial, y)]
+        for each in (path, fine)
+    )
     pull = scene.model.mass(y) * float(np.linalg.norm(g)) if isinstance(g, tuple) else 0.0
-    small = ROUND_OFF * max(pull, *(np.abs(curve).max(initial=0.0) for curve in curves))
-    curves = [np.where(np.abs(curve) > small, curve, 0.0) for curve in curves]
-    weights = time_weights(path)
+    small = ROUND_OFF * max(pull, *(np.abs(curve).max(initial=0.0) for curve in along))
+    curves, along = (
+        [np.where(np.abs(curve) > small, curve, 0.0) for curve in each] for each in (curves, along)
+    )
+    weights = time_weights(fine)
     weights = weights / weights.sum()
     of = WEIGHED if isinstance(g, tuple) else "the motion alone (gravity: none)"
     if g is None:
         of = "the motion alone (gravity is not stated)"
-    if not isinstance(g, tuple) and not any(curve.any() for curve in curves):
+    if not isinstance(g, tuple) and not any(curve.any() for curve in along):
         return ()
 
     def load(tau: Floats) -> DriveLoad:
         k = int(np.abs(tau).argmax())
-        where = path.where(k) if tau[k] else ""
+        where = fine.where(k) if tau[k] else ""
         return DriveLoad(abs(float(tau[k])), float(np.sqrt(weights @ tau**2)), where)
 
     def limit(name: str) -> float | None:
         return file.design.torque[name].max if name in file.design.torque else None
 
     return tuple(
-        DriveRow(name, unit, of, limit(name), load(before), load(after), before, after)
-        for name, unit, before, after in zip(
-            file.coordinates, file.drive_units, *(c.T for c in curves), strict=True
+        DriveRow(name, unit, of, limit(name), load(tau), load(tau_y), before, after)
+        for name, unit, tau, tau_y, before, after in zip(
+            *(file.coordinates, file.drive_units), *(c.T for c in (*along, *curves)), strict=True
         )
     )
 

@@ -28,9 +28,6 @@ from eigassign.modal.model import Model
 
 Path = Trajectories | None
 _MASS = "design.mass"
-# Instants of a motion at which what drives exert is known at least: its peak errs by the square of
-# their distance over 8, which of a quintic motion is 1e-4.
-FINELY = 200
 _NO_MODES = Frequencies(np.zeros((1, 0)), np.zeros((1, 0, 0)))
 
 
@@ -209,7 +206,7 @@ class CarriedLoad:
 
 
 class DriveLimit(LimitedQuantity):
-    """|τ| ≤ max of the drive of a coordinate at `FINELY` many instants; its amount is the peak."""
+    """|τ| ≤ max of the drive of a coordinate along `path.whole.finely`; its amount: the peak."""
 
     extreme = ("the least found is", "the least found is")
 
@@ -219,7 +216,7 @@ class DriveLimit(LimitedQuantity):
         if path is None or not file.design.torque:
             return
 
-        fine = path.whole.with_instants([_finely(part.trajectory.time_s) for part in path.parts])
+        fine = path.whole.finely
 
         @lru_cache(maxsize=1)  # all drives ask for the same design
         def loads(y: bytes) -> tuple[Ints, Floats, Floats]:
@@ -316,13 +313,6 @@ class LinearLimit(LimitedQuantity):
         """The same as a row of the program."""
         row = self.terms[0][0]
         return row if isinstance(row, LinearConstraint) else None
-
-
-def _finely(time_s: Floats) -> Floats:
-    """Instants that divide the steps of a motion evenly, into `FINELY` at least."""
-    pieces = -(-FINELY // max(len(time_s) - 1, 1))
-    shares = np.arange(1, pieces) / pieces
-    return np.asarray((time_s[:-1, None] + np.diff(time_s)[:, None] * shares).ravel())
 
 
 def _ends(low: float | None, high: float | None) -> tuple[float, float]:

@@ -56,6 +56,9 @@ _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+# Steps of a motion at least, where what drives exert is known: its peak errs by the square of
+# their size over 8, which of a quintic motion is 1e-4.
+FINELY = 200
 
 
 @dataclass(frozen=True, repr=False)
@@ -434,6 +437,11 @@ class Trajectories:
             )
         )
 
+    @cached_property
+    def finely(self) -> Trajectories:
+        """The same with each trajectory divided evenly into `FINELY` steps at least."""
+        return self.with_instants([_divided(part.trajectory.time_s) for part in self.parts])
+
     def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:
         """Some of the samples only, given by ascending numbers; no part that has none of them."""
         kept = np.asarray(samples, dtype=np.intp)
@@ -443,6 +451,12 @@ class Trajectories:
             if len(own):
                 parts.append(part._replace(trajectory=part.trajectory.chosen(own)))
         return Trajectories(tuple(parts), self.whole)
+
+
+def _divided(time_s: Floats) -> Floats:
+    pieces = -(-FINELY // max(len(time_s) - 1, 1))
+    shares = np.arange(1, pieces) / pieces
+    return np.asarray((time_s[:-1, None] + np.diff(time_s)[:, None] * shares).ravel())
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:

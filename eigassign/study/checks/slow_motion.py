@@ -67,7 +67,9 @@ def study_motion(
     given = np.flatnonzero(~scene.path.inserted)  # what targets ask between samples is no motion
     ends = np.cumsum([len(part.given.time_s) for part in parts])
     samples = np.split(given, ends[:-1])
-    timed = [(rates(part), own) for part, own in zip(parts, samples, strict=True) if len(own) >= 3]
+    timed = [
+        (rates(part.given), own) for part, own in zip(parts, samples, strict=True) if len(own) >= 3
+    ]
     if not timed:
         return None
     modes, limit = sorted({*scene.modes, *asked}), min(scene.file.validation.max_error, MOVED)

@@ -346,7 +346,8 @@ def finer_path(
         low = lowest_room(model, one, path, y)
         room = low.room
         if one.is_aim:  # what it has at samples is what counts
-            own = _Room(model, one, path.between(one.rows, y), y)(np.arange(len(one.lower)))
+            here = np.arange(len(one.lower), dtype=np.float64)
+            own = _Room(model, one, path.between(one.rows, y), y)(here)
             room = low.room / float(own.min()) - 1.0
         if room < -LIMIT:
             k = int(low.at)
