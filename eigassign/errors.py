@@ -62,10 +62,13 @@ class MechanismError(EigassignError):
 
 
 class TrajectoryError(MechanismError):
-    """The trajectory cannot be followed; ``sample`` is the first sample (0-based) that cannot."""
+    """The trajectory cannot be followed; ``sample`` is the first sample (0-based) that cannot.
 
-    def __init__(self, path: str, message: str, sample: int) -> None:
-        self.sample = sample
+    Between samples ``place`` says where: 1.5 is midway between the second and the third.
+    """
+
+    def __init__(self, path: str, message: str, sample: int, place: float | None = None) -> None:
+        self.sample, self.place = sample, place
         super().__init__(path, message)
 
 

@@ -331,14 +331,19 @@ class Trajectories:
     def between(self, rows: slice, y: Floats) -> Callable[[Floats], Floats]:
         """q (n, n_q) at places along some rows of one trajectory, at design y (n_y,).
 
-        Place 1.5 is midway in time between the second row and the third.
+        Place 1.5 is midway in time between the second row and the third. The poses raise
+        TrajectoryError with a place where that design cannot follow a path of its tip.
         """
         part, own = self._at(rows.start)
         time_s, known = self.time_s[rows], part.trajectory.at(y)[0]
         known = known[rows.start - own.start : rows.stop - own.start]
 
         def poses(at: Floats) -> Floats:
-            q = part.trajectory.motion.poses(np.interp(at, np.arange(len(time_s)), time_s), y)
+            try:
+                q = part.trajectory.motion.poses(np.interp(at, np.arange(len(time_s)), time_s), y)
+            except TrajectoryError as lost:
+                k = lost.sample
+                raise TrajectoryError(lost.path, lost.message, k, float(at[k])) from None
             on = at == np.rint(at)
             q[on] = known[at[on].astype(int)]
             return q

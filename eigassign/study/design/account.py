@@ -200,7 +200,9 @@ def _missed_between(
         except LostModeError as lost:
             yield f"{one.label} is not known between the samples: {lost}"
             continue
-        if error > (accepted if one.is_goal else LIMIT):
+        if error == np.inf:
+            yield f"{one.label} is not known between the samples: the tip cannot follow its path"
+        elif error > (accepted if one.is_goal else LIMIT):
             help_ = "give the trajectory more samples"
             if len(one.mode_terms) > 1 and error > CROSSED:
                 help_ = "its modes cross there; name them by their shapes"

@@ -32,7 +32,7 @@ from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.quantity import DriveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit
-from eigassign.errors import LostModeError, MissingMassError
+from eigassign.errors import LostModeError, MissingMassError, TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
@@ -73,7 +73,7 @@ def check_band(
     try:
         shape = next(shapes, None)
         return BandMotion(scene.model, band, below, q, y, raised, shape, poses).judged()
-    except LostModeError:
+    except (LostModeError, TrajectoryError):
         return ClearanceRow(band.label, below, False, 0.0, False, None)
 
 
@@ -263,7 +263,7 @@ def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
 def lowest_room(model: Model, asked: Requirement, path: Trajectories, y: Floats) -> Lowest:
     """The least room that a target leaves along its trajectories, relative, and the place of it.
 
-    At a design y (n_y,), within `WITHIN`. The room of a wanted
+    At a design y (n_y,), within `WITHIN`; −∞ where that cannot follow the path. That of a wanted
     frequency is its error, negative; that of what shall be highest is its frequency in Hz. Bands
     are checked for themselves, modes that are followed by their shape are known at samples only.
     """
@@ -278,7 +278,10 @@ def lowest_room(model: Model, asked: Requirement, path: Trajectories, y: Floats)
     for name, own in asked.along:
         part = asked.part(name, own)
         room = _Room(model, part, path.between(part.rows, y), y)
-        low = least_along(room, q[part.rows], WITHIN)
+        try:
+            low = least_along(room, q[part.rows], WITHIN)
+        except TrajectoryError as lost:
+            low = Lowest(-np.inf, lost.place or 0.0)
         found.append(Lowest(low.room, part.rows.start + low.at))
     return min(found)
 

@@ -119,9 +119,22 @@ def test_samples_keep_their_numbers_and_rates_where_instants_are_between_them() 
     (part,) = refined.parts
     assert part.trajectory.given is path.parts[0].trajectory
     np.testing.assert_array_equal(refined.q[~refined.inserted], path.q)
-    np.testing.assert_array_equal(refined.q[k], part.trajectory.motion.poses(np.array([0.5]))[0])
+    own = part.trajectory.motion.poses(np.array([0.5]))[0]
+    np.testing.assert_allclose(refined.q[k], own, rtol=1e-12)
     chord = 0.5 * (path.q[75] + path.q[76])  # 0.5 s is midway, and q bends by some 1e-5 rad
     assert 1e-7 < np.abs(refined.q[k] - chord).max() < 1e-4
+
+
+def test_what_holds_during_a_part_is_weighed_over_that_part_alone() -> None:
+    """152 samples a second: 0.03 s are four intervals and a half, and half of none beyond them."""
+    _, result, row = shipped("{mode: 1, frequency: 190 Hz, during: [0 s, 0.03 s]}")
+    (target,) = result.results.targets
+    time_s = result.results.time_s[target.asked.rows]
+    assert time_s[-1] == 0.03
+    error = (target.exact_hz / 190.0 - 1.0) ** 2
+    rms = np.sqrt(np.trapezoid(error, time_s) / 0.03)
+    assert target.error.exact.rms_relative == pytest.approx(rms, rel=1e-12)
+    assert row.objective_optimal == pytest.approx(rms**2, rel=1e-9)
 
 
 def test_rates_and_the_speed_of_the_motion_are_those_of_the_samples() -> None:
