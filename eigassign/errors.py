@@ -88,7 +88,8 @@ class MissingMassError(MechanismError):
         modes = f"only {most} modes" if most != 1 else "only 1 mode"
         super().__init__(
             "mechanism",
-            f"has {modes} whose mass is more than round-off: add mass, or ask for fewer modes",
+            f"has {modes} whose mass is more than round-off: add mass, ask for fewer modes, "
+            "or take a pose in which springs hold all that moves freely",
         )
 
 

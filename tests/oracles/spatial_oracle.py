@@ -591,23 +591,19 @@ class Builder:
 
     def add_spring(self, data: Tree, planar: bool) -> None:
         """Relative motion at the second node's place, the first end carried there rigidly."""
-        first, second = data["between"]
-        R = self.pose.R[first.split(".")[0]] @ mount(data)
-        here = self.pose.node(self.tree, first)
-        there = here if second == "ground" else self.pose.node(self.tree, second)
+        R = self.pose.R.get(data["between"][0].split(".")[0], np.eye(3)) @ mount(data)
+        nodes = [node for node in data["between"] if node != "ground"]
+        places = [self.pose.node(self.tree, node) for node in nodes]
         k = np.zeros(6)
         for key, at, axes in (("translational", 0, 3), ("rotational", 3, 3)):
             given = data.get(key, 0.0)
             kept = ([0, 1] if at == 0 else [2]) if planar else range(axes)
             for n, axis in enumerate(kept):
                 k[at + axis] = given[n] if np.ndim(given) else given
-        D = np.zeros((6, 12))
-        D[:, :6] = -carry(there - here)
-        dofs = np.arange(self.where[first], self.where[first] + 6)
-        if second != "ground":
-            D[:, 6:] = np.eye(6)
-            dofs = np.r_[dofs, self.where[second] : self.where[second] + 6]
-        D = np.kron(np.eye(2), R.T) @ D[:, : len(dofs)]
+        D = np.hstack([-carry(places[-1] - places[0]), np.eye(6)])
+        D = D[:, np.repeat([node != "ground" for node in data["between"]], 6)]
+        dofs = np.concatenate([self.where[node] + np.arange(6) for node in nodes])
+        D = np.kron(np.eye(2), R.T) @ D
         self.K.append((dofs, D.T @ np.diag(k) @ D))
 
     def add_joint(self, name: str) -> int:

@@ -9,7 +9,7 @@ with a displacement and a rotation vector for every node in world axes:
 * bodies and rigid links are carried by rotation matrices; joints close with the rotation matrices
   of their freedoms, which are unknowns; a rider stands on the shape of its beam, the mean of that
   on both its sides;
-* springs measure in axes that turn with their first node.
+* springs measure in axes that turn with their first node, which the ground does not.
 
 The internal forces n and the multipliers μ of joints are those of linear statics with every
 coordinate held, at the geometry without sag, so that with strains ε(x) and closures c(x)
@@ -351,10 +351,10 @@ class WeightBuilder(Builder):
     def add_spring(self, data: Tree, planar: bool) -> None:
         super().add_spring(data, planar)
         dofs, _ = self.K[-1]
-        first, second = data["between"]
-        R = self.pose.R[first.split(".")[0]] @ mount(data)
-        here = self.pose.node(self.tree, first)
-        arm = np.zeros(3) if second == "ground" else self.pose.node(self.tree, second) - here
+        moving = [node != "ground" for node in data["between"]]
+        R = self.pose.R.get(data["between"][0].split(".")[0], np.eye(3)) @ mount(data)
+        here, there = (self.pose.node(self.tree, node) for node in data["between"])
+        arm = (there - here) * float(all(moving))
         k = np.zeros(6)
         for key, at in (("translational", 0), ("rotational", 3)):
             given = data.get(key, 0.0)
@@ -362,12 +362,10 @@ class WeightBuilder(Builder):
                 k[at + axis] = given[n] if np.ndim(given) else given
 
         def stretched(x: Jet) -> Jet:
-            turn_1 = rotated(x[3:6])
-            apart = (x[6:9] - x[0:3] if len(dofs) == 12 else -x[0:3]) + arm
-            back = product("ji,j->i", turn_1, apart) - arm
-            twist = -vector_of(turn_1)
-            if len(dofs) == 12:
-                twist = vector_of(product("ji,jk->ik", turn_1, rotated(x[9:12])))
+            one, two = (each * float(m) for each, m in zip((x[:6], x[-6:]), moving, strict=True))
+            turn_1 = rotated(one[3:6])
+            back = product("ji,j->i", turn_1, two[0:3] - one[0:3] + arm) - arm
+            twist = vector_of(product("ji,jk->ik", turn_1, rotated(two[3:6])))
             return joined(by(R.T, back), by(R.T, twist))
 
         self.strained.append(Strained(dofs, stretched, np.diag(k)))

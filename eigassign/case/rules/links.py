@@ -223,11 +223,10 @@ def springs_join_two_nodes(tree: Tree) -> Iterator[Finding]:
     for name, spring in items(tree, "mechanism", "springs"):
         path: KeyPath = ("mechanism", "springs", name)
         ends = entries(spring, "between")
-        for k, end in enumerate(ends):
-            if isinstance(end, str) and not (k == 1 and end == "ground"):
-                ground = "write the ground second" if end == "ground" else None
-                if problem := ground or node_problem(tree, end):
-                    yield (*path, "between", k), problem
+        nodes = ((k, e) for k, e in enumerate(ends) if isinstance(e, str) and e != "ground")
+        for k, node in nodes:
+            if problem := node_problem(tree, node):
+                yield (*path, "between", k), problem
         if len(ends) == 2 and ends[0] == ends[1]:
             yield (*path, "between"), "both ends are the same node"
         if isinstance(spring, Mapping) and not {"translational", "rotational"} & set(spring):

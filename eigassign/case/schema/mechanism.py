@@ -78,10 +78,11 @@ class Spring(Part):
     that node against a rigid arm from the first.
 
     Keys:
-        between: two nodes, `<link>.<node>`, or one and `ground`
+        between: two nodes, `<link>.<node>`, or one and `ground`; its axes turn with the link of the
+            first, or stay the ground's
         translational: one number for all axes, or one for each
         rotational: one number for all axes, or one for each
-        angle: by which its axes are turned from those of the first node's link, in a plane
+        angle: by which its axes are turned from those of the first, in a plane
         orientation: the same in space, `[rx, ry, rz]`, R = Rz Ry Rx
     """
 

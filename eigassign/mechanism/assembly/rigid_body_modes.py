@@ -287,9 +287,9 @@ class _Resistance:
         paths = tuple(dict.fromkeys(self.springs))
         return MechanismError(
             "mechanism." + ".".join(paths[0].split(".")[:2]),
-            f"{' and '.join(paths)} hold {self._moved(left)} in one direction only, which turns "
-            "with the link that the spring names first. Give the springs stiffness in the other "
-            "directions, lock one of these coordinates, or give it a drive stiffness",
+            f"{' and '.join(paths)} hold {self._moved(left)} in one direction only, which "
+            "changes with the pose. Give the springs stiffness in the other directions, lock one "
+            "of these coordinates, or give it a drive stiffness",
         )
 
 

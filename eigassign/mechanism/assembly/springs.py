@@ -1,4 +1,4 @@
-"""Springs between two nodes, or from a node to the ground, along axes fixed in the first link.
+"""Springs between two nodes, or a node and the ground, along axes fixed in what is written first.
 
 The spring is stress-free in every pose; it resists the relative motion of its ends at the place of
 the second, k_t |v_2 − v_1 − ω_1 × d|² + k_r |ω_2 − ω_1|²: the first node reaches there by a rigid
@@ -116,10 +116,12 @@ class SpringEnds:
     ) -> SpringMotion:
         """Motion of both ends in the spring's axes, the first carried to the second."""
         here, there, arm = self.in_world(start), self.in_world(end), np.zeros(3, dtype=object)
-        if end != GROUND:
+        if GROUND not in (start, end):
             arm = self._place(end) - self._place(start)
             here = apply(carried(np.eye(3).astype(object), arm), here)
-        R = multiply(self.motion.placement(start[0]).world_rotation, mount)
+        R = mount  # in the ground, where that is first
+        if start != GROUND:
+            R = multiply(self.motion.placement(start[0]).world_rotation, mount)
         seen = carried(R, np.zeros(3, dtype=object))
         return SpringMotion(start, end, stiffness, apply(seen, here), apply(seen, there), R, arm)
 

@@ -92,7 +92,6 @@ JOINTS = [
     Wrong("turning springs in a plane", "rotational: 5,", "¦rotational: [5, 5],", "mechanism.springs.stop.rotational", "planar: one number, about z"),
     Wrong("spring on one node", "between: [slider.pin, bracket.tip]", "¦between: [slider.pin, slider.pin]", "mechanism.springs.stop.between", "both ends are the same node"),
     Wrong("spring from nowhere", "between: [slider.pin, bracket.tip]", "between: [¦slidr.pin, bracket.tip]", "mechanism.springs.stop.between[0]", "did you mean 'slider'"),
-    Wrong("spring from the ground", "between: [plate.right, ground]", "between: [¦ground, plate.right]", "mechanism.springs.soft.between[0]", "write the ground second"),
     Wrong("spring with one end", "between: [plate.right, ground]", "¦between: [plate.right]", "mechanism.springs.soft.between[1]", "entry 2 is missing"),
     Wrong("body offset of one number", "offset: [0, 50 mm]", "¦offset: [50 mm]", "mechanism.bodies.weight.offset", "needs 2 components"),
 ]
