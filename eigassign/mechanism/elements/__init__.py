@@ -8,6 +8,7 @@ Read in this order; each imports only from those above it:
     mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
     bodies         rigid links, point masses and rigid bodies at nodes
     sparse_factor  factors of symmetric definite sparse matrices, and their largest modes
+    solid_stress   k_σ of a solid part for each load on its nodes
     craig_bampton  fixed-interface modes instead of a link's interior dofs
     superelement   links from another finite-element program, or from the mesh of a solid part
     free_part      mass, inertia and free-free frequencies of a part, in words

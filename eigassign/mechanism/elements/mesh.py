@@ -91,6 +91,8 @@ class LinkMesh:
     strands: Sequence[Strand] = ()
     reduction: Reduction | None = None
     lost: Lost | None = None  # of solids
+    # of solids: k_σ of unit loads, see `solid_stress`, in a basis (n_local, n) where given
+    stressed: Callable[[Sequence[int], Floats | None], list[sparse.csr_array]] | None = None
 
     @property
     def whole(self) -> LinkMesh:

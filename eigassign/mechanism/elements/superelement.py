@@ -29,6 +29,7 @@ from eigassign.mechanism.elements.mesh import (
     chain_dofs,
     rigid_motion,
 )
+from eigassign.mechanism.elements.solid_stress import stressed
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.imports.parts import UNITS, imported_part, matrix_keys
 from eigassign.mechanism.kinematics.parameters import ModelParameters
@@ -204,6 +205,7 @@ def solid_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMe
         [_term(rho, part.mass[own][:, own]), *bodies.terms()],
         [Term(1.0, sparse.csr_array(part.rigid[own][:, kept]))],
         lost=Lost(E, rho, gram, lambda: part.lacked.one_layer),
+        stressed=lambda loads, basis: stressed(part, tuple(kept)).matrices(loads, basis),
     )
 
 

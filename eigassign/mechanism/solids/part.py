@@ -61,12 +61,13 @@ class SolidPart:
     stiffness: sparse.csr_array  # for E = 1, (n_local, n_local)
     mass: sparse.csr_array  # for ρ = 1
     rigid: Floats  # (n_local, 6)
-    held: Ints  # nodes of the mesh that its nodes stand for
+    nodes: tuple[Coupling, ...]  # what its nodes stand for
 
     @cached_property
     def lacked(self) -> Enriched:
         """The functions that its mesh lacks."""
-        return enriched(self.mesh, self.nu, self.held)
+        held = np.concatenate([each.own for each in self.nodes])
+        return enriched(self.mesh, self.nu, held)
 
 
 def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
@@ -145,11 +146,10 @@ def _made(
         K = K + assembled(stiffness(x, count, nu), to, to, (n, n))
         heavy = np.asarray(np.kron(mass(x, count), np.eye(3)))
         M = M + assembled(heavy, to, to, (n, n))
-    held = np.concatenate([each.own for each in given.values()])
     whole = rigid_rows(mesh.x)
     rigid = np.vstack([*(_at_node(each.place) for each in given.values()), whole[free]])
     K, M = (sparse.csr_array(T.T @ A @ T) for A in (K, M))
-    return SolidPart(mesh, nu, T, 0.5 * (K + K.T), 0.5 * (M + M.T), rigid, held)
+    return SolidPart(mesh, nu, T, 0.5 * (K + K.T), 0.5 * (M + M.T), rigid, tuple(given.values()))
 
 
 def _at_node(place: Floats) -> Floats:

@@ -123,11 +123,7 @@ class _Followers(NamedTuple):
 
 def _followers(mesh: SolidMesh, name: str, each: Coupling) -> _Followers:
     x, dofs = mesh.x[each.own], (3 * each.own[:, None] + np.arange(3)).ravel()
-    w, first = (
-        (np.full(len(x), 1.0 / len(x)), x / len(x)) if each.rigid else _moments(mesh, each.own)
-    )
-    arms, levers = x - w @ x, first - np.outer(w, w @ x)
-    J = (levers * arms).sum() * np.eye(3) - arms.T @ levers
+    w, _, levers, J = moments(mesh, each)
     values = np.linalg.eigvalsh(0.5 * (J + J.T))
     if not values[0] > ON_A_LINE * values[-1]:
         raise UnfitSurfaceError(
@@ -142,13 +138,26 @@ def _followers(mesh: SolidMesh, name: str, each: Coupling) -> _Followers:
             "smaller surface, or write coupling: rigid",
         )
     mean = np.kron(w, np.eye(3))
-    turn = np.linalg.solve(J, np.hstack([_crossed(lever) for lever in levers]))
-    B = np.vstack([mean - _crossed(each.place - w @ x) @ turn, turn])
+    turn = np.linalg.solve(J, np.hstack([crossed(lever) for lever in levers]))
+    B = np.vstack([mean - crossed(each.place - w @ x) @ turn, turn])
     size = np.append(np.ones(3), np.full(3, np.sqrt(values[-1])))[:, None]  # turns as lengths
     order = qr(B * size, mode="r", pivoting=True)[1]
     six, rest = np.sort(order[:6]), np.sort(order[6:])
     inverse = np.linalg.inv(B[:, six])
     return _Followers(dofs[six], dofs[rest], np.hstack([inverse, -inverse @ B[:, rest]]))
+
+
+def moments(mesh: SolidMesh, each: Coupling) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of a surface ∫ N_i dA (n,), arms s (n, 3), ∫ N_i s dA (n, 3) and J (3, 3).
+
+    Where it moves as one its nodes count alike.
+    """
+    x = mesh.x[each.own]
+    w, first = (
+        (np.full(len(x), 1.0 / len(x)), x / len(x)) if each.rigid else _moments(mesh, each.own)
+    )
+    arms, levers = x - w @ x, first - np.outer(w, w @ x)
+    return w, arms, levers, (levers * arms).sum() * np.eye(3) - arms.T @ levers
 
 
 def pieces(mesh: SolidMesh) -> int:
@@ -164,9 +173,9 @@ def pieces(mesh: SolidMesh) -> int:
 
 def rigid_rows(arms: Floats) -> Floats:
     """u = v + θ × r of points at arms r (n, 3): (3 n, 6)."""
-    return np.vstack([np.hstack([np.eye(3), -_crossed(arm)]) for arm in arms])
+    return np.vstack([np.hstack([np.eye(3), -crossed(arm)]) for arm in arms])
 
 
-def _crossed(a: Floats) -> Floats:
+def crossed(a: Floats) -> Floats:
     """[a]×"""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

@@ -55,8 +55,9 @@ from eigassign.mechanism.elements.beam import (
     fields,
     shear,
 )
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand
+from eigassign.mechanism.elements.mesh import Entries, Strand
 from eigassign.mechanism.elements.profiles import SHARES, STATIONS, BeamValues, Profile
+from eigassign.mechanism.elements.solid_stress import PAIRS
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -143,7 +144,7 @@ class StiffnessUnderLoad:
     inner: Ints  # dofs inside reduced links
     slots: Mapping[NodeName, Ints]  # the dofs (6,) of nodes among all, −1 where there is none
     sites: Sequence[NodeName]  # see `Loaded`
-    parts: Mapping[str, float]  # of imported links their own mass, kg; where ρ varies their volume
+    solids: Sequence[str]  # the links that are known by their meshes
     strands: Sequence[tuple[StackedElements, bool]]  # and whether they shear
     told: Sequence[NodeName]  # see `LoopsAtNodes`
     counted: Ints  # of all numbers in `Loads` those that are variables
@@ -156,7 +157,7 @@ class StiffnessUnderLoad:
         z = self.parameters.z(np.atleast_2d(x))
         poses: list[LoadedPose] = []
         for own, row in zip(z.T, zip(*self.at_rest(z), strict=True), strict=True):
-            now = _Numbers._make((row[:5], *row[5:10], row[10:]))
+            now = _Numbers._make((row[:5], *row[5:11], row[11:]))
             beams = [
                 Beams(elements, Alike(h, profile, sheared))
                 for (elements, sheared), h, profile in zip(
@@ -235,6 +236,7 @@ class _Numbers(NamedTuple):
     sites: Floats  # (n_sites, 6, 6)
     spring_stiffness: Floats  # (n_springs, 6)
     rotations: Floats  # (n_links, 3, 3)
+    densities: Floats  # of solids, kg/m³
     elements: Values  # of each strand lengths, and values
 
 
@@ -396,18 +398,18 @@ class _Acting:
         """What acts, an axis of the loads behind."""
         model, now = self.pose.model, self.pose.numbers
         received = np.asarray(self.pose.stiffness @ self.v - self.forces)
-        on_links = dict(zip(model.names, self.own, strict=True))
-        parts = {}
-        for name, mass in model.parts.items():
-            bodies = sum(wrench[:3] for at, (wrench, _) in self.carried.items() if at[0] == name)
-            parts[name] = (on_links[name][:3] - bodies) * (1.0 / mass if mass > 0.0 else 0.0)
+        turned = np.zeros((len(model.solids), 6, self.x.shape[1]))
+        if self.spin is not None:
+            for own, name, rho in zip(turned, model.solids, now.densities, strict=True):
+                w = _crossed(self.spin[model.names.index(name)])
+                own[:, 0] = [rho * (w @ w)[pair] for pair in PAIRS]
         stretched = np.asarray(self.pose.springs @ self.x).reshape(-1, 6, self.x.shape[1])
         springs = zip(now.spring_stiffness, stretched, strict=True)
         return Loads(
-            on_links,
+            dict(zip(model.names, self.own, strict=True)),
             {node: wrench for node, (wrench, _) in self.carried.items()},
             {node: D for node, (_, D) in self.carried.items()},
-            parts,
+            dict(zip(model.solids, turned, strict=True)),
             {n: k[:, None] * moved for n, (k, moved) in enumerate(springs)},
             {node: _picked(received, model.slots[node]) for node in model.told},
         )
@@ -443,8 +445,8 @@ def variable_loads(scene: Loaded) -> Loads:
     recorder, first = scene.known.recorder, itertools.count(scene.known.count)
     kept = DOFS[scene.nodes.space]
 
-    def wrench(size: int = 6) -> Objects:
-        found = [recorder.variable(next(first)) if d in kept else 0.0 for d in range(size)]
+    def wrench() -> Objects:
+        found = [recorder.variable(next(first)) if d in kept else 0.0 for d in range(6)]
         return np.array(found, dtype=object)
 
     def moments() -> Objects:
@@ -455,7 +457,7 @@ def variable_loads(scene: Loaded) -> Loads:
         {name: wrench() for name in scene.links},
         {node: wrench() for node in scene.sites},
         {node: moments() for node in scene.sites},
-        {name: wrench(3) for name in scene.imported},
+        {name: wrench() for name in scene.solids},
         {k: wrench() for k in range(len(scene.springs))},
         {node: wrench() for node in scene.settled.nodes},
     )
@@ -495,7 +497,7 @@ def stiffness_under_load(
         inner=_inner(scene, first),
         slots=_slots(scene, first),
         sites=tuple(scene.sites),
-        parts={name: _own_mass(scene.whole(name)) for name in scene.imported},
+        solids=tuple(scene.solids),
         strands=list(zip(elements, sheared, strict=True)),
         told=scene.settled.nodes,
         counted=counted,
@@ -517,6 +519,7 @@ def _scalars(
     yield np.array(list(scene.sites.values()), dtype=object).reshape(-1, 6, 6)
     yield np.array([one.stiffness for one in scene.springs], dtype=object).reshape(-1, 6)
     yield np.array([p.world_rotation for p in scene.motion.placements])
+    yield np.array(list(scene.solids.values()), dtype=object)
     for _, strand in strands:
         values = [[[0.0 if v is None else v for v in b] for b in each] for each in strand.profiles]
         yield np.array(strand.lengths, dtype=object)
@@ -549,12 +552,6 @@ def _relative(scene: Loaded, n_dof: int) -> Entries:
             own = np.array(list(apart), dtype=np.intp)
             out.add_scalars(list(apart.values()), np.full(len(own), row), own)
     return out
-
-
-def _own_mass(mesh: LinkMesh) -> float:
-    """Mass of a part that is known by its matrices, without bodies; where ρ varies its volume."""
-    along = np.sum([t.matrix.toarray()[:, 0] for t in mesh.rigid], axis=0)
-    return float(along @ (mesh.mass[0].matrix @ along))
 
 
 def _collected(K: AffineEntries, n_u: int, recorder: Recorder, n_dof: int) -> Pattern:

@@ -1,25 +1,27 @@
-"""Geometric stiffness of a part that is known by its matrices alone: a strut between its nodes.
+"""Geometric stiffness of imported parts: of a solid that of its stress, else that of a strut.
 
-Its strains are those of the displacements v against a frame that turns by φ, the rotation that fits
-the motion of the nodes best (about a line that they all lie on, their mean turn). To second order
-the wrenches (F, M) on its nodes at X and its own weight, M r g on all its dofs, do the work
+What acts on the nodes is in balance with the inertia of the part, or its weight. A part known by
+its matrices alone is a strut between its nodes. Its strains are those of the displacements v
+against a frame that turns by φ, the rotation that fits the motion of the nodes best (about a line
+that they all lie on, their mean turn). To second order the wrenches (F, M) on its nodes at X and
+its own weight, M r g on all its dofs, do the work
 
     Σ [F · (−φ × v + φ × (φ × X)/2) − M · (φ × θ)/2] + vᵀ M r (φ × g) + m g · (φ × (φ × c))/2,
 
-r its translations and c its centre of mass. What bends between the nodes under the forces inside
-is left out.
+r its translations, c its centre of mass and g = −Σ F/m. What bends between the nodes under the
+forces inside is left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy import sparse
 
 from eigassign.mechanism.elements.mesh import LinkMesh, Term
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, some
-from eigassign.series.expression import Scalar
+from eigassign.series.expression import Scalar, one_atom
 
 ON_A_LINE = 1e-6  # of the nodes' second moment, about an axis that they do not turn about
 AXES = np.eye(3)
@@ -27,17 +29,32 @@ AXES = np.eye(3)
 CROSSED = np.cross(AXES[:, None], AXES[None]).transpose(2, 0, 1)
 
 
-def strut_terms(
-    mesh: LinkMesh, wrenches: Sequence[tuple[str, Objects]], g: Objects, space: str
+def imported_terms(
+    mesh: LinkMesh, wrenches: Sequence[tuple[str, Objects]], spin: Objects | None, space: str
 ) -> list[Term]:
-    """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes and g, m/s².
+    """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes.
 
-    g is times the coefficient of the part's own mass: the density of a solid.
+    ``spin`` (6,) is of solids, ρ ω̃ ω̃: xx, yy, zz, xy, xz, yz.
     """
+    found: dict[str, Objects] = {}
+    for name, wrench in wrenches:
+        found[name] = found.get(name, np.zeros(6, dtype=object)) + wrench
+    if mesh.whole.stressed is None:
+        return _strut_terms(mesh, found, space)
+    still = np.zeros(6, dtype=object)
+    each = [found.get(name, still) for name in mesh.whole.nodes]
+    loads = np.concatenate([*each, still if spin is None else spin])
+    acting = [k for k, load in enumerate(loads) if some(load)]
+    basis = None if mesh.reduction is None else mesh.reduction.basis
+    matrices = mesh.whole.stressed(acting, basis) if acting else []
+    return [Term(one_atom(loads[k]), A) for k, A in zip(acting, matrices, strict=True)]
+
+
+def _strut_terms(mesh: LinkMesh, wrenches: Mapping[str, Objects], space: str) -> list[Term]:
     moved, of_nodes = _motions(mesh)
     kept = [d - 3 for d in DOFS[space] if d >= 3]
     phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)
-    Mr, first = _momentum(mesh, space)
+    Mr, first, m = _momentum(mesh, space)
     out: list[Term] = []
 
     def add(coefficient: Scalar, columns: Floats) -> None:
@@ -45,16 +62,14 @@ def strut_terms(
             matrix = sparse.csr_array(columns) @ of_nodes.T
             out.append(Term(coefficient, sparse.csr_array(matrix + matrix.T)))
 
-    for name, wrench in wrenches:
+    for name, wrench in wrenches.items():
         v, theta = moved[name][:3], moved[name][3:]
         X = mesh.positions[name].astype(float)
         for axis in range(3):
-            lever = _turned_twice(phi, X, axis) - _mixed(axis, phi, v)
-            add(wrench[axis], of_nodes @ lever)
+            lever = _turned_twice(phi, X - first / m, axis) - _mixed(axis, phi, v)
+            turned = Mr.T @ (CROSSED[:, :, axis] @ phi) / m
+            add(wrench[axis], of_nodes @ lever - turned)
             add(wrench[3 + axis], of_nodes @ (-0.5 * _mixed(axis, phi, theta)))
-    for axis in range(3):
-        turned = Mr.T @ (CROSSED[:, :, axis] @ phi)
-        add(g[axis], turned + of_nodes @ _turned_twice(phi, first, axis))
     return out
 
 
@@ -94,14 +109,16 @@ def _rotation(nodes: Sequence[tuple[Floats, Floats]], kept: Sequence[int]) -> Fl
     return np.asarray(whole @ np.array(each))
 
 
-def _momentum(mesh: LinkMesh, space: str) -> tuple[Floats, Floats]:
-    """(M r)ᵀ (3, n_local) of the part's own mass, and its first moment m c (3,)."""
-    whole = mesh if mesh.reduction is None else mesh.reduction.mesh
-    kept = list(DOFS[space])
+def _momentum(mesh: LinkMesh, space: str) -> tuple[Floats, Floats, float]:
+    """(M r)ᵀ (3, n_local) of the part, its first moment m c (3,), and m, all without bodies.
+
+    A part without mass has no weight.
+    """
+    whole, kept = mesh.whole, list(DOFS[space])
     N = np.zeros((whole.n_local, 6))
     N[:, kept] = sum(term.matrix.toarray() for term in whole.rigid)
     Mr = np.asarray(whole.mass[0].matrix @ N[:, :3])
-    B = N[:, 3:].T @ Mr  # θ · (m c × a)
+    B, m = N[:, 3:].T @ Mr, float(N[:, 0] @ Mr[:, 0])  # θ · (m c × a)
     if mesh.reduction is not None:
         Mr = mesh.reduction.basis.T @ Mr
-    return Mr.T, np.array([B[2, 1], -B[2, 0], -B[0, 1]])
+    return Mr.T, np.array([B[2, 1], -B[2, 0], -B[0, 1]]), m or 1.0

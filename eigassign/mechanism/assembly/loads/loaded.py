@@ -19,7 +19,6 @@ from eigassign.mechanism.elements.mesh import Entries, LinkMesh, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,
-    is_imported,
     link_type,
     node_position,
 )
@@ -31,6 +30,7 @@ from eigassign.mechanism.kinematics.topology import (
     Topology,
     split,
 )
+from eigassign.series.expression import Scalar
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,10 @@ class Loaded:
         return summed(own.terms(), 6)
 
     @property
-    def imported(self) -> list[str]:
-        """The links that are known by their matrices."""
-        return [name for name in self.links if is_imported(self.case, name)]
+    def solids(self) -> dict[str, Scalar]:
+        """The densities of the links that are known by their meshes."""
+        lost = {name: self.whole(name).lost for name in self.links}
+        return {name: each.density for name, each in lost.items() if each is not None}
 
     def sites_of(self, name: str) -> list[NodeName]:
         """The nodes of a link that carry bodies."""

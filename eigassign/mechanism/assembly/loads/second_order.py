@@ -17,7 +17,7 @@ from eigassign.mechanism.assembly.loads.curvature import (
     add_spring,
     end_strains,
 )
-from eigassign.mechanism.assembly.loads.imported import strut_terms
+from eigassign.mechanism.assembly.loads.imported import imported_terms
 from eigassign.mechanism.assembly.loads.loaded import Loaded
 from eigassign.mechanism.assembly.loads.statics import Loads, Statics, handed, statics
 from eigassign.mechanism.assembly.node_motion import (
@@ -46,7 +46,7 @@ def add_second_order(K: AffineEntries, scene: Loaded, loads: Loads) -> Statics:
     for name, link in scene.links.items():
         if is_imported(scene.case, name):
             mesh, wrenches = scene.nodes.meshes[name], on_nodes(scene, found, loads, name)
-            terms = strut_terms(mesh, wrenches, loads.on_parts[name], scene.nodes.space)
+            terms = imported_terms(mesh, wrenches, loads.in_solids.get(name), scene.nodes.space)
             add_stressed(K, link, terms, scene.nodes.count)
         for node in scene.sites_of(name):
             D = loads.arms[node]

@@ -46,7 +46,7 @@ class Loads:
     on_links: Mapping[str, Any]  # wrench (6,) of all that a link and its bodies bear, at its origin
     on_sites: Mapping[NodeName, Any]  # wrench (6,) of what a site carries, about it
     arms: Mapping[NodeName, Any]  # D = ∫ dF rᵀ (3, 3) of what a site carries, r from there
-    on_parts: Mapping[str, Any]  # an imported part's acceleration (3,) × coefficient of its mass
+    in_solids: Mapping[str, Any]  # ρ ω̃ ω̃ (6,): xx, yy, zz, xy, xz, yz
     in_springs: Mapping[int, Any]  # wrench (6,) on the first end
     received: Mapping[NodeName, Any]  # (6,) by nodes of `LoopsAtNodes` from joints and springs
 

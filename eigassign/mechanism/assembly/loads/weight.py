@@ -70,7 +70,7 @@ def weight_loads(scene: Loaded, g: Mapping[str, Objects], coarse: Callable[[], L
         on_links,
         {node: multiply(m[:, :3], g[node[0]]) for node, m in scene.sites.items()},
         {node: np.outer(g[node[0]], first_moment(m)) for node, m in scene.sites.items()},
-        {n: scaled(g[n], scene.whole(n).mass[0].coefficient) for n in scene.imported},
+        {},
         {k: sag.in_spring(k) for k in range(len(scene.springs))} if sag else {},
         {node: sag.received(node) for node in scene.settled.nodes} if sag else {},
     )
