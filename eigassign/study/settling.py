@@ -170,7 +170,7 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
         return None
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
     upright = whole
-    if whole.pencil.weight is not None:  # inside imported parts it changes nothing
+    if whole.pencil.weight is not None:  # inside imported parts it changes little
         at_nodes = {n: LOWEST if is_imported(file, n) else None for n in names}
         upright = build_model(with_reduction(file, at_nodes), links)
     path, q0 = _path(file, upright)
