@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.modal.model import Model
-from eigassign.modal.under_load import STANDARD_GRAVITY, buckling, sag_of_nodes, weight_changes
+from eigassign.modal.under_load import (
+    STANDARD_GRAVITY,
+    buckling,
+    sag_of_nodes,
+    strut_error,
+    weight_changes,
+)
 from eigassign.study.results import SagRow, WeightRow
 
 Floats = NDArray[np.float64]
@@ -90,7 +96,8 @@ def _row(
     rows.sort(key=lambda one: -one.most)
     share = float(buckling(model, q, y).max())
     known = share if np.isfinite(share) else None
-    return replace(row, sag=tuple(rows), turn=turn, buckling=known)
+    struts = strut_error(model, q, y, modes)
+    return replace(row, sag=tuple(rows), turn=turn, buckling=known, struts=struts)
 
 
 def weight_doubt(
@@ -109,6 +116,8 @@ def weight_doubt(
         yield "the effect of gravity is not known"
     if row is not None and _bent(row) > accepted:
         yield f"{_large(row)}, and {100 * accepted:.3g} % are accepted"
+    if row is not None and row.struts is not None and row.struts > accepted:
+        yield f"{_struts(row.struts)}, and {100 * accepted:.3g} % are accepted"
     if file.design.torque and file.mechanism.gravity is None:
         yield (
             "the drives have limits, and carry a weight that the case does not state"
@@ -122,6 +131,8 @@ def _warnings(file: CaseFile, row: WeightRow) -> Iterator[str]:
         yield f"{said}{_advice(file)}"
     if _bent(row) > WARNED:
         yield _large(row)
+    if row.struts is not None and row.struts > WARNED:
+        yield _struts(row.struts)
     if row.buckling is not None and row.buckling > NEAR_BUCKLING:
         most = f"above {100 * NEAR_BUCKLING:g} % frequencies that are linear in it are inaccurate"
         yield f"{_share(row.buckling)}: {most}"
@@ -150,6 +161,13 @@ def _share(buckling: float) -> str:
     return f"the weight is {100 * buckling:.3g} % of the buckling load"
 
 
+def _struts(error: float) -> str:
+    return (
+        "imported matrices have no stress inside, and are struts under the weight: frequencies may "
+        f"be off by about {100 * max(error, SAID):.2g} %"
+    )
+
+
 def _bent(row: WeightRow) -> float:
     """What is of second order in the turns of the links, relative."""
     return 0.0 if row.turn is None else BENT * row.turn**2
@@ -176,3 +194,5 @@ def _of_whole(row: WeightRow) -> Iterator[str]:
         yield f"{row.sag[0].node} sags by {row.sag[0].most:.3g} m under the weight"
     if row.buckling is not None:
         yield _share(row.buckling)
+    if row.struts is not None:
+        yield _struts(row.struts)

@@ -46,7 +46,8 @@ def add_second_order(K: AffineEntries, scene: Loaded, loads: Loads) -> Statics:
     for name, link in scene.links.items():
         if is_imported(scene.case, name):
             mesh, wrenches = scene.nodes.meshes[name], on_nodes(scene, found, loads, name)
-            terms = imported_terms(mesh, wrenches, loads.in_solids.get(name), scene.nodes.space)
+            spin, space = loads.in_solids.get(name), scene.nodes.space
+            terms = imported_terms(mesh, wrenches, spin, space, scene.bent)
             add_stressed(K, link, terms, scene.nodes.count)
         for node in scene.sites_of(name):
             D = loads.arms[node]
