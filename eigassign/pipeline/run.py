@@ -43,6 +43,7 @@ from eigassign.study.comparison import (
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
+from eigassign.study.design.proof import proof
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.pictures.drawing import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
@@ -152,7 +153,10 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
             meaning = study_meaning(scene, answer, wanted, solved.exact, accepted, asked)
-    found = VerifiedAssignment(answer, tuple(wanted), targets, solved, meaning)
+            bound = None
+            if answer.found is not None and asked is not Studies.NONE:
+                bound = proof(scene, answer.found, thorough=asked is Studies.ALL)
+    found = VerifiedAssignment(answer, tuple(wanted), targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
     results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s)
     return _result(results, scene.expanded, answer.one_shot)

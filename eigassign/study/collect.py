@@ -38,6 +38,7 @@ from eigassign.study.results import (
     MassRow,
     Meaning,
     Motion,
+    OptimalityRow,
     OtherModes,
     RunResults,
     StaticRow,
@@ -59,6 +60,7 @@ class VerifiedAssignment:
     targets: tuple[TargetStudy, ...]
     solved: SolvedDesigns
     meaning: Meaning
+    bound: OptimalityRow | None = None
 
 
 def collect_results(
@@ -115,7 +117,7 @@ def _with_answer(
     motion = study_motion(scene, answer.y, assigned.solved.exact.hz, judged)
     row = assignment_row(
         *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
-        *(results.discretisation, results.weight, motion, meaning.unreachable),
+        *(results.discretisation, results.weight, motion, meaning.unreachable, assigned.bound),
     )
     reach = reach if answer.found is None else ()
     slow, fast = ("", None) if motion is None else (motion.note, motion.warning)

@@ -1,12 +1,12 @@
-"""Parameters in which every frequency is monotone: added masses lower it, springs raise it.
+"""Parameters in which every frequency is monotone: masses lower it, stiffnesses raise it.
 
-K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs and drives, and masses
-and inertias m of bodies and drives, A_i and B_j positive semidefinite at every pose. By the
-min-max principle every λ grows with each k and falls with each m, so that over a box of them the
-least and largest frequency are those of two corners: two exact solves a pose. With gravity masses
-are weights, too, and springs share the load: of neither anything is known then. Nor of inertias
-where a coordinate is free: elastic modes move it along the more the less inertia it has, and what
-the weight does along that way is in K (see `apart_from_rigid`).
+K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs and drives and moduli of
+materials, and in masses, inertias and densities m, A_i and B_j positive semidefinite at every pose.
+By the min-max principle every λ grows with each k and falls with each m, so that over a box of them
+the least and largest frequency are those of two corners: two exact solves a pose. With gravity
+masses are weights, too, and springs and links share the load: of neither anything is known then.
+Nor of inertias where a coordinate is free: elastic modes move it along the more the less inertia it
+has, and what the weight does along that way is in K (see `apart_from_rigid`).
 """
 
 from __future__ import annotations
@@ -30,32 +30,60 @@ MOST_SIDES = 6  # of a box with at most 64 corners, as many as a tolerance study
 
 def effects(file: CaseFile) -> Floats:
     """+1 for each parameter (n_y,) that raises every frequency, −1 that lowers it, 0 unknown."""
-    weighs = isinstance(file.mechanism.gravity, tuple)
-    loose = weighs and any(c.moves == "free" for c in file.coordinates.values())
-    columns = file.design.parameters.values()
-    return np.array([_common(column.factors, weighs, loose) for column in columns])
+    return np.array([_common(file, column.factors) for column in file.design.parameters.values()])
 
 
-def _common(factors: Mapping[str, float], weighs: bool, loose: bool) -> float:
+def _common(file: CaseFile, factors: Mapping[str, float]) -> float:
     """The effect of all properties of a parameter, where it is the same; else unknown."""
-    found = {np.sign(f) * _effect(path, weighs, loose) for path, f in factors.items()}
+    found = {np.sign(factor) * _effect(file, path) for path, factor in factors.items()}
     return found.pop() if len(found) == 1 else 0.0
 
 
-def _effect(path: str, weighs: bool, loose: bool) -> float:
-    group, _, *rest = path.split(".")
-    if weighs and (group == "springs" or rest == ["mass"]):  # loads and their shares change, too
+def _effect(file: CaseFile, path: str) -> float:
+    weighs = isinstance(file.mechanism.gravity, tuple)
+    loose = weighs and any(c.moves == "free" for c in file.coordinates.values())
+    group, name, *rest = path.split(".")
+    if weighs and (group in ("springs", "materials") or rest == ["mass"]):  # loads change, too
         return 0.0
     if loose and rest[-1] in MOMENTS:
         return 0.0
     match group, ".".join(rest):
-        case "bodies", "mass":
+        case ("bodies" | "links", "mass") | ("materials", "density"):
             return -1.0
-        case "bodies" | "coordinates", _ if rest[-1] in MOMENTS:
+        case "bodies" | "links" | "coordinates", _ if rest[-1] in MOMENTS:
             return -1.0
         case ("springs", "translational" | "rotational") | ("coordinates", "drive.stiffness"):
             return 1.0
+        case "materials", "youngs_modulus":  # with a G of its own a shear beam's M changes
+            return float(file.mechanism.materials[name].shear_modulus is None)
     return 0.0
+
+
+# By shape what makes A, I, J and I_p of a section grow; of shear beams it changes shapes, too
+GROWING = {
+    "bare": {"area", "bending_inertia", "inertia_y", "inertia_z", "torsion_constant"},
+    "circle": {"diameter"},
+    "tube": {"outer_diameter", "thickness"},
+    "rectangle": {"width", "height"},
+}
+
+
+def growing(file: CaseFile) -> NDArray[np.bool_]:
+    """The parameters (n_y,) with which K and M do not fall, one of them as in `effects` or both."""
+    mechanism = file.mechanism
+    links = mechanism.links.values()
+    plain = not isinstance(mechanism.gravity, tuple)
+    plain = plain and not any(getattr(link, "shear", False) for link in links)
+
+    def grows(path: str, factor: float) -> bool:
+        group, name, *rest = path.split(".")
+        if group != "sections":
+            return factor > 0.0 and _effect(file, path) != 0.0
+        shape = mechanism.sections[name].shape
+        return factor > 0.0 and plain and rest[0] in GROWING.get(shape, ())
+
+    columns = file.design.parameters.values()
+    return np.array([all(grows(*each) for each in column.factors.items()) for column in columns])
 
 
 def corners(file: CaseFile, y: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from eigassign.assignment.catalogues.branching import CatalogueSearch
 from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, ON, Appraisal
-from eigassign.assignment.exact.optima import NOTHING
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.exact.sequential import OPTIMAL, End
+from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.brief import counted
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
 from eigassign.study.checks.mesh import finer, model_errors, raised_by
@@ -61,12 +61,13 @@ def assignment_row(
     weight: WeightRow | None,
     motion: MotionStudy | None,
     unreachable: Sequence[str] = (),
+    bound: OptimalityRow | None = None,
 ) -> AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers.
 
     ``exact`` are its frequencies, ``mesh`` is the mesh's error there and ``weight`` what gravity
     changes that is not in them; ``unreachable`` says in words which targets are out of reach within
-    the bounds.
+    the bounds, ``bound`` what is proved of the optimum.
     """
     keys, found = scene.file.assignment, answer.found
     initial, optimal = _merits(answer, targets)
@@ -87,7 +88,7 @@ def assignment_row(
         open_ = {one.name for one in scene.limits if not one.is_decided}
         if open_.intersection(answer.conflict.names):
             answer = replace(answer, conflict=None)
-    optimality = _optimality(scene, answer)
+    optimality = _optimality(scene, answer, bound)
     conflicting = () if answer.conflict is None else answer.conflict.names
     unproved = () if found is None else tuple(_why_unproved(scene, found))
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
@@ -408,7 +409,8 @@ def _merits(
     return (0.0, before), (0.0, after)
 
 
-def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
+def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> OptimalityRow:
+    """How good the optimum is known to be."""
     found, one_shot = answer.found, answer.one_shot
     if found is None:
         search = one_shot and one_shot.search
@@ -433,29 +435,26 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     if chosen is not None:
         words = f"the best found of {chosen.count} combinations of the catalogues; {best.end.value}"
         return OptimalityRow("local", best.stationarity, None, words)
-    words = _of_starts(found)
+    if bound is not None and bound.kind == "proved":
+        return bound
+    row = OptimalityRow("local", best.stationarity, None, "")
+    row = row if bound is None or bound.kind == "local" else bound
+    words = _of_starts(found) + ("" if bound is None else f"; {bound.words}")
     if found.untried:
         words += f"; {found.untried} choices of how many modes are below the bands were not tried"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
-    return OptimalityRow("local", best.stationarity, None, words)
+    return replace(row, words=words)
 
 
 def _of_starts(found: Found) -> str:
-    """Say how many optima the starts led to, and how many more are to be expected."""
-    best, tally = found.best, found.tally
+    """Say how many optima the starts led to, and whether more are to be expected."""
+    tally = found.tally
     if tally is None or not tally.optima:
-        return f"the best design that {found.starts} start{'s' * (found.starts > 1)} led to"
-    many = f"{tally.starts} start{'s' * (tally.starts > 1)}"
-    which = f"best of {tally.optima} local optima" if tally.optima > 1 else "only local optimum"
-    words = f"the {which} that {many} found"
-    exact = found.variant.problem.is_error and best.seen.violation <= MET
-    if exact and best.objective <= NOTHING:
-        return f"{words}; all targets are met, so that no design is better"
-    if not np.isfinite(tally.unseen):
-        return f"{words}; too few starts to estimate how many more there are"
-    unseen = f"{tally.unseen:.1g}" if tally.unseen < 1.0 else f"{tally.unseen:.0f}"
-    return f"{words}; about {unseen} others may not have been found"
+        return f"the best design that {counted(found.starts, 'start')} led to"
+    which = f"best of {tally.optima} different optima" if tally.optima > 1 else "only optimum"
+    further = "; raise `starts` to look further" if tally.unseen > PAYS else ""
+    return f"the {which} from {counted(tally.starts, 'start')}{further}"
 
 
 def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:

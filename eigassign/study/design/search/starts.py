@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
 from eigassign.assignment.exact.optima import FINISHED, NOTHING, Tally, with_end
-from eigassign.assignment.exact.sequential import PAYS, End, Optimum, minimise, worth
+from eigassign.assignment.exact.sequential import PAYS, ROUND_OFF, End, Optimum, minimise, worth
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.search.response import ReducedModels
@@ -175,12 +175,13 @@ def continued(before: Optimum, found: Optimum) -> Optimum:
 def _is_enough(search: Searched) -> bool:
     """True where more starts are not expected to lead to more optima, or exact solves are used up.
 
-    No errors at all cannot be improved; what is no error, such as a price, can.
+    No errors at all cannot be improved, nor what is cheapest of all within the bounds.
     """
     if search.tally is None:
         return False
-    violation, value = worth(search.optima[0])
-    if search.variant.problem.is_error and violation <= MET and value <= NOTHING:
+    (violation, value), problem = worth(search.optima[0]), search.variant.problem
+    least = problem.least_value(problem.lower, problem.upper, np.zeros(0))
+    if violation <= MET and value <= least + ROUND_OFF * abs(least) + NOTHING:
         return True
     return search.tally.unseen <= PAYS or search.variant.response.exact_solves > SOLVES
 

@@ -1,0 +1,127 @@
+"""No design is below what is proved: random small problems against fine grids of designs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from eigassign.case import parse
+from eigassign.pipeline import Options, solve_case
+from eigassign.study import BuiltCase
+
+SEEDS = int(os.environ.get("EIGASSIGN_PROOFS", "4"))  # 50 were tried
+TEXT = (Path(__file__).parents[3] / "cases" / "two_link.yaml").read_text()
+ALL = Options(use_cache=False, study="all", report="none")
+PARAMETERS: dict[str, tuple[str, float, float]] = {
+    "m1": ("bodies.elbow_mass.mass", 0.05, 0.5),
+    "m2": ("bodies.tool_mass.mass", 0.0, 0.5),
+    "k1": ("coordinates.q1.drive.stiffness", 1e4, 1e5),
+    "k2": ("coordinates.q2.drive.stiffness", 5e3, 5e4),
+    "E": ("materials.aluminium.youngs_modulus", 6e10, 2.1e11),
+    "rho": ("materials.aluminium.density", 2000.0, 8000.0),
+    "A": ("sections.rod.area", 4e-4, 1.2e-3),
+}
+KINDS = ("least_squares", "worst_case", "highest", "lightest", "priced")
+
+
+def built(tree: dict[str, Any]) -> BuiltCase:
+    return BuiltCase(parse(yaml.safe_dump(tree).encode(), "case.yaml"))
+
+
+def random_problem(seed: int) -> tuple[dict[str, Any], str]:
+    """The arm on drives, two or three parameters, an objective, limits that some design keeps."""
+    rng, kind = np.random.default_rng([seed, 40]), KINDS[seed % len(KINDS)]
+    tree: dict[str, Any] = yaml.safe_load(TEXT)
+    for name, stiffness in (("q1", 4e4), ("q2", 2e4)):
+        tree["coordinates"][name]["drive"] = {"stiffness": stiffness}
+    tree["mechanism"]["bodies"]["elbow_mass"]["mass"] = 0.2
+    names = rng.permutation(list(PARAMETERS))[: 2 + seed // 5 % 2].tolist()
+    tree["trajectory"]["samples"] = int(rng.integers(2, 6))
+    keys = ("parameter", "min", "max")
+    tree["design"] = {name: dict(zip(keys, PARAMETERS[name], strict=True)) for name in names}
+    tree = {key: tree[key] for key in tree if key not in ("expansion", "validation")}
+    tree["targets"] = [{"mode": 1, "at_least": "1 Hz"}]
+    case = built(tree)
+    lower, upper = np.array(case.file.box).T
+    y = lower + rng.uniform(0.1, 0.9, len(lower)) * (upper - lower)
+    hz = case.model().frequencies(case.trajectory.q, y, 2)
+    limit = {"mode": 2, "at_least": f"{0.97 * hz[:, 1].min():.5g} Hz"}
+    tree["assignment"] = {"objective": kind}
+    if kind in ("least_squares", "worst_case"):
+        wanted = {"mode": 1, "frequency": f"{rng.uniform(0.9, 1.1) * hz[:, 0].mean():.5g} Hz"}
+        tree["targets"] = [wanted, limit][: 1 + seed // 10 % 2]
+    elif kind == "highest":
+        tree["targets"] = [{"mode": 2, "at_most": f"{1.03 * hz[:, 1].max():.5g} Hz"}]
+        tree["assignment"] = {"objective": {"highest": 1}}
+    else:
+        tree["targets"] = [{"mode": 1, "at_least": f"{0.98 * hz[:, 0].min():.5g} Hz"}, limit]
+    if kind == "priced":
+        tree["assignment"] = {}
+        for name, width in zip(tree["design"], upper - lower, strict=True):
+            tree["design"][name]["price"] = float(rng.uniform(0.2, 1.0) / width)
+    return tree, kind
+
+
+def grid_best(case: BuiltCase, kind: str, points: int) -> float:
+    """The least objective of all designs of a grid that keep the limits."""
+    box, model, q = np.array(case.file.box), case.model(), case.trajectory.q
+    grid = np.stack(np.meshgrid(*(np.linspace(*ends, points) for ends in box)), -1)
+    y = grid.reshape(-1, len(box))
+    hz = model.frequencies(np.tile(q, (len(y), 1)), np.repeat(y, len(q), axis=0), 2)
+    hz = hz.reshape(len(y), len(q), 2)
+    kept, error = np.ones(len(y), dtype=bool), np.zeros(hz.shape[:2])
+    for one in case.file.targets:
+        own = hz[:, :, one.mode - 1]
+        if hasattr(one, "at_least"):
+            kept &= (own >= one.at_least).all(axis=1)
+        elif hasattr(one, "at_most"):
+            kept &= (own <= one.at_most).all(axis=1)
+        else:
+            error = own / one.frequency - 1.0
+    apart = np.diff(case.trajectory.time_s)
+    weights = 0.5 * (np.append(apart, 0.0) + np.append(0.0, apart))
+    prices = np.array([p.price or 0.0 for p in case.file.design.parameters.values()])
+    values = {
+        "least_squares": lambda: error**2 @ weights / weights.sum(),
+        "worst_case": lambda: np.abs(error).max(axis=1),
+        "highest": lambda: -hz[:, :, 0].min(axis=1),
+        "lightest": lambda: np.array([model.mass(each) for each in y]),
+        "priced": lambda: (y - case.initial_design) @ prices,
+    }[kind]()
+    return float(values[kept].min(initial=np.inf))
+
+
+@pytest.mark.parametrize("seed", range(SEEDS))
+def test_no_design_of_a_fine_grid_is_below_what_is_proved(seed):
+    tree, kind = random_problem(seed)
+    case = built(tree)
+    row = solve_case(case, ALL).results.assignment
+    how, best = row.optimality, grid_best(case, kind, 60 if len(tree["design"]) == 2 else 18)
+    assert "no design within the bounds is" in how.words
+    proved = row.objective_optimal - how.gap * abs(row.objective_optimal)
+    assert best >= proved - 1e-9 * abs(best)
+
+
+def test_the_cheapest_design_of_all_that_keeps_its_limits_is_proved_for_any_parameter():
+    tree, _ = random_problem(4)
+    price = {"min": 0.5, "max": 0.7, "price": 1.0, "parameter": "links.upper_arm.length"}
+    tree |= {"design": {"reach": price}, "targets": [{"mode": 1, "at_least": "1 Hz"}]}
+    tree["trajectory"] = {"points": [[0.3, 0.1], [0.9, 2.0]], "duration": 1.0, "samples": 5}
+    row = solve_case(built(tree), Options(use_cache=False, report="none")).results.assignment
+    assert (row.optimality.kind, row.optimality.gap) == ("proved", 0.0)
+
+
+def test_limits_that_nothing_meets_are_proved_to_contradict_each_other():
+    tree, _ = random_problem(0)
+    case = built(tree)
+    hz = case.model().frequencies(case.trajectory.q, np.array(case.file.box)[:, 0], 1)
+    low, high = 0.9 * hz.min(), 0.95 * hz.min()
+    tree["targets"] = [{"mode": 1, "at_most": float(low)}, {"mode": 1, "at_least": float(high)}]
+    row = solve_case(built(tree), ALL).results.assignment
+    assert row.verdict == "infeasible"
+    assert row.optimality.words == "proved: no design within the bounds meets all limits"
