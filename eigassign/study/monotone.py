@@ -68,22 +68,22 @@ GROWING = {
 }
 
 
-def growing(file: CaseFile) -> NDArray[np.bool_]:
-    """The parameters (n_y,) with which K and M do not fall, one of them as in `effects` or both."""
-    mechanism = file.mechanism
+def growing(file: CaseFile) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The parameters (n_y,) with which K grows, and M; neither of one with which they may fall."""
+    mechanism, columns = file.mechanism, file.design.parameters.values()
     links = mechanism.links.values()
     plain = not isinstance(mechanism.gravity, tuple)
     plain = plain and not any(getattr(link, "shear", False) for link in links)
 
-    def grows(path: str, factor: float) -> bool:
+    def both(path: str) -> bool:
         group, name, *rest = path.split(".")
-        if group != "sections":
-            return factor > 0.0 and _effect(file, path) != 0.0
-        shape = mechanism.sections[name].shape
-        return factor > 0.0 and plain and rest[0] in GROWING.get(shape, ())
+        known = GROWING.get(mechanism.sections[name].shape, ()) if group == "sections" else ()
+        return plain and rest[0] in known
 
-    columns = file.design.parameters.values()
-    return np.array([all(grows(*each) for each in column.factors.items()) for column in columns])
+    alone = effects(file)
+    positive = np.array([min(column.factors.values()) > 0.0 for column in columns])
+    sections = positive & [all(map(both, column.factors)) for column in columns]
+    return sections | (positive & (alone > 0.0)), sections | (positive & (alone < 0.0))
 
 
 def corners(file: CaseFile, y: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:

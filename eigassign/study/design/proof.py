@@ -52,7 +52,7 @@ def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
     if least < enough:  # else all that has a price is cheapest, or there is no error
         task = found.task
         given = task.scenarios or task.bands or task.followers or scene.path.follows_design
-        if given or not np.all(growing(file) | (lower == upper)):
+        if given or not np.all(np.logical_or(*growing(file)) | (lower == upper)):
             return None
         most = MOST if thorough else int(SHARE * found.exact_solves / len(scene.path.q))
         least = min(value, _bound(scene, found, least, enough, most))
@@ -109,7 +109,10 @@ def _of_boxes(
     Infinite where none meets the limits.
     """
     problem, n = variant.problem, len(glances.order)
-    softest, stiffest = np.hstack([lower, upper]), np.hstack([upper, lower])  # of K and of M
+    of_K, of_M = growing(variant.task.scene.file)
+    least_K, most_K = (np.where(of_K, own, problem.lower) for own in (lower, upper))
+    least_M, most_M = (np.where(of_M, own, problem.lower) for own in (lower, upper))
+    softest, stiffest = np.hstack([least_K, most_M]), np.hstack([most_K, least_M])
     glances.look(np.concatenate([softest, stiffest]), n)
     for low, high, soft, stiff in zip(lower, upper, softest, stiffest, strict=True):
         lowest, highest = glances.solved(soft, n, 0.0), glances.solved(stiff, n, ENDLESS)
