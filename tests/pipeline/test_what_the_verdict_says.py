@@ -151,13 +151,13 @@ def test_a_band_that_all_loads_pass_below_is_not_called_infeasible() -> None:
     assert "of 32 choices of how many modes are below each band" in notes
 
 
-def test_the_cheapest_of_both_sides_of_a_band_is_taken_and_not_called_proved() -> None:
+def test_the_cheapest_of_both_sides_of_a_band_is_proved_on_its_bound() -> None:
     result = one_link(price=1e-3)
     row = result.results.assignment
     assert row is not None
     assert row.verdict == "reached"
     assert result.design["k"] == pytest.approx(500.0)
-    assert row.optimality.kind == "local"
+    assert row.optimality.kind == "proved"
 
 
 # --- Between samples that are far apart
