@@ -177,15 +177,9 @@ class Model:
         if self.pencil.weight is not None:
             require_standing(self.pencil, self.pencil.theta(x), x, label)
 
-    def frequencies(
-        self, q: ArrayLike, y: ArrayLike, count: int = 3, y_mass: ArrayLike | None = None
-    ) -> Floats:
-        """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz.
-
-        Where given, M is that of a design ``y_mass`` and y alone that of K.
-        """
-        x_mass = None if y_mass is None else self.x(q, y_mass)
-        return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count, x_mass)) / (2.0 * np.pi)
+    def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
+        """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
+        return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count)) / (2.0 * np.pi)
 
     def modes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[Floats, Floats]:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""

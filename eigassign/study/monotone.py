@@ -59,33 +59,6 @@ def _effect(file: CaseFile, path: str) -> float:
     return 0.0
 
 
-# By shape what makes A, I, J and I_p of a section grow; of shear beams it changes shapes, too
-GROWING = {
-    "bare": {"area", "bending_inertia", "inertia_y", "inertia_z", "torsion_constant"},
-    "circle": {"diameter"},
-    "tube": {"outer_diameter", "thickness"},
-    "rectangle": {"width", "height"},
-}
-
-
-def growing(file: CaseFile) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """The parameters (n_y,) with which K grows, and M; neither of one with which they may fall."""
-    mechanism, columns = file.mechanism, file.design.parameters.values()
-    links = mechanism.links.values()
-    plain = not isinstance(mechanism.gravity, tuple)
-    plain = plain and not any(getattr(link, "shear", False) for link in links)
-
-    def both(path: str) -> bool:
-        group, name, *rest = path.split(".")
-        known = GROWING.get(mechanism.sections[name].shape, ()) if group == "sections" else ()
-        return plain and rest[0] in known
-
-    alone = effects(file)
-    positive = np.array([min(column.factors.values()) > 0.0 for column in columns])
-    sections = positive & [all(map(both, column.factors)) for column in columns]
-    return sections | (positive & (alone > 0.0)), sections | (positive & (alone < 0.0))
-
-
 def corners(file: CaseFile, y: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     """The designs of lowest and of highest frequencies in the box, each (n_y,).
 

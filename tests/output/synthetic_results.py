@@ -287,9 +287,7 @@ def _assignment(n_y: int, prefix: str) -> AssignmentRow:
         objective="least_squares",
         objective_initial=3e-3,
         objective_optimal=9e-5,
-        optimality=OptimalityRow(
-            "local", 3e-9, None, "the best of 2 different optima from 3 starts"
-        ),
+        optimality=OptimalityRow("local", 3e-9, None, "the best of 2 optima from 3 starts"),
         verdict="reached",
         reason="every target is met",
         steps=steps,

@@ -7,7 +7,7 @@ between exact, Taylor and reduced evaluation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -123,22 +123,6 @@ class Pencil(Brief):
     def is_affine(self) -> bool:
         """True where K and M are of degree 1 in y at most, by their form."""
         return self.program.is_affine((self.to_program[:, self.n_q :] != 0.0).any(axis=1))
-
-    @cached_property
-    def apart(self) -> Pencil:
-        """K at one θ and M at another: both of θ = (θ_K, θ_M) (2 n_theta, n)."""
-
-        def beside(*both: sparse.csr_array) -> sparse.csr_array:
-            return sparse.csr_array(sparse.hstack(both))
-
-        weight, none = self.weight, sparse.csr_array(self.mass.shape)
-        if weight is not None:
-            own = weight.stiffness, weight.without, weight.among_joints
-            terms = (beside(each, sparse.csr_array(each.shape)) for each in own)
-            both = dict(zip(("stiffness", "without", "among_joints"), terms, strict=True))
-            weight = Weight(**{**vars(weight), **both})
-        K, M = beside(self.stiffness, none), beside(none, self.mass)
-        return replace(self, stiffness=K, mass=M, weight=weight)
 
     @cached_property
     def elastic(self) -> Ints:

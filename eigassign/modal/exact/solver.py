@@ -24,18 +24,13 @@ from eigassign.modal.exact.substructure import solve_large
 Floats = NDArray[np.float64]
 
 
-def eigenvalues(pencil: Pencil, x: Floats, count: int, x_mass: Floats | None = None) -> Floats:
+def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:
     """λ (n_samples, count) of the lowest elastic modes at x (n_samples, n_x), in rad²/s².
-
-    Of K there, and where given of M at ``x_mass`` (n_samples, n_x).
 
     Raises UsageError for more modes than there are, MissingMassError for more than have mass,
     MechanismError where K_E or M_FF is singular, or a pose falls or buckles under its weight.
     """
-    theta = pencil.theta(x)
-    if x_mass is not None:
-        pencil, theta = pencil.apart, np.vstack([theta, pencil.theta(x_mass)])
-    return _solve(pencil, theta, count, vectors=False, x=x).lam
+    return _solve(pencil, pencil.theta(x), count, vectors=False, x=x).lam
 
 
 def modes(pencil: Pencil, x: Floats, count: int) -> Modes:

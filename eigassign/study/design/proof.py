@@ -1,10 +1,10 @@
 """What no design within the bounds is below: boxes of designs are bounded, and halved.
 
-Where K and M grow with every parameter, or do not change (`monotone.growing`), each λ of a box is
-between that of its least K with its largest M and that of its largest K with its least M, at every
-sample. That bounds the limits that no design of it keeps, and the F that none is below
-(`Requirements.least`). The box of the least bound is halved where it is widest, as slopes at the
-optimum weigh its sides. Where this misses limits, the least violation takes the place of F.
+Where every parameter raises or lowers each frequency (`monotone`), those at two corners of a box
+bound each mode at every sample, and with it the limits that no design of the box keeps, and the F
+that none is below (`Requirements.least`). The box of the least bound is halved where it is widest,
+as slopes at the optimum weigh its sides. Where this misses limits, the least violation takes the
+place of F.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from eigassign.errors import EigassignError
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.response import ENDLESS, Glances
 from eigassign.study.design.search.variants import PosedProblem
-from eigassign.study.monotone import growing
+from eigassign.study.monotone import corners, effects
 from eigassign.study.results import OptimalityRow
 from eigassign.study.scene import Scene
 
@@ -52,7 +52,7 @@ def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
     if least < enough:  # else all that has a price is cheapest, or there is no error
         task = found.task
         given = task.scenarios or task.bands or task.followers or scene.path.follows_design
-        if given or not np.all(np.logical_or(*growing(file)) | (lower == upper)):
+        if given or not np.all((effects(file) != 0.0) | (lower == upper)):
             return None
         most = MOST if thorough else int(SHARE * found.exact_solves / len(scene.path.q))
         least = min(value, _bound(scene, found, least, enough, most))
@@ -109,10 +109,7 @@ def _of_boxes(
     Infinite where none meets the limits.
     """
     problem, n = variant.problem, len(glances.order)
-    of_K, of_M = growing(variant.task.scene.file)
-    least_K, most_K = (np.where(of_K, own, problem.lower) for own in (lower, upper))
-    least_M, most_M = (np.where(of_M, own, problem.lower) for own in (lower, upper))
-    softest, stiffest = np.hstack([least_K, most_M]), np.hstack([most_K, least_M])
+    softest, stiffest = corners(variant.task.scene.file, lower, lower, upper)
     glances.look(np.concatenate([softest, stiffest]), n)
     for low, high, soft, stiff in zip(lower, upper, softest, stiffest, strict=True):
         lowest, highest = glances.solved(soft, n, 0.0), glances.solved(stiff, n, ENDLESS)
@@ -124,9 +121,7 @@ def _of_boxes(
             ends = row.coefficients * low, row.coefficients * high
             if np.maximum(*ends).sum() < row.lower or np.minimum(*ends).sum() > row.upper:
                 violation = np.inf
-        value, cost = problem.least_value(low, high, residual), problem.cost
-        if cost is not None and cost.mass is not None and not cost.is_affine:
-            value += cost.of_mass * cost.mass(low)[0]  # which grows with all of them
+        value = problem.least_value(low, high, residual)
         yield violation if missed else value if violation <= MET else np.inf
 
 

@@ -131,10 +131,7 @@ ENDLESS = 1e150  # Hz; squares of it are numbers
 
 @dataclass
 class Glances:
-    """The lowest ``count`` frequencies of many designs at more and more samples, remembered.
-
-    Designs are (n_y,); of twice as many numbers the first half is that of K, the other that of M.
-    """
+    """The lowest ``count`` frequencies of many designs at more and more samples, remembered."""
 
     model: Model
     path: Trajectories
@@ -166,9 +163,7 @@ class Glances:
             q = [self.path.at(each[key])[0][self.order[len(had[key]) : few]] for key in left]
             lengths = [len(poses) for poses in q]
             y = np.repeat([each[key] for key in left], lengths, axis=0)
-            n_y = len(self.model.y_names)
-            of_mass = y[:, n_y:] if y.shape[1] > n_y else None
-            hz = self.model.frequencies(np.concatenate(q), y[:, :n_y], self.count, of_mass)
+            hz = self.model.frequencies(np.concatenate(q), y, self.count)
         except EigassignError:
             if len(left) == 1:
                 self.known[left[0]] = np.full((len(self.order), self.count), np.nan)
