@@ -225,7 +225,7 @@ def _is_damaged(place: Path) -> bool:
 
 
 def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
-    error, found = results.error, results.assignment
+    error, violation, found = results.error, results.violation, results.assignment
     return {
         "status": _status(results),
         "message": results.shortcoming or "",
@@ -234,6 +234,8 @@ def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
         "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
         "exact_rms_relative": error and error.exact.rms_relative,
+        "initial_violation": violation and violation.initial,
+        "exact_violation": violation and violation.exact,
         "mass": results.mass and results.mass.optimal,
         "price": results.price,
         "design": tuple((row.name, row.optimal) for row in results.design),

@@ -25,10 +25,10 @@ from eigassign.study.results import RunResults
 _GAP = 2  # columns that rich leaves between two columns of a table
 _COLOURS = {
     "green": {"reached", "met", "ok", "checked", "fitted", "done"},
-    "yellow": {"improved", "improved, not reached", "unfinished", "over tolerance"},
+    "yellow": {"improved", "unfinished", "over tolerance"},
     "red": {
         *("unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),
-        *("poor_fit", "not_identified", "not reachable", "limits contradict", "not run"),
+        *("poor_fit", "not_identified", "not run"),
     },
 }
 

@@ -37,6 +37,7 @@ from eigassign.study.results import (
     StaticRow,
     TargetStudy,
     ToleranceRows,
+    ViolationRow,
     WeightRow,
 )
 from eigassign.study.updating.fit import UpdateResults
@@ -184,6 +185,7 @@ class RunDocument(OriginDocument):
     statics: Annotated[Mapping[str, StaticRow], Fact("of static targets, by what they ask")]
     price: Annotated[float | None, Fact("of the change of the design")]
     error: Annotated[ErrorSummary | None, Fact("of all wanted frequencies, else of all limits")]
+    violation: Annotated[ViolationRow | None, Fact("the largest of any limit, and which has it")]
     frequencies: Annotated[CurvesDocument | LimitDocument | None, Fact("of the first target")]
     targets: Annotated[Sequence[TargetDocument], Fact("in the order of the case")]
     assignment: Annotated[AssignmentRow | None, Fact("the verdict, and how the answer was found")]

@@ -22,8 +22,9 @@ from eigassign.facts import (
     positive_percent,
     seconds,
 )
-from eigassign.study.design.judgement import MET
+from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import (
+    MET,
     SEEN,
     Comparison,
     DesignRow,
@@ -113,30 +114,32 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
 
 
 def headline(results: RunResults) -> str | None:
-    """The verdict with its reason, and the worst distance before and after, in a sentence or two.
+    """The verdict with its reason, and distance, violation and room, wherever one is shown.
 
-    Without targets None, or the verdict alone.
+    None where nothing was asked for.
     """
-    error, row = results.error, results.assignment
-    if error is None:
-        return None if row is None else f"{capital(row.verdict.replace('_', ' '))}: {row.reason}."
-    limits = [target.error for target in results.targets if not target.asked.is_goal]
-    alone = len(limits) == len(results.targets)  # no frequency is wanted
-    what = "Worst violation of a limit" if alone else "Worst distance to the target"
-    said = positive_percent if alone else percent
-    beside = ""
-    if "one shot" in _stages(results) and error.one_shot is not None:
-        beside = f" (one shot: {said(error.one_shot.max_relative)})"
-    before, after = said(error.initial.max_relative), said(error.exact.max_relative)
-    distance = f"{what}: {before} before, {after} after{beside}, solved exactly."
-    worst = max((each.initial.max_relative for each in limits), default=0.0)
-    if not alone and worst > MET:
-        left = positive_percent(max(each.exact.max_relative for each in limits))
-        distance += f" Worst violation of a limit: {percent(worst)} before, {left} after."
-    if row is None:
-        return distance
-    word = row.verdict.replace("_", " ")
-    return f"{capital(word)}: {row.reason}. {distance}"
+    row, said = results.assignment, list(distances(results))
+    if row is not None:
+        said = [f"{verdict_word(row.verdict)}: {row.reason}.", *said]
+    return " ".join(said) or None
+
+
+def distances(results: RunResults) -> Iterator[str]:
+    """Sentences of the worst distance, of the worst violation of all limits, and of least room."""
+    error, violation, row = results.error, results.violation, results.assignment
+    goals = any(target.asked.is_goal for target in results.targets)
+    if error is not None and goals:
+        beside = ""
+        if "one shot" in _stages(results) and error.one_shot is not None:
+            beside = f" (one shot: {percent(error.one_shot.max_relative)})"
+        both = (percent(one.max_relative) for one in (error.initial, error.exact))
+        said = "Worst distance to the target: {} before, {} after".format(*both)
+        yield f"{said}{beside}, solved exactly."
+    if violation is not None and (violation.initial or violation.exact or not goals):
+        yield f"Worst violation of a limit: {violation.words}{', solved exactly' * (not goals)}."
+    if row is not None and row.clearances and all(one.clear for one in row.clearances):
+        least = min(row.clearances, key=lambda one: one.room)
+        yield f"Least room: {positive_percent(least.room)} ({least.label})."
 
 
 def design(results: RunResults) -> Table:

@@ -41,6 +41,7 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
+MET = 1e-8  # a violation below it is round-off
 SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
@@ -449,6 +450,26 @@ class LimitRow:
         edges = [edge for edge in (self.lower, self.upper) if edge is not None]
         unit, size = limit_unit(self.unit, *edges)
         return f"{number(amount / size)} {unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class ViolationRow:
+    """The largest violation of any limit, before and with the answer, and which limit has it.
+
+    Limits and bands of frequencies count, and all of mass, drives, statics and sums of parameters.
+    """
+
+    initial: Violation
+    exact: Violation
+    initial_limit: Annotated[str | None, Fact("the limit in words; null where all are kept")]
+    exact_limit: Annotated[str | None, Fact("the same with the answer")]
+
+    @property
+    def words(self) -> str:
+        """``31 % before (mass at most 6 kg), 0 % after``; one limit of both is named once."""
+        named = [f" ({limit})" if limit else "" for limit in (self.initial_limit, self.exact_limit)]
+        first = "" if self.initial_limit == self.exact_limit else named[0]
+        return f"{percent(self.initial)} before{first}, {percent(self.exact)} after{named[1]}"
 
 
 @dataclass(frozen=True)
@@ -1004,6 +1025,11 @@ class RunResults(Brief):
         return over_all([(target.error, target.weight_s) for target in self.counted])
 
     @property
+    def violation(self) -> ViolationRow | None:
+        """The largest violation of any limit; None where nothing is limited."""
+        return worst_violation(self.targets, self.assignment.limits if self.assignment else ())
+
+    @property
     def price(self) -> float | None:
         """The cost of the choices and of the change; None where nothing has a price."""
         priced = [row.cost for row in self.design if row.is_priced]
@@ -1021,6 +1047,24 @@ class RunResults(Brief):
         """The same along one trajectory; None where no target holds on it."""
         along = [one.error for target in self.counted for one in target.along if one.name == name]
         return over_all([(error, 1.0) for error in along]) if along else None
+
+
+def worst_violation(
+    targets: Sequence[TargetStudy], limits: Sequence[LimitRow]
+) -> ViolationRow | None:
+    """The largest violation of all that may be violated; None where that is nothing."""
+    asked = [one for one in targets if not one.asked.is_goal and not one.asked.is_aim]
+    both = [(one.error.initial.max_relative, one.error.exact.max_relative) for one in asked]
+    both += [(row.initial_violation, row.violation) for row in limits]
+    if not both:
+        return None
+    names = [*(one.label for one in asked), *(row.words for row in limits)]
+    worst = [
+        max(zip(shares, names, strict=True), key=itemgetter(0))
+        for shares in zip(*both, strict=True)
+    ]
+    (initial, before), (exact, after) = (one if one[0] > MET else (0.0, None) for one in worst)
+    return ViolationRow(initial, exact, before, after)
 
 
 def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:

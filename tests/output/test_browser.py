@@ -334,7 +334,7 @@ def test_rows_of_a_batch_sort_by_size_and_filter_by_words_and_verdict(browser, b
     assert len(names(browser)) == 200
     browser.find_element("css selector", ".more button").click()
     assert len(names(browser)) == 400
-    browser.find_element("css selector", "[data-word='Not reachable']").click()
+    browser.find_element("css selector", "[data-word='Unreachable']").click()
     assert sorted(names(browser)) == ["108", "208", "308", "408", "8"]
     browser.find_element("css selector", "input").send_keys("308 not")
     assert names(browser) == ["308"]

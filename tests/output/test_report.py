@@ -125,10 +125,10 @@ def test_a_full_report_plots_every_description_and_lists_its_numbers():
     ("change", "word", "tone"),
     [
         ({"verdict": "reached"}, "Reached", "good"),
-        ({"verdict": "improved", "max_error": 0.001}, "Improved, not reached", "fair"),
-        ({"verdict": "unreachable"}, "Not reachable", "bad"),
+        ({"verdict": "improved", "max_error": 0.001}, "Improved", "fair"),
+        ({"verdict": "unreachable"}, "Unreachable", "bad"),
         ({"verdict": "do_not_use"}, "Do not use", "bad"),
-        ({"verdict": "infeasible"}, "Limits contradict", "bad"),
+        ({"verdict": "infeasible"}, "Infeasible", "bad"),
     ],
 )
 def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
@@ -137,9 +137,8 @@ def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
     _, parsed, _ = made(replace(results, assignment=row))
     first = next(a for tag, a in parsed.tags if (a.get("class") or "").startswith("verdict"))
     assert first["class"] == f"verdict {tone}"
-    asked = "mode 1 at 190 Hz is 1.00 % off at worst (6.00 % before)."
+    asked = "so it is. Worst distance to the target: 6.00 % before, 1.00 % after"
     assert f"{word} : {asked}" in shown_text(parsed)[:1000]
-    assert ("So it is." in parsed.text) == (tone == "bad")
 
 
 @pytest.mark.parametrize("full", [False, True])

@@ -106,7 +106,8 @@ def test_a_case_with_nothing_but_a_stiffness_has_an_answer() -> None:
     assert limit.optimal == pytest.approx(4e5, rel=1e-6)
     assert limit.initial < 4e5
     assert (limit.lower, limit.upper, limit.unit) == (4e5, None, "N/m")
-    assert repr(result).endswith("Reached: every target is met.>")
+    assert "Reached: every target is met. Worst violation of a limit: " in repr(result)
+    assert repr(result).endswith(f" before ({limit.words}), 0 % after, solved exactly.>")
     assert verdict_of(result.results) is not None
     to_json(result.results)
     assert run_figures(result.results)

@@ -109,13 +109,15 @@ class LimitedQuantity(Requirement):
         assert not isinstance(value, int)
         return np.asarray(c * value(y)[1])
 
-    def violation(self, amount: float, reach: float) -> float:
+    def violation(self, amount: float, reach: float, near: float = 0.0) -> float:
         """The way of an amount beyond a limit, relative to that; 0 within both.
 
-        Relative to ``reach`` where that is larger: what the quantity changes over the bounds.
+        Of a limit of 0 relative to ``reach``, what the quantity changes over the bounds; a share
+        ``near`` of the larger of both is nothing.
         """
-        beyond = (s * (amount - edge) / (max(abs(edge), reach) or 1.0) for s, edge in self._edges)
-        return max(0.0, *(one for one in beyond if np.isfinite(one)))
+        ways = [(s * (amount - edge), abs(edge)) for s, edge in self._edges if np.isfinite(edge)]
+        far = (way / (edge or reach or 1.0) for way, edge in ways if way > near * max(edge, reach))
+        return max(far, default=0.0)
 
     @property
     def asked_words(self) -> str:

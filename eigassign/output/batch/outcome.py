@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from eigassign.facts import Fact, Seconds, Share
 from eigassign.files import name_of
-from eigassign.output.reports.verdict import WORDS
+from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import RunResults
 
 Status = Literal["ok", "tolerance", "failed", "error"]
@@ -39,6 +39,10 @@ class CaseOutcome:
     predicted_max_relative: Annotated[Share | None, Fact(heading="worst predicted")] = None
     exact_max_relative: Annotated[Share | None, Fact("largest error", "worst error")] = None
     exact_rms_relative: Annotated[Share | None, Fact("over time", "rms error")] = None
+    initial_violation: Annotated[
+        Share | None, Fact("largest of any limit", "worst violation before")
+    ] = None
+    exact_violation: Annotated[Share | None, Fact("largest of any limit", "worst violation")] = None
     mass: Annotated[float | None, Fact("of all links and bodies", "total mass", "kg")] = None
     price: Annotated[float | None, Fact("of the choices and of the change")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
@@ -54,19 +58,20 @@ class CaseOutcome:
     @property
     def word(self) -> Annotated[str, Fact(heading="verdict")]:
         """How it ended as people say it: the verdict, or of a case without one its status."""
-        return WORDS.get(self.verdict, _WITHOUT.get(self.status, self.status))
+        return verdict_word(self.verdict) or _WITHOUT.get(self.status, self.status)
 
 
 _WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", "error": "Not run"}
 _STATUSES = get_args(Status)
 NUMBERS = (  # that every case has, or lacks
     "initial_max_relative", "predicted_max_relative", "exact_max_relative", "exact_rms_relative",
-    "mass", "price",
+    "initial_violation", "exact_violation", "mass", "price",
 )  # fmt: skip
 _ORDER = (
     "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
-    "predicted_max_relative", "exact_max_relative", "exact_rms_relative", "mass", "price", "design",
-    "units", "frequencies", "seconds", "path", "run_folder",
+    "predicted_max_relative", "exact_max_relative", "exact_rms_relative", "initial_violation",
+    "exact_violation", "mass", "price", "design", "units", "frequencies", "seconds", "path",
+    "run_folder",
 )  # fmt: skip
 
 

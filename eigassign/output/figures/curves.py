@@ -291,10 +291,10 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
     """
     values = np.array([row.objective_initial, *(step.objective for step in row.steps)])
     taken = np.array([step.taken for step in row.steps])
-    limits = [t.error.initial.max_relative for t in results.targets if not t.asked.is_goal]
-    violations = [max(limits, default=0.0), *(step.violation for step in row.steps)]
-    missed = 100.0 * np.array(violations)
-    several = bool((missed > 1e-6).any())  # %; less is round-off
+    missed = results.violation.initial if results.violation else 0.0
+    violations = [missed, *(step.violation for step in row.steps)]
+    percents = 100.0 * np.array(violations)
+    several = bool((percents > 1e-6).any())  # %; less is round-off
     kind = "rms" if row.objective == "least_squares" else "worst"
     wanted = [t for t in results.targets if t.asked.is_goal]
     error = results.error if wanted else None
@@ -309,7 +309,7 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
     height = 2.2 if several else 2.4
     panels = [Panel(label, tuple(marks), height, logarithmic=error is not None)]
     if several:
-        below = tuple(_steps(missed, taken, named=False))
+        below = tuple(_steps(percents, taken, named=False))
         panels.append(Panel("limits missed [%]", below, 1.2, logarithmic=True))
     return FigurePlan(
         "progress",

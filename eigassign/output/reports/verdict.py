@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.facts import about, capital, number, percent
-from eigassign.output.tables import violated
+from eigassign.output.tables import distances, violated
+from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
 MOST = 8  # findings on the first screen
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
-WORDS = {
-    "reached": "Reached",
-    "improved": "Improved, not reached",
-    "unreachable": "Not reachable",
-    "infeasible": "Limits contradict",
-    "do_not_use": "Do not use",
-}
 
 
 @dataclass(frozen=True)
@@ -56,7 +50,7 @@ class FirstScreen:
     word: str
     tone: str  # good | fair | bad
     sentence: str  # what follows the word
-    reason: str  # what else the verdict rests on; "" where all is said
+    more: str  # how far off before and after
     helps: tuple[str, ...]  # where a target is missed
     findings: tuple[Finding, ...]
     bars: tuple[Bar, ...]
@@ -72,40 +66,22 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     aim, tone = row.aim, TONES.get(row.verdict, "bad")
     findings = [] if aim is None else [Finding(capital(aim.label), aim.before, aim.after, tone)]
     targets = (target for target in results.targets if not target.asked.is_aim)
-    reason = capital(row.reason.partition("; the nearest design: ")[0])  # which the sentence says
     static = {one.name for one in results.statics}
-    findings += [_kept(one) for one in row.limits if not one.satisfied]
+    first = [one for one in row.limits if one.violation or one.initial_violation]
+    findings += [_kept(one) for one in first]
     findings += [_finding(target, row.max_error) for target in targets]
-    findings += [_kept(one) for one in row.limits if one.satisfied and one.name in static]
+    findings += [_kept(one) for one in row.limits if one not in first and one.name in static]
     return FirstScreen(
-        word=WORDS[row.verdict],
+        word=verdict_word(row.verdict),
         tone=tone if row.shortcoming is None else "bad",
-        sentence=_sentence(findings, row.reason) if aim is None else f"{aim.words}.",
-        reason="" if tone == "good" or (tone == "fair" and aim is None) else f"{reason}.",
+        sentence=f"{row.reason}.",
+        more=" ".join(distances(results)),
         helps=tuple(_helps(results)),
         findings=tuple(findings[:MOST]),
         bars=tuple(_bars(results)),
         cost=tuple(_cost(results)),
         trust=tuple(_trust(results)),
     )
-
-
-def _sentence(findings: Sequence[Finding], reason: str) -> str:
-    """The worst finding, first of all one in the reason, before and after; and of the others."""
-    if not findings:
-        return "nothing is limited."
-    order, asked = ("bad", "fair", "good"), reason.lower()
-    worst = min(findings, key=lambda f: (order.index(f.tone), f.label.lower() not in asked))
-    others = [one for one in findings if one is not worst]
-    missed = sum(one.tone != "good" for one in others)
-    before = "" if worst.before == "met" else f" ({worst.before} before)"
-    said = f"{worst.label[:1].lower()}{worst.label[1:]} {worst.after}{before}"
-    verb, many = ("missed", f"{missed} of") if missed else ("met", "all")
-    if len(others) == 1:
-        said += f"; the other target is {verb}"
-    elif others:
-        said += f"; {many} {len(others)} others are {verb}"
-    return f"{said}."
 
 
 def _helps(results: RunResults) -> Iterator[str]:
@@ -158,7 +134,7 @@ def _finding(target: TargetStudy, accepted: float) -> Finding:
 
 
 def _kept(limit: LimitRow) -> Finding:
-    """A limit of a quantity that the answer breaks, or of statics, with its amounts."""
+    """A limit of a quantity that a design breaks, or of statics, with its amounts."""
     before, after = limit.said(limit.initial), limit.said(limit.optimal)
     tone = "good" if limit.satisfied else "bad"
     return Finding(capital(limit.words), before, f"is {after}", tone)

@@ -40,7 +40,9 @@ from eigassign.study.results import (
     RobustRow,
     StepRow,
     TargetStudy,
+    ViolationRow,
     WeightRow,
+    worst_violation,
 )
 from eigassign.study.scene import Scene
 
@@ -70,7 +72,6 @@ def assignment_row(
     the bounds, ``bound`` what is proved of the optimum.
     """
     keys, found = scene.file.assignment, answer.found
-    initial, optimal = _merits(answer, targets)
     accepted = scene.file.validation.max_error
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
@@ -81,6 +82,8 @@ def assignment_row(
         () if answer.robust is None else tuple(_deviated(answer.robust, targets, limits, largest))
     )
     met = all(t.satisfied for t in targets) and all(row.satisfied for row in limits)
+    worst = worst_violation(targets, limits)
+    initial, optimal = _merits(answer, targets, worst)
     if met and not deviated:
         # what only round-off misses contradicts nothing
         answer = replace(answer, conflict=None)
@@ -93,7 +96,7 @@ def assignment_row(
     unproved = () if found is None else tuple(_why_unproved(scene, found))
     of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
-    aim = None if found is None else aim_row(scene, found, wanted, of_model)
+    aim = None if found is None else aim_row(scene, found, wanted, of_model, worst)
     undecided = dict(_undecided(scene, targets, exact, of_model, largest))
     beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
     doubts = [] if trusted else [UNTRUSTED]
@@ -229,8 +232,8 @@ def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
     for one in scene.limits:
         before, after = one.amount(scene.initial), one.amount(y)
         reach = float(np.abs(one.slopes(y)) @ (upper - lower))
-        misses = [one.violation(amount, reach) for amount in (before, after)]
-        kept = misses[1] <= ON
+        misses = [one.violation(amount, reach, ON) for amount in (before, after)]
+        kept = misses[1] == 0.0
         least = None if kept else extreme(scene, one, y)
         low, high = one.allowed
         yield LimitRow(
@@ -394,19 +397,21 @@ def _combination(
 
 
 def _merits(
-    answer: Answer, targets: Sequence[TargetStudy]
+    answer: Answer, targets: Sequence[TargetStudy], worst: ViolationRow | None
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Violation and objective of the initial design and of the answer."""
+    missed = (0.0, 0.0) if worst is None else (worst.initial, worst.exact)
     if answer.found is not None:
-        best = answer.found.best
-        return answer.found.initial, (best.seen.violation, best.objective)
+        best, (violation, value) = answer.found.best, answer.found.initial
+        found = max(missed[1], best.seen.violation), best.objective
+        return (max(missed[0], violation), value), found
     weights = np.array([target.asked.weight * target.weight_s for target in targets])
     weights = weights / weights.sum()
     before, after = (
         float(weights @ [getattr(t.error, when).rms_relative ** 2 for t in targets])
         for when in ("initial", "exact")
     )
-    return (0.0, before), (0.0, after)
+    return (missed[0], before), (missed[1], after)
 
 
 def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> OptimalityRow:

@@ -44,25 +44,31 @@ from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.variants import lacking, variant_of
-from eigassign.study.results import AimRow
+from eigassign.study.results import AimRow, ViolationRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 
 
 def aim_row(
-    scene: Scene, found: Found, wanted: Sequence[Requirement], of_model: Mapping[int, float]
+    scene: Scene,
+    found: Found,
+    wanted: Sequence[Requirement],
+    of_model: Mapping[int, float],
+    worst: ViolationRow | None,
 ) -> AimRow | None:
     """What is light, high or wide before and after; None where the objective is an error.
 
-    ``of_model`` is how much too high mesh and reduced links put modes at most, relative.
+    ``of_model`` is how much too high mesh and reduced links put modes at most, relative; ``worst``
+    what limits are violated by.
     """
-    aim, kept = scene.file.assignment.named_objective, ""
+    aim, kept = scene.file.assignment.named_objective, ")"
     designs = scene.initial, found.best.y
-    if [one for one in (*wanted, *scene.limits) if not one.is_aim]:
-        missed = found.best.seen.violation
-        met = missed <= ON and all(row.clear for row in found.clearances)
-        kept = ", all limits kept" if met else ", not all limits kept"
+    if worst is not None:
+        met = worst.exact == 0.0 and found.best.seen.violation <= ON
+        met = met and all(row.clear for row in found.clearances)
+        kept = ", with limits broken" * (worst.initial > 0.0)
+        kept += "), all limits kept" if met else "), not all limits kept"
     if aim == "lightest":
         before, after = map(scene.model.mass, designs)
         row = AimRow("as light as can be", before, after, "kg")
@@ -87,7 +93,7 @@ def aim_row(
 
 
 def _in_words(row: AimRow, reached: str, kept: str) -> AimRow:
-    return replace(row, words=f"{reached} (initially {row.before}){kept}")
+    return replace(row, words=f"{reached} (initially {row.before}{kept}")
 
 
 def _least(found: Found, asked: Requirement, y: Floats) -> float:

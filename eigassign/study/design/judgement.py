@@ -18,6 +18,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.solver import modes
 from eigassign.modal.model import Model
 from eigassign.study.results import (
+    MET,
     ErrorRow,
     ErrorSummary,
     FollowedRow,
@@ -27,7 +28,6 @@ from eigassign.study.results import (
 )
 
 Floats = NDArray[np.float64]
-MET = 1e-8  # a violation below it is round-off
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eigassign.study.design.judgement import MET
-from eigassign.study.results import LimitRow, TargetStudy
+from eigassign.facts import capital
+from eigassign.study.results import MET, LimitRow, TargetStudy
 
 IMPROVED = 0.01  # of the merit of the start
 GAINED = 1e-9  # of what is to be light, high or wide: less is round-off
@@ -63,6 +63,11 @@ class Verdict:
     word: str
     reason: str
     shortcoming: str | None
+
+
+def verdict_word(word: str) -> str:
+    """The word of a verdict as people read it, wherever it stands: ``Do not use``."""
+    return capital(word.replace("_", " "))
 
 
 def verdict(facts: Facts) -> Verdict:
@@ -108,7 +113,7 @@ def _word(facts: Facts) -> tuple[str, str]:
 
 def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
     if word not in ("reached", "improved"):
-        return f"{word.replace('_', ' ')}: {reason}"
+        return f"{verdict_word(word).lower()}: {reason}"
     wanted = [target for target in facts.targets if target.asked.is_goal] or facts.targets
     error = max((target.error.exact.max_relative for target in wanted), default=0.0)
     if facts.max_error is None or error <= facts.max_error:

@@ -161,7 +161,7 @@ def test_the_page_says_in_a_sentence_how_many_meet_what_is_asked(tmp_path):
     html = (tmp_path / "index.html").read_text("utf-8")
     assert "<h1>Sweep of arm</h1>" in html
     assert "2 of 16 variants meet what is asked." in html
-    assert found["verdict"][2][-1] == "Not reachable"
+    assert found["verdict"][2][-1] == "Unreachable"
     assert found["message"][2][-1] == "Mode 1 is off"
     assert "failed" not in html.partition('id="data"')[0]
     for rows, said in ((GRID, "All 16 variants meet"), ([GRID[0]], "The variant meets")):
