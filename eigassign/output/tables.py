@@ -137,7 +137,7 @@ def distances(results: RunResults) -> Iterator[str]:
         yield f"{said}{beside}, solved exactly."
     if violation is not None and (violation.initial or violation.exact or not goals):
         yield f"Worst violation of a limit: {violation.words}{', solved exactly' * (not goals)}."
-    if row is not None and row.clearances and all(one.clear for one in row.clearances):
+    if row is not None and row.clearances and row.verdict == "reached":
         least = min(row.clearances, key=lambda one: one.room)
         yield f"Least room: {positive_percent(least.room)} ({least.label})."
 

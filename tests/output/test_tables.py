@@ -78,7 +78,10 @@ def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met
     both = replace(results, targets=(target, replace(limit, error=error)))
     said = io.StringIO()
     print_assignment(both, stream=said)
-    assert "Worst violation of a limit: 68.1 % before (mode 1 at_least), 0 % after.\n" in said.getvalue()
+    assert (
+        "Worst violation of a limit: 68.1 % before (mode 1 at_least), 0 % after.\n"
+        in said.getvalue()
+    )
     found = table(both, "Limits and bands")
     assert found is not None
     assert found.rows[0][-2] == "met"

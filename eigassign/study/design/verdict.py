@@ -86,7 +86,8 @@ def _word(facts: Facts) -> tuple[str, str]:
         return "infeasible", _beside(facts.conflict, broken)
     if facts.doubts:
         return "do_not_use", "; ".join(facts.doubts)
-    worst = max(missed, key=lambda target: target.error.exact.max_relative, default=None)
+    missed.sort(key=lambda one: (one.asked.is_goal, -one.error.exact.max_relative))
+    worst = next(iter(missed), None)  # limits decide before what is wanted
     far = [*([] if worst is None else [_far(worst)]), *broken]
     if facts.unreachable:
         return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
