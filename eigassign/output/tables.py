@@ -114,32 +114,27 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
 
 
 def headline(results: RunResults) -> str | None:
-    """The verdict with its reason, and distance, violation and room, wherever one is shown.
+    """The verdict with its reason, then worst distance, worst violation and least room.
 
     None where nothing was asked for.
     """
-    row, said = results.assignment, list(distances(results))
-    if row is not None:
-        said = [f"{verdict_word(row.verdict)}: {row.reason}.", *said]
-    return " ".join(said) or None
-
-
-def distances(results: RunResults) -> Iterator[str]:
-    """Sentences of the worst distance, of the worst violation of all limits, and of least room."""
     error, violation, row = results.error, results.violation, results.assignment
     goals = any(target.asked.is_goal for target in results.targets)
+    said = [] if row is None else [f"{verdict_word(row.verdict)}: {row.reason}."]
     if error is not None and goals:
         beside = ""
         if "one shot" in _stages(results) and error.one_shot is not None:
             beside = f" (one shot: {percent(error.one_shot.max_relative)})"
-        both = (percent(one.max_relative) for one in (error.initial, error.exact))
-        said = "Worst distance to the target: {} before, {} after".format(*both)
-        yield f"{said}{beside}, solved exactly."
+        before, after = (percent(one.max_relative) for one in (error.initial, error.exact))
+        distance = f"{before} before, {after} after{beside}"
+        said.append(f"Worst distance to the target: {distance}, solved exactly.")
     if violation is not None and (violation.initial or violation.exact or not goals):
-        yield f"Worst violation of a limit: {violation.words}{', solved exactly' * (not goals)}."
+        exactly = "" if goals else ", solved exactly"
+        said.append(f"Worst violation of a limit: {violation.words}{exactly}.")
     if row is not None and row.clearances and row.verdict == "reached":
         least = min(row.clearances, key=lambda one: one.room)
-        yield f"Least room: {positive_percent(least.room)} ({least.label})."
+        said.append(f"Least room: {positive_percent(least.room)} ({least.label}).")
+    return " ".join(said) or None
 
 
 def design(results: RunResults) -> Table:

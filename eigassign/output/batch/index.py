@@ -110,8 +110,7 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
     """
     yield ("verdict", "", "word"), [row.word for row in rows]
     for name in NUMBERS:
-        one, hidden = fact(CaseOutcome, name), name.startswith(("pred", "initial_v"))
-        kind = "hidden" if hidden else "number"
+        one, kind = fact(CaseOutcome, name), "hidden" if name.startswith("pred") else "number"
         yield _numbers(one.heading, kind, [getattr(row, name) for row in rows], one.unit)
     designs = [dict(row.design) for row in rows]
     counts = Counter(name for design in designs for name in design)

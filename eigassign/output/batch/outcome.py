@@ -39,10 +39,8 @@ class CaseOutcome:
     predicted_max_relative: Annotated[Share | None, Fact(heading="worst predicted")] = None
     exact_max_relative: Annotated[Share | None, Fact("largest error", "worst error")] = None
     exact_rms_relative: Annotated[Share | None, Fact("over time", "rms error")] = None
-    initial_violation: Annotated[
-        Share | None, Fact("largest of any limit", "worst violation before")
-    ] = None
-    exact_violation: Annotated[Share | None, Fact("largest of any limit", "worst violation")] = None
+    initial_violation: Annotated[Share | None, Fact("of any limit", "violated before")] = None
+    exact_violation: Annotated[Share | None, Fact("the largest of any limit", "violated by")] = None
     mass: Annotated[float | None, Fact("of all links and bodies", "total mass", "kg")] = None
     price: Annotated[float | None, Fact("of the choices and of the change")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.facts import about, capital, number, percent
-from eigassign.output.tables import distances, violated
-from eigassign.study.design.verdict import verdict_word
+from eigassign.output.tables import headline, violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
@@ -49,8 +48,7 @@ class FirstScreen:
 
     word: str
     tone: str  # good | fair | bad
-    sentence: str  # what follows the word
-    more: str  # how far off before and after
+    sentence: str  # what follows the word in the headline
     helps: tuple[str, ...]  # where a target is missed
     findings: tuple[Finding, ...]
     bars: tuple[Bar, ...]
@@ -66,16 +64,14 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     aim, tone = row.aim, TONES.get(row.verdict, "bad")
     findings = [] if aim is None else [Finding(capital(aim.label), aim.before, aim.after, tone)]
     targets = (target for target in results.targets if not target.asked.is_aim)
+    word, _, sentence = (headline(results) or "").partition(": ")
     static = {one.name for one in results.statics}
-    first = [one for one in row.limits if one.violation or one.initial_violation]
-    findings += [_kept(one) for one in first]
-    findings += [_finding(target, row.max_error) for target in targets]
-    findings += [_kept(one) for one in row.limits if one not in first and one.name in static]
+    broken = [r for r in row.limits if r.violation or r.initial_violation or r.name in static]
+    findings += [*map(_kept, broken), *(_finding(target, row.max_error) for target in targets)]
     return FirstScreen(
-        word=verdict_word(row.verdict),
+        word=word,
         tone=tone if row.shortcoming is None else "bad",
-        sentence=f"{row.reason}.",
-        more=" ".join(distances(results)),
+        sentence=sentence,
         helps=tuple(_helps(results)),
         findings=tuple(findings[:MOST]),
         bars=tuple(_bars(results)),

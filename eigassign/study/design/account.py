@@ -400,17 +400,16 @@ def _merits(
     answer: Answer, targets: Sequence[TargetStudy], worst: ViolationRow | None
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Violation and objective of the initial design and of the answer."""
-    missed = (0.0, 0.0) if worst is None else (worst.initial, worst.exact)
     if answer.found is not None:
-        best, (violation, value) = answer.found.best, answer.found.initial
-        found = max(missed[1], best.seen.violation), best.objective
-        return (max(missed[0], violation), value), found
+        best = answer.found.best
+        return answer.found.initial, (best.seen.violation, best.objective)
     weights = np.array([target.asked.weight * target.weight_s for target in targets])
     weights = weights / weights.sum()
     before, after = (
         float(weights @ [getattr(t.error, when).rms_relative ** 2 for t in targets])
         for when in ("initial", "exact")
     )
+    missed = (0.0, 0.0) if worst is None else (worst.initial, worst.exact)
     return (missed[0], before), (missed[1], after)
 
 
