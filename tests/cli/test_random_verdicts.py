@@ -18,6 +18,7 @@ import pytest
 
 from eigassign.case import parse
 from eigassign.cli import main
+from eigassign.pipeline import solve_case
 from eigassign.study import BuiltCase
 
 CASE = """
@@ -82,6 +83,18 @@ class Limits:
             off["clear of"] = np.array(min(each))
         goal = float(np.abs(off.pop("goal", np.zeros(1))).max())
         return {kind: max(float(share.max()), 0.0) for kind, share in off.items()}, goal
+
+
+def test_a_torque_that_the_initial_design_misses_most_is_in_the_headline() -> None:
+    edges = (
+        ENDS["mass"].format(7),
+        ENDS["torque"].format(40),
+        "targets:",
+        ENDS["at least"].format(3),
+    )
+    case = BuiltCase(parse("\n".join([CASE, *edges]).encode(), "arm.yaml"))
+    words = "67.0 % before (torque of q1 at most 40 N m), 0 % after"
+    assert f"every target is met. Worst violation of a limit: {words}" in repr(solve_case(case))
 
 
 @pytest.mark.parametrize("seed", range(300))

@@ -49,6 +49,13 @@ def test_limits_are_violated_not_off() -> None:
     )
 
 
+def test_a_limit_that_is_missed_is_named_before_what_is_wanted() -> None:
+    limit = missed("at_most", ErrorRow(0.1, 0.1), ErrorRow(0.01, 0.01))
+    goal = missed("frequency", ErrorRow(0.2, 0.2), ErrorRow(0.2, 0.2))
+    facts = Facts((goal, limit), ((0.1, 1.0), (0.01, 0.5)))
+    assert verdict(facts).reason.endswith("violated by 1 % at worst")
+
+
 def test_the_first_that_holds_is_the_word() -> None:
     """Each fact alone, and beside all those that come after it."""
     target = missed("frequency", ErrorRow(0.08, 0.04), ErrorRow(0.06, 0.02))
