@@ -66,7 +66,7 @@ class DriveForces:
         """
         samples, motions = [], []
         for part, rows in zip(path.parts, path.rows, strict=True):
-            motion = rates_at(part.trajectory, y)
+            motion = rates_at(part.trajectory, y, slopes)
             samples.append(rows.start + motion[0].samples)
             motions.append([[m.q, m.rate, m.acceleration] for m in motion])
         here, by_design = (

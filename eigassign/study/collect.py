@@ -12,6 +12,7 @@ from eigassign._version import __version__
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
+from eigassign.errors import TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks.accuracy import Accuracy
 from eigassign.study.checks.slow_motion import study_motion
@@ -150,11 +151,11 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
 def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     """What every drive exerts before and after; none where there is no weight and no motion."""
     file, path, g = scene.file, scene.path, scene.file.mechanism.gravity
-    fine = path.finely  # peaks are between samples too
-    curves, along = (
-        [scene.model.drives.curves(each, design) for design in (scene.initial, y)]
-        for each in (path, fine)
-    )
+    fine, curves = path.finely, [scene.model.drives.curves(path, one) for one in (scene.initial, y)]
+    try:  # peaks are between samples too
+        along = [scene.model.drives.curves(fine, one) for one in (scene.initial, y)]
+    except TrajectoryError:  # a design that the tip follows its path with at samples only
+        fine, along = path, curves
     pull = scene.model.mass(y) * float(np.linalg.norm(g)) if isinstance(g, tuple) else 0.0
     small = ROUND_OFF * max(pull, *(np.abs(curve).max(initial=0.0) for curve in along))
     curves, along = (

@@ -323,12 +323,14 @@ def test_slopes_that_vanish_or_are_alike_at_one_design_only_are_no_lack_of_effec
 )
 def test_a_limit_that_only_round_off_misses_contradicts_nothing(above: float, word: str) -> None:
     design = DESIGN.replace("max: 250 g", "max: 1 g")
+    still = "trajectory: {q: [[1, 5], [1, 5]], duration: 1 s}\n"
+    head = HELD[: HELD.index("trajectory:")] + still
     case = BuiltCase(
-        parse((HELD + design + TAIL + "  - {mode: 1, at_least: 1 Hz}\n").encode(), "a")
+        parse((head + design + TAIL + "  - {mode: 1, at_least: 1 Hz}\n").encode(), "a")
     )
     most = case.model().frequencies(case.trajectory.q, [0.0, 0.0], 1).min()
     target = f"  - {{mode: 1, at_least: {most * (1.0 + above):.17g}}}\n"
-    _, row = solved(design, target, HELD)
+    _, row = solved(design, target, head)
     assert row.verdict == word, row.reason
     assert (row.conflict != ()) == (word == "infeasible")
     assert "no design" in row.optimality.words

@@ -12,6 +12,7 @@ Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -502,21 +503,25 @@ def rates(trajectory: Trajectory, y: Floats | None = None) -> Rates:
     return Rates(samples, q, rate, push)
 
 
-def rates_at(trajectory: Trajectory, y: Floats) -> tuple[Rates, Rates]:
-    """`rates` at design y (n_y,), and the slopes of q, q̇ and q̈ in y, each (m, n_q, n_y).
+def rates_at(trajectory: Trajectory, y: Floats, slopes: bool = True) -> tuple[Rates, Rates]:
+    """`rates` at design y (n_y,), and the slopes of q, q̇ and q̈ in y, each (m, n_q, n_y), or 0.
 
-    Those along paths that follow the design are central differences, of steps that move q by 1e-4.
+    Those along paths that follow the design are differences, of steps that move q by 1e-4, central
+    ones where the tip can follow its path on both sides.
     """
     found = rates(trajectory, None if trajectory.of_design is None else y)
-    slopes = np.zeros((3, *found.q.shape, len(y)))
-    if trajectory.of_design is not None:
+    by_y = np.zeros((3, *found.q.shape, len(y)))
+    if slopes and trajectory.of_design is not None:
         by_design = np.abs(trajectory.at(y)[1]).max(axis=(0, 1))
         for j in np.flatnonzero(by_design):
-            step = np.eye(len(y))[j] * 1e-4 / by_design[j]
-            ahead, behind = rates(trajectory, y + step), rates(trajectory, y - step)
+            step, sides = np.eye(len(y))[j] * 1e-4 / by_design[j], dict[int, Rates]()
+            for side in (1, -1):
+                with suppress(TrajectoryError):  # beyond what the tip reaches
+                    sides[side] = rates(trajectory, y + side * step)
+            ahead, behind = sides.get(1, found), sides.get(-1, found)
             pairs = zip(_values(ahead), _values(behind), strict=True)
-            slopes[..., j] = [(a - b) / (2.0 * step[j]) for a, b in pairs]
-    return found, Rates(found.samples, *slopes)
+            by_y[..., j] = [(a - b) / (max(len(sides), 1) * step[j]) for a, b in pairs]
+    return found, Rates(found.samples, *by_y)
 
 
 def _values(found: Rates) -> tuple[Floats, Floats, Floats]:
