@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.catalogues.branching import CatalogueSearch, ListedValues
-from eigassign.assignment.catalogues.choosing import held, solve_catalogue
 from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.listed import CatalogueSearch, ListedValues, held, solve_catalogue
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
@@ -95,7 +94,7 @@ def solve_assignment(
         UsageError: shapes that do not fit, values that are not finite, empty ranges.
         InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
         AccuracyError: the KKT residuals of the best answer found exceed 1e-8; or no combination
-            of the catalogues was found in a minute.
+            of the catalogues was found.
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
     program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)

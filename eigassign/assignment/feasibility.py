@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.program import Bounds, QuadraticProgram, ScaledProgram
@@ -13,6 +14,7 @@ from eigassign.assignment.targets import Floats
 from eigassign.errors import InfeasibleError
 
 T = TypeVar("T")
+MISSED = 1e-7  # of a constraint's terms: what programs leave of it
 TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `optimality` accepts
 
 
@@ -95,6 +97,19 @@ def constraints_agree(rows: Sequence[LinearConstraint], bounds: Bounds) -> bool:
     upper = np.append(np.ones(n), (high - fixed) / size + TOUCH)
     nothing = np.zeros(n)
     return feasible_point(ScaledProgram(G[:0], nothing[:0], G, lower, upper, nothing)) is not None
+
+
+def can_be_kept(
+    rows: Sequence[LinearConstraint], lower: Floats, upper: Floats
+) -> NDArray[np.bool_]:
+    """True of each box of designs (n, n_y) in which some design meets each limit, taken alone."""
+    kept = np.ones(len(lower), dtype=bool)
+    for row in rows:
+        ends = row.coefficients * lower, row.coefficients * upper
+        size = MISSED * np.maximum(*np.abs(ends)).sum(axis=1)
+        kept &= np.minimum(*ends).sum(axis=1) <= row.upper + size
+        kept &= np.maximum(*ends).sum(axis=1) >= row.lower - size
+    return kept
 
 
 def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> InfeasibleError:

@@ -55,26 +55,31 @@ class Cost:
     mass: Callable[[Floats], tuple[float, Floats]] | None = None  # its value and slopes (n_y,)
     free: float = 0.0  # m_ref
     is_affine: bool = True  # but for the choices
-    listed: Callable[[Floats], float] = lambda _y: 0.0
+    listed: Callable[[Floats], Floats | float] = lambda _y: 0.0  # (n,) of designs (n, n_y) too
 
     def __call__(self, y: Floats) -> tuple[float, Floats]:
         """The cost of a design y (n_y,), and its slopes (n_y,)."""
-        value, slopes = float(self.prices @ (y - self.reference)) + self.listed(y), self.prices
+        value, slopes = float(self.prices @ (y - self.reference) + self.listed(y)), self.prices
         if self.mass is None:
             return value, slopes
         mass, steep = self.mass(y)
         return value + self.of_mass * (mass - self.free), slopes + self.of_mass * steep
 
-    def least(self, lower: Floats, upper: Floats) -> float:
-        """A cost that no design between two (n_y,) of the same choices is below.
+    def least(self, lower: Floats, upper: Floats) -> Floats:
+        """Costs (n,) that no design between two (n, n_y) of the same choices is below.
 
-        It is one's where c is affine.
+        They are one's where c is affine.
         """
-        if self.is_affine or np.array_equal(lower, upper):
-            return self(np.where(self(lower)[1] > 0.0, lower, upper))[0]
-        cheapest = np.where(self.prices > 0.0, lower, upper)
-        linear = float(self.prices @ (cheapest - self.reference))
-        return linear + self.listed(cheapest) - self.of_mass * self.free
+        slopes, constant = self.prices, -self.of_mass * self.free
+        if self.mass is not None and self.is_affine:
+            mass, steep = self.mass(self.reference)
+            slopes, constant = slopes + self.of_mass * steep, constant + self.of_mass * mass
+        y = np.where(slopes > 0.0, lower, upper)
+        least = (y - self.reference) @ slopes + constant + self.listed(y)
+        if not self.is_affine:
+            for k in np.flatnonzero((lower == upper).all(axis=1)):
+                least[k] = self(y[k])[0]
+        return np.asarray(least)
 
 
 @dataclass(frozen=True)
@@ -152,11 +157,13 @@ class DesignProblem:
 
     def least_value(self, lower: Floats, upper: Floats, residual: Floats) -> float:
         """An F that no design between two (n_y,) is below, with these of `Least`."""
-        if self.is_one_sided and not len(residual):  # nothing is known of them
-            return -np.inf
-        return self.measure(residual) + (
-            0.0 if self.cost is None else self.cost.least(lower, upper)
-        )
+        cost = 0.0 if self.cost is None else self.cost.least(lower[None], upper[None])[0]
+        return self.least_measure(residual) + float(cost)
+
+    def least_measure(self, residual: Floats) -> float:
+        """`measure` of residuals of `Least`; without any nothing is known where it may be < 0."""
+        unknown = self.is_one_sided and not len(residual)
+        return -np.inf if unknown else self.measure(residual)
 
     def measure(self, residual: Floats) -> float:
         """F but for the cost."""

@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import CatalogueSearch
-from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, ON, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
+from eigassign.assignment.listed import KEEP
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
@@ -172,8 +171,7 @@ def assignment_row(
 
 def _is_first_order(found: Found) -> bool:
     """True where no small change is better; of listed values where all were gone through."""
-    ended = found.chosen is not None and found.chosen.ended is not None
-    return found.best.stationarity <= OPTIMAL and not ended
+    return found.best.stationarity <= OPTIMAL and found.ended is None
 
 
 def _deviated(
@@ -347,31 +345,28 @@ def _percent(share: float) -> str:
 
 
 def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> CatalogueRow | None:
-    """The search of the catalogues; of the one shot's best few what they are exactly worth."""
+    """The best combinations of the catalogues; of the one shot's what they are exactly worth."""
     own, found, one_shot = scene.file.design.catalogues, answer.found, answer.one_shot
-    if found is not None and found.chosen is not None:
-        search = found.chosen.search
-        of_rows = found.chosen.rows
-        worth = [(o.y, o.objective, o.seen) for o in found.chosen.optima]
+    if not own:
+        return None
+    if found is not None:
+        few = [(one.choice.rows, one.best) for one in found.outcomes[:KEEP]]
+        worth = [(rows, best.y, best.objective, best.seen) for rows, best in few]
         asked = found.variant.requirements
-    elif found is None and one_shot is not None and one_shot.search is not None:
-        search = one_shot.search
-        of_rows = tuple(one.rows for one in search.best)
-        variant = variant_of(Task(scene, tuple(wanted)), ())
+        looked, gap = found.choices - found.untried, 0.0 if _is_settled(found) else None
+    elif one_shot is not None and one_shot.search is not None:
+        search, variant = one_shot.search, variant_of(Task(scene, tuple(wanted)), ())
         exact, asked = variant.problem, variant.requirements
-        each = ((one.y, exact.appraise(one.y)) for one in search.best)
-        worth = [(y, exact(y, seen), seen) for y, seen in each]
+        each = ((one.rows, one.y, exact.appraise(one.y)) for one in search.best)
+        worth = [(rows, y, exact(y, seen), seen) for rows, y, seen in each]
+        looked, gap = search.solved, search.relative_gap
     else:
         return None
-    best = tuple(
-        _combination(scene, asked, {c.name: c.choices[k] for c, k in zip(own, rows, strict=True)},
-                     *each)
-        for rows, each in zip(of_rows, worth, strict=True)
-    )  # fmt: skip
-    if search is None:
-        return CatalogueRow(None, None, best)
-    gap = search.relative_gap if found is None else 0.0 if _is_settled(found) else None
-    return CatalogueRow(search.nodes, gap, best)
+    best = []
+    for rows, y, value, seen in worth:
+        choices = {c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}
+        best.append(_combination(scene, asked, choices, y, value, seen))
+    return CatalogueRow(looked, gap, tuple(best))
 
 
 def _combination(
@@ -423,29 +418,26 @@ def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> Op
         gap = search.relative_gap
         words = (
             f"the best of the catalogues for the linearised problem only, to {100 * gap:.2g} % of "
-            f"its objective, by branch and bound in {search.nodes} nodes"
+            f"its objective, with {search.solved} combinations solved"
         )
         return OptimalityRow("bounded", None, gap, words)
-    best, chosen = found.best, found.chosen
-    if chosen is not None and chosen.search is not None:
-        return _of_catalogues(found, chosen, chosen.search)
-    if chosen is None and is_proved(scene, found):
+    best = found.best
+    if not found.are_listed and is_proved(scene, found):
         met = best.seen.violation <= MET
         words = "no design " + ("is better" if met else "misses the limits by less")
         if answer.conflict is not None:
             words = "no design meets all limits, or misses them by less"
         words = f"the problem is convex: {words}"
         return OptimalityRow("proved", best.stationarity, None, words)
-    if chosen is not None:
-        words = f"the best found of {chosen.count} combinations of the catalogues; {best.end.value}"
-        return OptimalityRow("local", best.stationarity, None, words)
+    if found.are_listed:
+        return _of_choices(found)
     if bound is not None and bound.kind == "proved":
         return bound
     row = OptimalityRow("local", best.stationarity, None, "")
     row = row if bound is None or bound.kind == "local" else bound
     words = _of_starts(found) + ("" if bound is None else f"; {bound.words}")
     if found.untried:
-        words += f"; {found.untried} choices of how many modes are below the bands were not tried"
+        words += f"; {found.untried} of {found.choices} choices were not searched"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
     return replace(row, words=words)
@@ -461,29 +453,28 @@ def _of_starts(found: Found) -> str:
     return f"the {which} from {counted(tally.starts, 'start')}{further}"
 
 
-def _of_catalogues(found: Found, chosen: Chosen, search: CatalogueSearch) -> OptimalityRow:
-    """What is known where the catalogues were searched to the end."""
-    best, among = found.best, f"{chosen.count} combinations of the catalogues"
-    met, of_bands = best.seen.violation <= MET, bool(found.variant.below)
+def _of_choices(found: Found) -> OptimalityRow:
+    """What is known of the choices from catalogues, searched to the end or as far as solves go."""
+    best, among = found.best, f"{found.choices} choices from the catalogues"
     if _is_settled(found):
+        met = best.seen.violation <= MET
         words = f"of all {among} none {'is better' if met else 'meets all limits'}"
-        if not met and not of_bands:
+        if not met and not found.task.bands:
             words += ", or misses them by less"
-        most = best.objective + EQUAL * abs(best.objective)
-        if equal := sum(o.seen.violation <= MET and o.objective <= most for o in found.optima[1:]):
+        most, others = best.objective + EQUAL * abs(best.objective), found.outcomes[1:]
+        if equal := sum(o.missed <= MET and o.best.objective <= most for o in others):
             words += f"; {equal} more of the best are as good"
         return OptimalityRow("proved", best.stationarity, 0.0, words)
-    how = f"by branch and bound in {search.nodes} nodes"
-    if chosen.each:
-        how = "the other parameters of each from two starts"
-    words = f"the best found of {among}, {how}; others may be better"
+    each = f"{len(found.outcomes)} searched, the other parameters of each from several starts"
+    words = f"the best found of {among}: {each}"
+    if found.untried:
+        words += f"; {found.untried} were not searched, and may be better"
     return OptimalityRow("local", best.stationarity, None, words)
 
 
 def _is_settled(found: Found) -> bool:
-    """True where every combination of the catalogues is known not to be better."""
-    each = [one.chosen is not None and one.chosen.settled for one in found.variants]
-    return all(each) and not found.untried and not found.lost
+    """True where every choice is known not to be better."""
+    return found.is_discrete and not found.untried and not found.lost
 
 
 def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:

@@ -30,7 +30,7 @@ from eigassign.study.design.conclusions import (
     least_changed,
 )
 from eigassign.study.design.followed import require_one_shape
-from eigassign.study.design.one_shot import assign_design, catalogues
+from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.robust import robust_optimum
 from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
 from eigassign.study.results import RobustRow
@@ -108,9 +108,9 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
     found, robust, more = _between_samples(scene, wanted, starts, progress)
     notes += more
     steps = scene.file.assignment.steps
-    contradiction = conflict(found, catalogues(scene.file), steps, found.task.scene.limits)
+    contradiction = conflict(found, steps, found.task.scene.limits)
     notes += idle_notes(scene.model.y_names, found, scene.initial)
-    notes += _band_notes(found)
+    notes += _choice_notes(found)
     if found.lost:
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
@@ -150,22 +150,22 @@ def _between_samples(
     return found, robust, notes
 
 
-def _band_notes(found: Found) -> Iterator[str]:
-    """Say what came of the numbers of modes below the bands, where there was a choice."""
+def _choice_notes(found: Found) -> Iterator[str]:
+    """Say what came of the choices from lists and of numbers of modes below bands."""
     if found.choices > 1:
-        rest = f"{found.searches} searches, each with some of the bands, cover the others"
-        if found.untried == found.choices:
-            rest = f"{found.searches} searches with some of the bands were stopped before"
-        yield (
-            f"of {found.choices} choices of how many modes are below each band "
-            f"{found.untried or 'none'} {'was' if found.untried < 2 else 'were'} left out: {rest}"
-        )
-    for one in found.variants[:SAID] if len(found.variants) > 1 else ():
-        below = ((band, k) for band, k in one.variant.below if k is not None)
-        choice = ", ".join(f"{band} with {k} below it" for band, k in below)
-        best, missed = one.optima[0], one.optima[0].seen.violation
-        value = -best.objective if one.variant.problem.is_one_sided else best.objective
-        how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {value:.6g}"
+        searched = len(found.outcomes)
+        excluded = found.choices - searched - found.untried
+        each = ((searched, "searched"), (excluded, "excluded by bounds"))
+        left = ((found.untried, "not searched: raise `starts` or `seconds`, or shorten the lists"),)
+        said = ", ".join(f"{n} {what}" for n, what in (*each, *left) if n)
+        of = "lists" * found.are_listed, "modes below each band" * bool(found.task.bands)
+        yield f"of {found.choices} choices of {' and '.join(filter(None, of))}: {said}"
+    for one in found.outcomes[:SAID] if found.task.bands and len(found.outcomes) > 1 else ():
+        numbers = zip(found.task.bands, one.choice.below, strict=True)
+        choice = ", ".join(f"{band.label} with {k} below it" for band, k in numbers)
+        best = one.best
+        value = -best.objective if found.variant.problem.is_one_sided else best.objective
+        how = f"missed by {100 * one.missed:.2g} %" if one.missed > MET else f"met at {value:.6g}"
         yield f"{choice}: {how}"
 
 

@@ -16,13 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import ListedValues
-from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_point import first_order
 from eigassign.assignment.exact.design_problem import (
     MET,
@@ -42,8 +39,8 @@ from eigassign.errors import EigassignError
 from eigassign.study.checks.mesh import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.one_shot import cost
-from eigassign.study.design.search.optimum import Found
-from eigassign.study.design.search.variants import lacking, variant_of
+from eigassign.study.design.search.optimum import Found, can_be_met
+from eigassign.study.design.search.variants import lacking
 from eigassign.study.results import AimRow, ViolationRow
 from eigassign.study.scene import Scene
 
@@ -114,7 +111,7 @@ def _rooms(found: Found, wanted: Sequence[Requirement], y: Floats) -> Iterator[f
             yield least_room(model, band, row, path, one)
 
 
-MOST_DIVIDED = 60  # searches to say whether some limits can be met together, with bands among them
+MOST_CHOICES = 60  # searches to say whether some limits can be met together
 MOST = 12  # limits of which the smallest contradiction is looked for
 # Steps of a search that nobody has asked to end sooner: of 20 runs 19 took at most 15, one 32
 ENOUGH = 100
@@ -183,17 +180,12 @@ class Conflict:
     smallest: bool
 
 
-def conflict(
-    found: Found,
-    listed: Sequence[ListedValues],
-    steps: int,
-    of_design: Sequence[LimitedQuantity],
-) -> Conflict | None:
+def conflict(found: Found, steps: int, of_design: Sequence[LimitedQuantity]) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
-    Each trial starts at the compromise, and searches the catalogues ``listed``, for each number of
-    modes below the bands that it comes into. Of a search that was ended, or that left out some
-    choices of these, nothing but limits that need no frequency can be said to contradict.
+    Each trial starts at the compromise, for every choice that nothing excludes. Of a search that
+    was ended, or that left out some choices, nothing but limits that need no frequency can be said
+    to contradict.
     """
     best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET:
@@ -209,7 +201,7 @@ def conflict(
     answers: list[bool | None] = []
 
     def contradict(rest: Sequence[str]) -> bool:
-        met = not rest or _can_be_met(found, rest, listed, steps)
+        met = not rest or can_be_met(found, rest, MOST_CHOICES, steps)
         answers.append(met)
         return met is False
 
@@ -232,53 +224,6 @@ def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
     problem = DesignProblem(lambda y: alone.appraise(y, unasked), lower, upper)
     best = minimise(problem, y, max(scene.file.assignment.steps, ENOUGH))
     return None if best.seen.violation <= MET else limit.amount(best.y)
-
-
-def _can_be_met(
-    found: Found, names: Sequence[str], listed: Sequence[ListedValues], steps: int
-) -> bool | None:
-    """True where the limits that are named can be met together; None where that cannot be said.
-
-    First without bands, then with the number of modes below one after the other that the designs
-    found are in.
-    """
-    start, bands = found.best.y, found.task.bands
-    named = {k for k, band in enumerate(bands) if band.name in names}
-    none: tuple[int | None, ...] = (None,) * len(bands)
-    open_ = [none]
-    for _ in range(MOST_DIVIDED):
-        if not open_:
-            return False
-        below = open_.pop()
-        problem = variant_of(found.task, below, missed=True).with_limits(names)
-        try:
-            met, y = _met(problem, listed, start, steps)
-        except EigassignError:
-            return True
-        if met is None:
-            return None
-        if not met:
-            continue
-        left_out = [k for k in named if below[k] is None]
-        errors = lacking(found.task, y) if left_out else []
-        band = max(left_out, key=lambda k: float(errors[k].min()), default=None)
-        if band is None or errors[band].min() <= MET:
-            return True
-        open_ += [(*below[:band], n, *below[band + 1 :]) for n in found.counts[band]]
-    return None
-
-
-def _met(
-    problem: DesignProblem, listed: Sequence[ListedValues], start: Floats, steps: int
-) -> tuple[bool | None, Floats]:
-    """Whether all limits of a problem can be met, None of long catalogues; and how nearly."""
-    if not listed:
-        best = minimise(problem, start, steps)
-        return best.seen.violation <= MET, best.y
-    chosen = choose(problem, listed, [start], steps, monotonic() + 10.0)  # s for each limit
-    best = chosen.optima[0]
-    met = best.seen.violation <= MET
-    return None if chosen.search is None and not met else met, best.y
 
 
 # --- What changes nothing
@@ -355,7 +300,7 @@ def least_changed(found: Found, initial: Floats) -> Found:
     Only where the merit is not worse than 1e-9 of itself.
     """
     problem, best = found.variant.problem, found.best
-    settled = found.chosen is not None or found.variant.requirements.least_change is not None
+    settled = found.are_listed or found.variant.requirements.least_change is not None
     if settled or found.clearances:  # a band is checked at this very design
         return found
     free = np.flatnonzero(problem.upper > problem.lower)
@@ -379,4 +324,4 @@ def least_changed(found: Found, initial: Floats) -> Found:
         return found
     left, limits = first_order(problem, y, seen)
     moved = replace(best, y=y, seen=seen, objective=value, stationarity=left, limits=limits)
-    return replace(found, optima=(moved, *found.optima[1:]))
+    return found.replaced(moved)

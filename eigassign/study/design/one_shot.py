@@ -1,7 +1,7 @@
 """The paper's answer: one quadratic program about one expansion point.
 
 The linear model of eq. (9) comes from the partially linearised expansion, the design from the
-quadratic program of eqs. (13)–(14) (`eigassign.assignment`), over catalogues by branch and bound.
+quadratic program of eqs. (13)–(14) (`eigassign.assignment`), over catalogues too.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment, solve_assignment
-from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.linear import LinearModel
+from eigassign.assignment.listed import ListedValues
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
@@ -102,7 +102,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
     listed = catalogues(scene.file)
     chosen = {k: choice for own in listed for k, choice in _chosen(own, optimal)}
     unit = price_of_one(scene.file)
-    whole = {own.columns[0]: unit * own.price(optimal) for own in listed if own.prices}
+    whole = {own.columns[0]: unit * float(own.price(optimal)) for own in listed if own.prices}
     return tuple(
         DesignRow(
             name,

@@ -25,7 +25,7 @@ from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.one_shot import cost
-from eigassign.study.design.search.optimum import FEW, Found, find_optimum
+from eigassign.study.design.search.optimum import Found, find_optimum
 from eigassign.study.design.search.response import reduced_about
 from eigassign.study.design.search.variants import variant_of
 from eigassign.study.monotone import box_corners
@@ -33,6 +33,7 @@ from eigassign.study.results import RobustRow, RobustTarget
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+FEW = 5  # optima from which the next round is searched
 ROUNDS = 12  # of scenarios: known cases took at most 4
 STEPS = 20  # to the worst deviation: from the best corner mostly none
 CUT = 1e-5  # relative: a deviation that is worse by more is a scenario

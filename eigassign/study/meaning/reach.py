@@ -12,13 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from time import monotonic
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
@@ -30,7 +28,6 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
-from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.search.response import DesignResponse, Glances, outlook_of, response_of
 from eigassign.study.design.search.variants import SPREAD, Designs
 from eigassign.study.monotone import corners, effects
@@ -40,7 +37,7 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
 STEPS, STARTS = 30, 3  # of a search at one sample
-CHOICES, SECONDS = 8, 10.0  # of the numbers of modes below bands there; of a search of catalogues
+CHOICES = 8  # of the numbers of modes below bands there
 R = TypeVar("R", bound=Requirement)
 
 
@@ -155,12 +152,14 @@ def _nearest(
 ) -> float | None:
     """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
 
-    Within the linear limits and those of the ``others`` that hold at this sample, and of catalogues
-    by a search of their tree. The search ends with the first start that leads within ``allowed`` of
-    it. None where none leads to a design within the limits.
+    Within the linear limits and those of the ``others`` that hold at this sample. The search ends
+    with the first start that leads within ``allowed`` of it. None where none leads to a design
+    within the limits, and of catalogues, of which a few starts say nothing.
     """
     lower, upper = scene.bounds
-    if not constraints_agree(scene.constraints, Bounds(lower, upper)):
+    if scene.file.design.catalogues or not constraints_agree(
+        scene.constraints, Bounds(lower, upper)
+    ):
         return None
     at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
     there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal)
@@ -169,7 +168,7 @@ def _nearest(
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
     followed = followers(alone, [replace(there, followed=wanted.followed), *beside, *bands])
-    listed, found = catalogues(scene.file), []
+    found = []
     glances: dict[int, Glances] = {}
     for below in Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]:
         kept = []
@@ -187,11 +186,7 @@ def _nearest(
         )
         for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
             try:
-                if listed:
-                    chosen = choose(problem, listed, [start], STEPS, monotonic() + SECONDS)
-                    best = chosen.optima[0]
-                else:
-                    best = minimise(problem, start, STEPS)
+                best = minimise(problem, start, STEPS)
             except EigassignError:
                 continue
             if best.seen.violation > MET:

@@ -1,60 +1,107 @@
-"""The design that meets a case's targets best, by the sequential method on exact frequencies.
+"""The design that meets a case's targets best: one loop over all that is discrete.
 
-Every problem that the targets make (`variants`) is tried from several starts, and the best kept.
+A **choice** is a row of every list and a number of modes below every band. Each makes a problem of
+its own (`variants`). The loop takes the choice that promises most by what is known of it:
+
+    a bound      no design of it is better: by linear limits, price and mass, and, where frequencies
+                 are monotone in all that is continuous, by those of two corners, on more and more
+                 samples
+    an estimate  what one start leads to, on few samples
+    its optimum  from all starts, on all samples; bands are looked at between these too
+
+It ends where nothing that is left can be better, or where the exact solves are used up: what no
+bound excludes and no search has seen is counted. Nothing else is done for lists, bands or both.
+
+Bands of an optimum are checked (`clearance`): where modes come too near between the samples, the
+limits at the samples are drawn in by what is lacking, and it is sought anew from where it was.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import prod
 from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import KEEP, ListedValues
-from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, are_few, choose, combinations
 from eigassign.assignment.exact.design_problem import MET, best_first
-from eigassign.assignment.exact.optima import NOTHING, SAME, Tally
-from eigassign.assignment.exact.sequential import Optimum, minimise, worth
+from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
+from eigassign.assignment.feasibility import can_be_kept
+from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
 from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.targets import frozen
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import EigassignError, InfeasibleError
+from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import check_band, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.search.response import reduced_models
 from eigassign.study.design.search.starts import (
+    SOLVES,
     Searched,
     coarse_to_fine,
-    continued,
     most_starts,
     search_starts,
 )
 from eigassign.study.design.search.variants import (
     SPREAD,
+    Counts,
     Designs,
     PosedProblem,
     Task,
     counts_of,
-    lacking,
     variant_of,
 )
 from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-SEARCHES = 100  # of branches: from then on only the best goes on, in its likeliest part
-# Designs all over the bounds from which a branch is searched too: with 1, 4 of 7 known cases ended
-# up to 45 % short of their best optimum, with 4 none
-PROMISING = 4
-DRAWN = 6  # times that the limits of a branch are drawn in
-FEW = 5  # branches of an ended search that are completed
-Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
+MOST = 200_000  # choices that are gone through: more are those about the best, in two lists at most
+ROUNDS = 5  # times that others are made about a better one
+TRIES = 100  # choices that are estimated before the best of them is searched
+TOGETHER = 64  # choices that are bounded together
+PROMISING = 4  # of designs all over the bounds: those that a choice with bands is searched from
+DRAWN = 6  # times that limits are drawn in
+BEFORE = 1e-12  # of F: less is no better
+STOPPED = (End.SECONDS, End.INTERRUPTED)
+BOUNDED, TRIED, DONE, EXCLUDED = 0, 100, 101, 102  # what is known of a choice; bounds by level
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A row of every list, and k of every band; None of one that is left out."""
+
+    rows: Rows
+    below: Counts
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A choice that was searched: its optima, the best first, and its bands as they were checked.
+
+    ``missed`` is what the best misses, of bands between the samples too.
+    """
+
+    choice: Choice
+    searched: Searched
+    missed: float
+    clearances: tuple[ClearanceRow, ...] = ()
+
+    @property
+    def best(self) -> Optimum:
+        """The best design found."""
+        return self.searched.optima[0]
+
+    @property
+    def worth(self) -> tuple[float, float]:
+        """What is missed, and F."""
+        return self.missed, self.best.objective
 
 
 @dataclass(frozen=True)
@@ -62,25 +109,55 @@ class Found:
     """The best design, what it was chosen among, and how much work that was."""
 
     task: Task
-    counts: tuple[Sequence[int], ...]  # the numbers of modes that may be below each band
-    choices: int  # of them for all bands
-    variant: PosedProblem
-    optima: tuple[Optimum, ...]  # distinct local optima of the variant, the best first
-    variants: tuple[Searched, ...]  # it, and others with some of the bands, the best first
+    outcomes: tuple[Outcome, ...]  # of the choices that were searched, the best first
+    choices: int  # of all lists and bands
+    untried: int  # of these, neither excluded nor searched
     initial: tuple[float, float]  # violation and objective of the initial design
-    clearances: tuple[ClearanceRow, ...]  # of every band along every trajectory
     starts: int
-    tally: Tally | None  # of the variant; None of catalogues
     exact_solves: int
-    searches: int
-    chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
-    lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
-    untried: int = 0  # choices of the numbers of modes below the bands
+    every: Choices  # what is known of each choice
+    ended: End | None = None  # by the clock or by Ctrl-C
+
+    @property
+    def variant(self) -> PosedProblem:
+        """The problem of the best choice."""
+        return self.outcomes[0].searched.variant
+
+    @property
+    def optima(self) -> tuple[Optimum, ...]:
+        """Its distinct local optima, the best first."""
+        return self.outcomes[0].searched.optima
 
     @property
     def best(self) -> Optimum:
         """The best design."""
         return self.optima[0]
+
+    @property
+    def clearances(self) -> tuple[ClearanceRow, ...]:
+        """Every band along every trajectory."""
+        return self.outcomes[0].clearances
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Designs passed over because a followed mode is lost there."""
+        return tuple(dict.fromkeys(line for one in self.outcomes for line in one.searched.lost))
+
+    @property
+    def are_listed(self) -> bool:
+        """True where lists are chosen from."""
+        return bool(self.every.listed)
+
+    @property
+    def is_discrete(self) -> bool:
+        """True where nothing continuous is left beside the choices."""
+        return self.every.is_discrete
+
+    def replaced(self, best: Optimum) -> Found:
+        """The same with another best design."""
+        first, *others = self.outcomes
+        searched = replace(first.searched, optima=(best, *self.optima[1:]))
+        return replace(self, outcomes=(replace(first, searched=searched), *others))
 
     def initial_solved(self, count: int) -> Solved | None:
         """The initial design as the search has solved it; None without so many modes."""
@@ -109,7 +186,9 @@ def find_optimum(
     """
     deadline = deadline_of(scene.file) if deadline is None else deadline
     designs = [*near, scene.initial, *starts][: most_starts(scene.file)]
-    return _Tree(scene, wanted, designs, deadline, progress, scenarios).found()
+    bands = sum(len(one.bands) for one in wanted)
+    task = Task(scene, tuple(wanted), (Margin(MARGIN),) * bands, scenarios=tuple(scenarios))
+    return _Search(task, designs, deadline, progress).found()
 
 
 def deadline_of(file: CaseFile) -> float:
@@ -118,340 +197,351 @@ def deadline_of(file: CaseFile) -> float:
     return np.inf if seconds is None else monotonic() + seconds
 
 
-@dataclass(frozen=True)
-class _Branch:
-    """All choices that have some numbers of modes below bands."""
-
-    below: Counts
-    searched: Searched
-    margins: tuple[Margin, ...]
-    was: Counts | None = None  # of a settled branch, before it was settled
-    drawn: int = 0  # times that its limits were drawn in
-    is_alone: bool = True  # of a settled one: what is beside it was searched
-
-    @property
-    def best(self) -> Optimum:
-        """The best design found."""
-        return self.searched.optima[0]
+# --- What is known of every choice
 
 
-class _Tree:
-    """Branch and bound over the numbers of modes below the bands.
+class Choices:
+    """All choices of a task, and what no design of each is below: more and more, as it is asked.
 
-    A branch is searched with some of the bands only, the first with none: as far as a few starts
-    find its optimum, no choice of it has a better one. The best branch of all is taken. If its
-    optimum is in a band that was left out, it is divided by the number of modes below this band;
-    otherwise it is settled, from all starts, on all samples and exactly.
-
-    Bands of an answer are checked (`clearance`): where modes come too near between the samples, the
-    limits at the samples are drawn in by what is lacking, and the answer is sought anew from where
-    it was. It stays as it was where no choice can be met with limits that are drawn in so far.
+    Of the limits ``names`` only, where these are given, and then without bands that are not named.
     """
 
     def __init__(
+        self, task: Task, belows: Sequence[Counts], about: Floats, names: Sequence[str] | None
+    ) -> None:
+        self.task, self.names, self.listed = task, names, catalogues(task.scene.file)
+        self.belows = belows
+        lower, upper = task.scene.bounds
+        columns = [column for own in self.listed for column in own.columns]
+        self.is_discrete = bool(columns) and not np.delete(upper > lower, columns).any()
+        allowed = [own.distinct for own in self.listed]
+        self.count = prod(map(len, allowed)) * len(belows)
+        self.is_whole = self.count <= MOST
+        rows = np.zeros((1, 0), dtype=np.intp)
+        if self.listed and self.is_whole:
+            rows = np.concatenate([*every_combination(allowed, MOST)])
+        elif self.listed:
+            rows = self._near(about)
+        self.bases: dict[int, PosedProblem] = {}
+        self.rows, self.of = (
+            np.tile(rows, (len(belows), 1)),
+            np.repeat(range(len(belows)), len(rows)),
+        )
+        self.lower, self.upper = (with_rows(self.listed, self.rows, y) for y in (lower, upper))
+        self.level = np.full(len(self.of), BOUNDED)
+        kept = can_be_kept(task.scene.constraints, self.lower, self.upper)
+        self.soft = not kept.any()  # linear limits are missed least, as others are
+        self.missed = np.where(kept | self.soft, 0.0, np.inf)
+        problem = self.base(0).problem
+        cost = None if problem.cost is None else problem.cost.least(self.lower, self.upper)
+        self.cost = np.zeros(len(self.of)) if cost is None else cost
+        self.value = self.cost + problem.least_measure(np.zeros(0))
+
+    def _near(self, about: Floats) -> Ints:
+        """The combinations that differ from the nearest to a design in two lists at most."""
+        centre = np.array([own.nearest(about) for own in self.listed])
+        found = [centre]
+        for pair in combinations(range(len(self.listed)), 2):
+            some = [own.distinct if k in pair else centre[[k]] for k, own in enumerate(self.listed)]
+            found += [*np.concatenate([*every_combination(some, MOST)])]
+        return np.unique(found, axis=0)
+
+    def choice(self, k: int) -> Choice:
+        """The rows and the numbers of one."""
+        return Choice(tuple(self.rows[k].tolist()), self.belows[self.of[k]])
+
+    def base(self, k: int) -> PosedProblem:
+        """The problem of some numbers below the bands, whatever the rows."""
+        if k not in self.bases:
+            self.bases[k] = self._only(variant_of(self.task, self.belows[k], self.soft))
+        return self.bases[k]
+
+    def posed(self, k: int, task: Task) -> PosedProblem:
+        """The problem of a choice in a task, such as on few samples."""
+        held = self.lower[k], self.upper[k]
+        return self._only(variant_of(task, self.belows[self.of[k]], self.soft, held))
+
+    def _only(self, variant: PosedProblem) -> PosedProblem:
+        if self.names is None:
+            return variant
+        return replace(variant, problem=variant.with_limits(self.names))
+
+    @property
+    def bounds_left(self) -> NDArray[np.bool_]:
+        """True of each of which more can be known before it is searched."""
+        least = [self.base(k).problem.least for k in range(len(self.belows))]
+        levels = np.array([0 if one is None else one.levels for one in least])
+        return np.asarray(self.level < levels[self.of])
+
+    def ahead(self, open_: NDArray[np.bool_], behind: NDArray[np.bool_] | None = None) -> Ints:
+        """Those that are open, the best first by what is known of them; some ``behind`` others."""
+        own = np.flatnonzero(open_)
+        missed, value = self.missed[own], self.value[own]
+        met = missed <= missed.min(initial=np.inf) + MET
+        late = np.zeros(len(own)) if behind is None else behind[own]
+        return own[np.lexsort((value, np.where(met, 0.0, missed), late))]
+
+    def learn(self, first: int, order: Ints) -> None:
+        """Look at the next level of one choice, and of some that are alike in this order."""
+        level, base = self.level[first], self.base(self.of[first])
+        alike = order[(self.level[order] == level) & (self.of[order] == self.of[first])]
+        alike, know = alike[:TOGETHER], base.problem.least
+        known = () if know is None else know(int(level), self.lower[alike], self.upper[alike])
+        for k, (missed, residual) in zip(alike, known, strict=True):
+            self.missed[k] = max(self.missed[k], missed)
+            least = base.problem.least_measure(residual) + self.cost[k]
+            self.value[k] = max(self.value[k], least)
+        self.level[alike] += 1
+
+
+# --- The loop
+
+
+class _Search:
+    """The choices, those that were searched, and how much work that was."""
+
+    def __init__(
         self,
-        scene: Scene,
-        wanted: Sequence[Requirement],
+        task: Task,
         starts: Sequence[Floats],
         deadline: float,
         progress: Callable[[str], None],
-        scenarios: Sequence[Floats] = (),
     ) -> None:
-        bands = sum(len(one.bands) for one in wanted)
-        margins = (Margin(MARGIN),) * bands
-        self.task = Task(scene, tuple(wanted), margins, scenarios=tuple(scenarios))
-        models = None if followed_modes(scene.file) else reduced_models(scene)
-        self.levels: dict[tuple[Margin, ...], tuple[Task, ...]] = {
-            self.task.margins: coarse_to_fine(self.task, models)
-        }
-        self.listed = catalogues(scene.file)
-        self.starts, self.deadline, self.progress = starts, deadline, progress
-        few = self.at(self.task.margins)[0]
+        self.task, self.starts = task, starts
+        self.deadline, self.progress = deadline, progress
+        models = None if followed_modes(task.scene.file) else reduced_models(task.scene)
+        self.levels = coarse_to_fine(task, models)
+        few = self.levels[0]
         self.designs = Designs.all_over(few.scene, few.wanted, SPREAD) if few.bands else None
-        self.counts: tuple[Sequence[int], ...] = ()
-        self.every: list[tuple[int, ...]] = []  # choices that combinations of catalogues have
-        if self.designs is not None:
-            self.counts, self.every = self.designs.counts, _of_combinations(self.task, self.listed)
-        if self.every:
-            both = zip(self.counts, zip(*self.every, strict=True), strict=True)
-            self.counts = tuple(sorted({*some, *more}) for some, more in both)
-        self.made: list[Searched] = []
-        self.untried = 0  # choices that no search stands for
+        belows: Sequence[Counts] = [()] if self.designs is None else self.designs.choices
+        belows = [*dict.fromkeys([*_of_lists(task), *belows])]
+        self.every = Choices(task, belows, starts[0], None)
+        self.outcomes: list[Outcome] = []
+        self.failed: EigassignError | None = None
+        self.ended: End | None = None
+        self.made = self.tried = self.spent = 0
+        self.keep = KEEP if self.every.is_discrete else 1
 
     def found(self) -> Found:
-        """The best settled branch, and what it was chosen among."""
-        open_ = list(self.roots())
-        answer: _Branch | None = None
-        unclear: list[_Branch] = []
-        while open_ and answer is None and not self.stopped:
-            best, *open_ = best_first(open_, _promise)
-            missed = best.best.seen.violation
-            if missed > MET and unclear:
+        """The best of all choices."""
+        for _ in range(ROUNDS):
+            self.run()
+            better = self.about_the_best()
+            if better is None or self.ended:
                 break
-            if best.was is None:
-                if len(self.made) > SEARCHES:
-                    self.untried += sum(self.size(one.below) for one in open_ if one.was is None)
-                    open_ = [one for one in open_ if one.was is not None]
-                open_ += self.divided(best)
-                continue
-            if self.counts and MET < missed <= 2.0 * MARGIN and not best.drawn:
-                none = (Margin(),) * len(self.counts)  # but for the margin it may be met
-                best = self.branch(best.below, [best.best.y], none, best.was, DRAWN)
-                missed = best.best.seen.violation
-            if not best.is_alone:
-                open_ += [replace(best, is_alone=True), *self.beside(best)]
-                continue
-            rows = _clearances(self.task, best.below, best.best.y)
-            if missed > MET or not wanting(rows):
-                answer = best
-                continue
-            drawn = self.drawn_in(best, rows)
-            if drawn is None or drawn.best.seen.violation > MET:
-                unclear.append(best)
-            else:
-                open_.append(drawn)
-        if answer is None and self.stopped:
-            self.untried += sum(self.size(one.below) for one in open_ if one.was is None)
-            unclear += map(self.completed, best_first(open_, _promise)[:FEW])
-        answer = answer or best_first(unclear, _promise)[0]
-        others = best_first((one.searched for one in open_), lambda one: worth(one.optima[0]))
-        return self.account(answer, others)
-
-    def roots(self) -> Iterator[_Branch]:
-        """Yield the branch without bands; or every choice that combinations of catalogues have.
-
-        Where none of these can be met, the others too: one may be missed by less.
-        """
-        none: Counts = (None,) * len(self.counts)
-        if not self.every:
-            yield self.branch(none, self.starts, was=None if none else none)
-        known, missed = self.every, True
-        likely = self.designs.choices if self.designs is not None and known else ()
-        others = [one for one in likely if one not in known]
-        for k, below in enumerate([*known, *others]):
-            if k == len(known):
-                if not missed:
-                    return
-                self.every = [*known, *others]
-            if k == SEARCHES or (k and self.stopped):
-                self.untried = len(self.every) - k
-                return
-            root = self.branch(below, self.starts, was=below)
-            missed = missed and root.best.seen.violation > MET
-            yield root
-
-    def at(self, margins: tuple[Margin, ...]) -> tuple[Task, ...]:
-        """The levels with limits drawn in so far."""
-        if margins not in self.levels:
-            levels = (replace(one, margins=margins) for one in self.levels[self.task.margins])
-            self.levels[margins] = tuple(levels)
-        return self.levels[margins]
-
-    @property
-    def stopped(self) -> bool:
-        """True where the last search was ended, or that of catalogues too long."""
-        last = self.made[-1]
-        return last.ended is not None or (last.chosen is not None and last.chosen.search is None)
-
-    def account(self, answer: _Branch, others: Sequence[Searched]) -> Found:
-        """The answer with what it was chosen among, and how much work that was."""
-        scene, (best, *more) = self.task.scene, answer.searched.optima
-        variant = answer.searched.variant
-        own = [one.tally for one in self.made if one.variant.below == variant.below and one.tally]
-        ended = self.made[-1].ended
+            self.every = better
+        if not self.outcomes and self.failed is not None:
+            raise self.failed
+        scene, every = self.task.scene, self.every
+        best, *others = best_first(self.outcomes, lambda one: one.worth)
+        if self.ended is not None:
+            optima = replace(best.best, end=self.ended), *best.searched.optima[1:]
+            best = replace(best, searched=replace(best.searched, optima=optima))
+        glances = (one for level in self.levels for one in level.glances.values())
         return Found(
             task=self.task,
-            counts=self.counts,
-            choices=len(self.every) or self.size((None,) * len(self.counts)),
-            variant=variant,
-            optima=(best if ended is None else replace(best, end=ended), *more),
-            variants=(answer.searched, *others),
-            initial=_initial(scene, variant),
-            clearances=_clearances(self.task, answer.below, best.y),
-            starts=sum(one.starts for one in self.made),
-            tally=max(own, key=lambda tally: tally.starts, default=None),
-            exact_solves=len(scene.path.q)
-            + sum(one.exact_solves for one in self.made)
-            + sum(
-                one.exact_solves
-                for levels in self.levels.values()
-                for one in levels[-1].glances.values()
-            ),
-            searches=len(self.made),
-            chosen=answer.searched.chosen,
-            lost=tuple(dict.fromkeys(line for one in self.made for line in one.lost)),
-            untried=self.untried,
+            outcomes=(best, *others),
+            choices=every.count,
+            untried=int((every.level < DONE).sum()) + every.count - len(every.of),
+            initial=_initial(scene, best.searched.variant),
+            starts=self.made,
+            exact_solves=len(scene.path.q) + self.spent + sum(one.exact_solves for one in glances),
+            every=every,
+            ended=self.ended,
         )
 
-    def branch(
-        self,
-        below: Counts,
-        near: Sequence[Floats],
-        margins: tuple[Margin, ...] | None = None,
-        was: Counts | None = None,
-        drawn: int = 0,
-    ) -> _Branch:
-        """The branch as it is searched; from all starts if it is settled and was not drawn in."""
-        levels = self.at(margins or self.task.margins)
-        near, clock = near[: most_starts(self.task.scene.file)], (self.deadline, self.progress)
-        if self.listed:
-            searched = _search_catalogues(levels[-1], below, self.listed, levels, near, *clock)
-        else:
-            made = sum(one.starts for one in self.made)
-            spread = was is not None and not drawn
-            levels = levels if was is not None else levels[:1]
-            searched = search_starts(levels, below, near, made, *clock, spread)
-        self.made.append(searched)
-        is_alone = drawn > 0 or not was or None not in was
-        return _Branch(below, searched, levels[-1].margins, was, drawn, is_alone)
+    def run(self) -> None:
+        """Go on with the choice that promises most, as long as one may be better."""
+        every = self.every
+        try:
+            while (order := self.ahead()).size and self.ended is None:
+                k = int(order[0])
+                if monotonic() > self.deadline:
+                    self.ended = End.SECONDS
+                elif every.level[k] < TRIED and every.bounds_left[k]:
+                    every.learn(k, order)
+                elif every.level[k] < TRIED and len(every.of) > 1 and not every.is_discrete:
+                    self.estimate(k)
+                elif self.outcomes and self.spent > SOLVES:
+                    break
+                else:
+                    self.search(k)
+        except KeyboardInterrupt:
+            self.ended = End.INTERRUPTED
+        if not self.outcomes and self.ended is not None:  # the nearest, as far as it is known
+            away = np.abs(every.lower + every.upper - 2.0 * self.starts[0])
+            width = np.where((reach := np.ptp(every.lower, axis=0)) > 0.0, reach, np.inf)
+            self.search(int((away / width).sum(axis=1).argmin()))
 
-    def divided(self, branch: _Branch) -> Iterator[_Branch]:
-        """Yield the parts of a branch by the number of modes below the band that it is in most.
+    def ahead(self) -> Ints:
+        """The choices that may be better than the best few that were searched."""
+        every = self.every
+        best = best_first(self.outcomes, lambda one: one.worth)[: self.keep]
+        open_ = every.level < DONE
+        if len(best) == self.keep:
+            missed, value = best[-1].worth
+            least = value - BEFORE * abs(value)
+            beyond = every.missed > MET if missed <= MET else every.missed >= missed - MET
+            beyond |= (every.value >= least) & (missed <= MET)
+            beyond &= every.level < TRIED  # what is a bound
+            every.level[beyond & open_] = EXCLUDED
+            open_ &= ~beyond
+        late = (every.level < TRIED) & ~every.bounds_left & (self.tried >= TRIES)
+        return every.ahead(open_, late)
 
-        Or the branch settled, where it is in no band by more than it misses anyway; where the room
-        is to be wide, where every band leaves as much as there is.
-        """
-        errors, missed = self.lacking(branch), max(branch.best.seen.violation, MET)
-        if self.task.scene.file.assignment.objective == "widest" and missed <= MET:
-            found = branch.searched.variant
-            has_rows = len(found.requirements.aims) > 0
-            missed = found.problem.measure(branch.best.seen.residual) + MET if has_rows else -np.inf
-        nearest = [int(own.argmin()) for own in errors]
-        open_ = [k for k, n in enumerate(branch.below) if n is None and errors[k].min() > missed]
-        if not open_:
-            both = zip(branch.below, nearest, strict=True)
-            settled = tuple(n if own is None else own for own, n in both)
-            yield self.branch(settled, [branch.best.y, *self.starts], was=branch.below)
+    def estimate(self, k: int) -> None:
+        """What one start leads to, on few samples."""
+        variant = self.every.posed(k, self.levels[0])
+        steps, self.tried = self.task.scene.file.assignment.steps, self.tried + 1
+        start, *_ = self.near(variant)
+        self.every.level[k] = TRIED
+        self.progress(f"  choice {self.tried} of {len(self.every.of)}")
+        try:
+            found = minimise(variant.problem, start, steps, self.deadline)
+        except EigassignError:
+            self.every.missed[k] = np.inf
             return
-        band = max(open_, key=lambda k: float(errors[k].min()))
-        counts = sorted({*self.counts[band], nearest[band]}, key=lambda n: float(errors[band][n]))
-        if len(self.made) > SEARCHES:
-            counts, others = counts[:1], counts[1:]
-            self.untried += sum(self.size(_with(branch.below, band, n)) for n in others)
-        for n in counts:
-            below = _with(branch.below, band, n)
-            if self.stopped:
-                self.untried += self.size(below)
-            else:
-                yield self.branch(below, self.near(branch, below))
+        self.ended = found.end if found.end in STOPPED else self.ended
+        self.every.missed[k], self.every.value[k] = worth(found)
+        self.spent += variant.response.exact_solves
 
-    def beside(self, branch: _Branch) -> Iterator[_Branch]:
-        """Yield the choices that a branch was settled without: other numbers below its bands."""
-        below = branch.was or ()
-        for band in (k for k, n in enumerate(below) if n is None and not self.stopped):
-            for n in self.counts[band]:
-                if n != branch.below[band]:
-                    other = _with(below, band, n)
-                    yield self.branch(other, self.near(branch, other))
-            below = _with(below, band, branch.below[band])
+    def near(self, variant: PosedProblem) -> list[Floats]:
+        """Designs to search a choice from; few that are like those of other choices."""
+        starts = [*self.starts]
+        if self.designs is not None and not self.task.followers:
+            starts = [*self.designs.best_of(variant, PROMISING), *starts]
+        if self.every.listed:
+            known = best_first(self.outcomes, lambda one: one.worth)[:1]
+            starts = [*(one.best.y for one in known), *starts][:2]
+        return [np.clip(y, variant.problem.lower, variant.problem.upper) for y in starts]
 
-    def drawn_in(self, branch: _Branch, rows: Sequence[ClearanceRow]) -> _Branch | None:
-        """The branch with limits drawn in by the room that was lacking; None after a few times.
+    def search(self, k: int) -> None:
+        """The optima of a choice from all starts, with its bands clear between the samples too."""
+        every, choice = self.every, self.every.choice(k)
+        every.level[k] = DONE
+        if len(every.of) > 1:
+            self.progress(f"  {len(self.outcomes) + 1} of {len(every.of)} choices searched")
+        margins = self.task.margins
+        try:
+            searched = self.searched(k, margins, (), not every.is_discrete)
+        except EigassignError as error:
+            self.failed, every.missed[k] = self.failed or error, np.inf
+            if len(every.of) == 1:
+                raise
+            return
+        missed = searched.optima[0].seen.violation
+        if margins and MET < missed <= 2.0 * MARGIN:  # but for the margin it may be met
+            margins = (Margin(),) * len(margins)
+            searched = self.searched(k, margins, [searched.optima[0].y], False)
+            missed = searched.optima[0].seen.violation
+        rows = _clearances(self.task, choice.below, searched.optima[0].y)
+        for drawn in range(DRAWN if missed <= MET else 0):
+            if not wanting(rows):
+                break
+            margins = _drawn_in(margins, rows, 1.1 if 2 * drawn < DRAWN else 2.0)
+            again = self.searched(k, margins, [searched.optima[0].y], False)
+            if again.optima[0].seen.violation > MET:
+                break
+            searched = again
+            rows = _clearances(self.task, choice.below, searched.optima[0].y)
+        missed = missed if missed > MET else wanting(rows)
+        every.missed[k], every.value[k] = missed, searched.optima[0].objective
+        self.outcomes.append(Outcome(choice, searched, missed, rows))
 
-        First by what the model raises the mode above the band, then by a little more than the rest.
-        """
-        if branch.drawn == DRAWN:
+    def searched(
+        self, k: int, margins: tuple[Margin, ...], near: Sequence[Floats], spread: bool
+    ) -> Searched:
+        """The optima of a choice from some designs, or from all starts."""
+        levels = self.levels[-1:] if self.every.is_discrete else self.levels
+        levels = tuple(replace(level, margins=margins) for level in levels)
+
+        def posed(task: Task) -> PosedProblem:
+            return self.every.posed(k, task)
+
+        starts = near or self.near(posed(levels[0]))[: 1 if self.every.is_discrete else None]
+        found = search_starts(
+            *(levels, posed, starts, self.made, self.deadline, self.progress, spread)
+        )
+        self.made, self.spent = self.made + found.starts, self.spent + found.exact_solves
+        self.ended = found.ended or self.ended
+        return found
+
+    def about_the_best(self) -> Choices | None:
+        """The choices about the best one, where there are too many for all; None if none is new."""
+        if self.every.is_whole or not self.outcomes:
             return None
-        margins, more = list(branch.margins), 1.1 if 2 * branch.drawn < DRAWN else 2.0
-        for k, row in enumerate(rows):
-            room, raised = margins[k]
-            if not row.clear and row.raised is not None:
-                rest = -row.room - max(row.raised - raised, 0.0)
-                room += more * max(rest, 0.0) + MARGIN
-                margins[k] = Margin(room, max(row.raised, raised))
-        near, drawn = [branch.best.y], branch.drawn + 1
-        return self.branch(branch.below, near, tuple(margins), branch.was, drawn)
-
-    def completed(self, branch: _Branch) -> _Branch:
-        """The best design of a search that was ended, with the numbers that it is nearest to."""
-        if branch.was is not None:
-            return branch
-        nearest = zip(branch.below, self.lacking(branch), strict=True)
-        below = tuple(int(own.argmin()) if n is None else n for n, own in nearest)
-        variant = variant_of(self.at(branch.margins)[-1], below)
-        found = continued(branch.best, minimise(variant.problem, branch.best.y, 0))
-        searched = replace(branch.searched, variant=variant, optima=(found,), chosen=None)
-        return replace(branch, below=below, searched=searched)
-
-    def near(self, branch: _Branch, below: Counts) -> list[Floats]:
-        """Designs to search a part of a branch from."""
-        few = self.at(self.task.margins)[0]
-        if self.designs is None or few.followers:
-            return [one.y for one in branch.searched.optima[: 1 + PROMISING]]
-        return [branch.best.y, *self.designs.best_of(variant_of(few, below), PROMISING)]
-
-    def lacking(self, branch: _Branch) -> list[Floats]:
-        """What the optimum lacks to be clear of each band, by the number of modes below it."""
-        found = lacking(self.at(branch.margins)[-1], branch.best.y)
-        return [
-            np.pad(own, (0, max(max(each) + 1 - len(own), 0)), constant_values=np.inf)
-            for own, each in zip(found, self.counts, strict=True)
-        ]
-
-    def size(self, below: Counts) -> int:
-        """The number of choices in a branch."""
-        return prod(len(c) for c, n in zip(self.counts, below, strict=True) if n is None)
+        best = best_first(self.outcomes, lambda one: one.worth)[0]
+        more = Choices(self.task, self.every.belows, best.best.y, None)
+        known = {one.choice for one in self.outcomes}
+        for k in range(len(more.of)):
+            if more.choice(k) in known:
+                more.level[k] = DONE
+        return more if (more.level < DONE).sum() else None
 
 
-def _promise(branch: _Branch) -> tuple[float, float]:
-    """Violation and F; of a settled branch F less what makes no difference."""
-    missed, value = worth(branch.best)
-    return missed, value if branch.was is None else value - SAME * abs(value) - NOTHING
+def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> bool | None:
+    """Whether some choice meets the limits ``names`` together; None where that cannot be said.
 
-
-def _with(below: Counts, band: int, count: int | None) -> Counts:
-    return (*below[:band], count, *below[band + 1 :])
-
-
-def _search_catalogues(
-    task: Task,
-    below: Counts,
-    listed: Sequence[ListedValues],
-    levels: Sequence[Task],
-    starts: Sequence[Floats],
-    deadline: float,
-    progress: Callable[[str], None],
-) -> Searched:
-    """The best combinations; where none meets the linear limits, these are missed as others are.
-
-    More than can be gone through are searched about the local optima without lists.
+    Each is searched from the best design found, ``most`` of them at most; bands not named are left
+    out.
     """
-    steps, near = task.scene.file.assignment.steps, starts[: KEEP + 1]
-    relaxed = Searched(variant_of(task, below))
-    if not are_few(listed, *task.scene.bounds):
-        relaxed = search_starts(levels, below, starts, 0, deadline, progress)
-        near = [*(found.y for found in relaxed.optima[:RELAXED]), *near]
+    named = [band.name in names for band in found.task.bands]
+    belows = [
+        tuple(n if own else None for n, own in zip(below, named, strict=True))
+        for below in found.every.belows
+    ]
+    y = found.best.y
+    every = Choices(found.task, list(dict.fromkeys(belows)), y, names)
+    open_, tried = np.ones(len(every.of), dtype=bool), 0
+    while open_.any():
+        order = every.ahead(open_)
+        k = int(order[0])
+        if every.missed[k] > MET:  # a bound
+            break
+        if every.bounds_left[k]:
+            every.learn(k, order)
+            continue
+        if (tried := tried + 1) > most:
+            return None
+        problem, open_[k] = every.posed(k, found.task).problem, False
+        try:
+            met = minimise(problem, np.clip(y, problem.lower, problem.upper), steps)
+        except EigassignError:
+            return True
+        if met.seen.violation <= MET:
+            return True
+    return False if every.is_whole else None
 
-    def chosen_of(variant: PosedProblem) -> Chosen:
-        def lacking(y: Floats) -> float:
-            return wanting(_clearances(task, below, y))
 
-        return choose(variant.problem, listed, near, steps, deadline, progress, lacking)
-
-    variant = variant_of(task, below)
-    try:
-        chosen = chosen_of(variant)
-    except InfeasibleError:
-        variant = variant_of(task, below, missed=True)
-        chosen = chosen_of(variant)
-    return Searched(
-        variant=variant,
-        optima=chosen.optima,
-        starts=relaxed.starts or min(len(near), RELAXED),
-        exact_solves=chosen.appraisals * len(task.scene.path.q) + relaxed.exact_solves,
-        ended=chosen.ended,
-        lost=tuple(variant.response.lost),
-        chosen=chosen,
-    )
-
-
-def _of_combinations(task: Task, listed: Sequence[ListedValues]) -> list[tuple[int, ...]]:
-    """The choices that all combinations of catalogues have, where they are all that is designed."""
-    are_followed = any(band.followed for band in task.bands)
-    if not listed or are_followed or not are_few(listed, *task.scene.bounds):
+def _of_lists(task: Task) -> list[Counts]:
+    """The numbers below the bands that all combinations have, where they are all that is chosen."""
+    listed, (lower, upper) = catalogues(task.scene.file), task.scene.bounds
+    allowed = [own.distinct for own in listed]
+    if not listed or not task.bands or any(band.followed for band in task.bands):
         return []
-    _, lower, upper = combinations(listed, *task.scene.bounds)
-    return counts_of(task.scene, task.bands, lower) if np.array_equal(lower, upper) else []
+    if prod(map(len, allowed)) > MOST:
+        return []
+    rows = np.concatenate([*every_combination(allowed, MOST)])
+    low, high = (with_rows(listed, rows, y) for y in (lower, upper))
+    if not np.array_equal(low, high):
+        return []
+    return [*counts_of(task.scene, task.bands, low)]
+
+
+def _drawn_in(
+    margins: tuple[Margin, ...], rows: Sequence[ClearanceRow], more: float
+) -> tuple[Margin, ...]:
+    """Margins by the room that was lacking.
+
+    First by what the model raises the mode above the band, then by a little more than the rest.
+    """
+    found = []
+    for (room, raised), row in zip(margins, rows, strict=True):
+        if not row.clear and row.raised is not None:
+            rest = -row.room - max(row.raised - raised, 0.0)
+            room, raised = room + more * max(rest, 0.0) + MARGIN, max(row.raised, raised)
+        found.append(Margin(room, raised))
+    return tuple(found)
 
 
 def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...]:
@@ -471,15 +561,15 @@ def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:
 
     Alone where it has no answer in a scenario.
     """
-    y, problem = scene.initial, variant.problem
+    y, problem, (lower, upper) = scene.initial, variant.problem, scene.bounds
     try:
         seen = problem.appraise(y)
     except EigassignError:
         if not variant.task.scenarios:
             raise
         seen = variant.requirements.appraise(y, variant.response(y))
-    width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
-    outside = np.maximum(problem.lower - y, y - problem.upper) / width
+    width = np.where(upper > lower, upper - lower, 1.0)
+    outside = np.maximum(lower - y, y - upper) / width
     worst = max(seen.violation, float(outside.max(initial=0.0)))
     for row in problem.constraints:
         value, size = row.coefficients @ y, np.abs(row.coefficients) @ width

@@ -13,7 +13,6 @@ from itertools import islice, zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
 from eigassign.assignment.exact.optima import FINISHED, NOTHING, Tally, with_end
 from eigassign.assignment.exact.sequential import PAYS, ROUND_OFF, End, Optimum, minimise, worth
@@ -25,7 +24,6 @@ from eigassign.study.design.search.variants import (
     Task,
     spread_designs,
     thinned,
-    variant_of,
 )
 
 Floats = NDArray[np.float64]
@@ -48,7 +46,6 @@ class Searched:
     ended: End | None = None  # by the clock or by Ctrl-C
     exact_solves: int = 0
     lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
-    chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
 
 
 def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
@@ -66,22 +63,22 @@ def most_starts(file: CaseFile) -> int:
 
 def search_starts(
     levels: Sequence[Task],
-    below: Sequence[int | None],
+    posed: Callable[[Task], PosedProblem],
     starts: Sequence[Floats],
     made: int,
     deadline: float,
     progress: Callable[[str], None],
     spread: bool = True,
 ) -> Searched:
-    """The local optima of a variant that ``starts`` lead to, and spread designs if asked for.
+    """The local optima of what is ``posed`` that ``starts`` lead to, and spread designs if asked.
 
     So many starts were ``made`` before.
     ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
     answer; with scenarios, in which others may have one, where none has.
     """
     first, keys = levels[0], levels[0].scene.file.assignment
-    search, lost = Searched(variant_of(first, below)), list[EigassignError]()
-    for start in _in_turn(first, search.variant, starts) if spread else starts:
+    search, lost = Searched(posed(first)), list[EigassignError]()
+    for start in _in_turn(first, posed, search.variant, starts) if spread else starts:
         progress(f"  from start {made + search.starts + 1}")
         try:
             search = _after(search, start, keys.steps, deadline)
@@ -98,7 +95,7 @@ def search_starts(
     for level in levels[1:]:
         if not search.ended:
             progress("  from what was found, on all samples and exactly")
-        refined = replace(search, variant=variant_of(level, below), optima=())
+        refined = replace(search, variant=posed(level), optima=())
         finer = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
         search = replace(finer, tally=search.tally)
         responses.append(search.variant.response)
@@ -189,7 +186,12 @@ def _is_enough(search: Searched) -> bool:
 # --- Starts
 
 
-def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Iterator[Floats]:
+def _in_turn(
+    task: Task,
+    posed: Callable[[Task], PosedProblem],
+    variant: PosedProblem,
+    starts: Sequence[Floats],
+) -> Iterator[Floats]:
     """The first starts, then by turns those that promise most of a sample, and spread ones.
 
     What promises most leads to good optima; what is expected not to be seen rests on designs that
@@ -201,14 +203,15 @@ def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Ite
     most = most_starts(task.scene.file) - len(starts)
     if most <= 0:
         return
-    box, spread = UnitBox.of(variant.problem), spread_designs(task.scene.bounds, most, 0)
+    bounds = variant.problem.lower, variant.problem.upper
+    box, spread = UnitBox.of(variant.problem), spread_designs(bounds, most, 0)
     if task.models is not None or task.followers:
         yield from spread
         return
     fewest = thinned(task, 8) or task
-    asked = variant_of(fewest, tuple(k for _, k in variant.below))
+    asked = posed(fewest)
     ranked: list[tuple[tuple[float, float], Floats]] = []
-    for y in spread_designs(task.scene.bounds, min(SCREENED * box.n, MOST_SCREENED), 1):
+    for y in spread_designs(bounds, min(SCREENED * box.n, MOST_SCREENED), 1):
         z = box.inside(box.z(y))
         try:
             seen = asked.without_slopes(box.y(z))

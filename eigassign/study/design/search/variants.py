@@ -47,6 +47,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 SPREAD = 8  # designs all over the bounds, beside corners and middle, that bands are looked at in
+Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
 MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them in order
 
 
@@ -144,13 +145,19 @@ def _few(whole: Task, few: int) -> NDArray[np.intp]:
     return np.union1d(path.spread(few), np.array(between, dtype=np.intp))
 
 
-def variant_of(task: Task, below: Sequence[int | None], missed: bool = False) -> PosedProblem:
+def variant_of(
+    task: Task,
+    below: Counts,
+    missed: bool = False,
+    held: tuple[Floats, Floats] | None = None,
+) -> PosedProblem:
     """The problem of a task with so many modes below each of its bands, without those of None.
 
-    Linear limits may be ``missed`` as others may, and are where they contradict each other.
+    Linear limits may be ``missed`` as others may, and are where they contradict each other. The
+    bounds are those of the scene, or what a choice from lists leaves ``held`` of them.
     """
     scene, wanted = task.scene, task.wanted
-    lower, upper = scene.bounds
+    lower, upper = held or scene.bounds
     aim = scene.file.assignment.named_objective
     asked = [one for one in wanted if not one.bands and not one.is_aim]
     aims = [one for one in wanted if one.is_aim]
@@ -166,7 +173,8 @@ def variant_of(task: Task, below: Sequence[int | None], missed: bool = False) ->
     kept = not (missed or task.scenarios)
     kept = kept and constraints_agree(scene.constraints, Bounds(lower, upper))
     asked += (one for one in scene.limits if not kept or one.constraint is None)
-    width = np.where(upper > lower, upper - lower, 1.0)
+    width = np.ptp(scene.bounds, axis=0)
+    width = np.where(width > 0.0, width, 1.0)
     has_goals = any(one.is_goal for one in asked)
     objective = Objective.LARGEST if aims else Objective.LEAST_SQUARES
     objective = Objective(aim) if has_goals else objective
