@@ -350,20 +350,21 @@ def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> C
     if not own:
         return None
     if found is not None:
-        few = [(one.choice.rows, one.best) for one in found.outcomes[:KEEP]]
-        worth = [(rows, best.y, best.objective, best.seen) for rows, best in few]
-        asked = found.variant.requirements
+        few = [
+            (one.searched.variant.requirements, one.choice.rows, one.best) for one in found.outcomes
+        ]
+        worth = [(own, rows, best.y, best.objective, best.seen) for own, rows, best in few[:KEEP]]
         looked, gap = found.choices - found.untried, 0.0 if _is_settled(found) else None
     elif one_shot is not None and one_shot.search is not None:
         search, variant = one_shot.search, variant_of(Task(scene, tuple(wanted)), ())
         exact, asked = variant.problem, variant.requirements
         each = ((one.rows, one.y, exact.appraise(one.y)) for one in search.best)
-        worth = [(rows, y, exact(y, seen), seen) for rows, y, seen in each]
+        worth = [(asked, rows, y, exact(y, seen), seen) for rows, y, seen in each]
         looked, gap = search.solved, search.relative_gap
     else:
         return None
     best = []
-    for rows, y, value, seen in worth:
+    for asked, rows, y, value, seen in worth:
         choices = {c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}
         best.append(_combination(scene, asked, choices, y, value, seen))
     return CatalogueRow(looked, gap, tuple(best))
@@ -455,7 +456,9 @@ def _of_starts(found: Found) -> str:
 
 def _of_choices(found: Found) -> OptimalityRow:
     """What is known of the choices from catalogues, searched to the end or as far as solves go."""
-    best, among = found.best, f"{found.choices} choices from the catalogues"
+    best, among = found.best, f"{found.choices} combinations of the catalogues"
+    if found.task.bands:
+        among = f"{found.choices} choices from the catalogues and of modes below bands"
     if _is_settled(found):
         met = best.seen.violation <= MET
         words = f"of all {among} none {'is better' if met else 'meets all limits'}"
@@ -465,10 +468,13 @@ def _of_choices(found: Found) -> OptimalityRow:
         if equal := sum(o.missed <= MET and o.best.objective <= most for o in others):
             words += f"; {equal} more of the best are as good"
         return OptimalityRow("proved", best.stationarity, 0.0, words)
-    each = f"{len(found.outcomes)} searched, the other parameters of each from several starts"
-    words = f"the best found of {among}: {each}"
-    if found.untried:
-        words += f"; {found.untried} were not searched, and may be better"
+    words = f"the best found of {among}"
+    if found.ended is not None:
+        return OptimalityRow("local", best.stationarity, None, f"{words}; {found.ended.value}")
+    if not found.is_discrete:
+        words += f", the other parameters of {len(found.outcomes)} from several starts"
+    words += f"; {found.untried} were not searched" * bool(found.untried)
+    words += "; others may be better"
     return OptimalityRow("local", best.stationarity, None, words)
 
 

@@ -158,7 +158,10 @@ def _choice_notes(found: Found) -> Iterator[str]:
         each = ((searched, "searched"), (excluded, "excluded by bounds"))
         left = ((found.untried, "not searched: raise `starts` or `seconds`, or shorten the lists"),)
         said = ", ".join(f"{n} {what}" for n, what in (*each, *left) if n)
-        of = "lists" * found.are_listed, "modes below each band" * bool(found.task.bands)
+        of = (
+            "lists" * found.are_listed,
+            "how many modes are below each band" * bool(found.task.bands),
+        )
         yield f"of {found.choices} choices of {' and '.join(filter(None, of))}: {said}"
     for one in found.outcomes[:SAID] if found.task.bands and len(found.outcomes) > 1 else ():
         numbers = zip(found.task.bands, one.choice.below, strict=True)

@@ -139,6 +139,11 @@ class Found:
         return self.outcomes[0].clearances
 
     @property
+    def tally(self) -> Tally | None:
+        """Of the starts of the best choice."""
+        return self.outcomes[0].searched.tally
+
+    @property
     def lost(self) -> tuple[str, ...]:
         """Designs passed over because a followed mode is lost there."""
         return tuple(dict.fromkeys(line for one in self.outcomes for line in one.searched.lost))
@@ -358,9 +363,9 @@ class _Search:
                 k = int(order[0])
                 if monotonic() > self.deadline:
                     self.ended = End.SECONDS
-                elif every.level[k] < TRIED and every.bounds_left[k]:
+                elif len(every.of) > 1 and every.level[k] < TRIED and every.bounds_left[k]:
                     every.learn(k, order)
-                elif every.level[k] < TRIED and len(every.of) > 1 and not every.is_discrete:
+                elif len(every.of) > 1 and every.level[k] < TRIED and not every.is_discrete:
                     self.estimate(k)
                 elif self.outcomes and self.spent > SOLVES:
                     break
