@@ -21,6 +21,7 @@ from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProb
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.feasibility import constraints_agree
+from eigassign.assignment.listed import every_combination, with_rows
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import Margin
 from eigassign.assignment.requirements.frequency import AssignedFrequency
@@ -28,6 +29,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import followers, solve_design
+from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.search.response import DesignResponse, Glances, outlook_of, response_of
 from eigassign.study.design.search.variants import SPREAD, Designs
 from eigassign.study.monotone import corners, effects
@@ -37,6 +39,7 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
 STEPS, STARTS = 30, 3  # of a search at one sample
+COMBINED = 64  # combinations of catalogues, each searched there
 CHOICES = 8  # of the numbers of modes below bands there
 R = TypeVar("R", bound=Requirement)
 
@@ -152,15 +155,17 @@ def _nearest(
 ) -> float | None:
     """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
 
-    Within the linear limits and those of the ``others`` that hold at this sample. The search ends
-    with the first start that leads within ``allowed`` of it. None where none leads to a design
-    within the limits, and of catalogues, of which a few starts say nothing.
+    Within the linear limits and those of the ``others`` that hold at this sample, with each
+    combination of catalogues. The search ends with the first start that leads within ``allowed`` of
+    it. None where none leads to a design within the limits, or there are many combinations.
     """
     lower, upper = scene.bounds
-    if scene.file.design.catalogues or not constraints_agree(
-        scene.constraints, Bounds(lower, upper)
-    ):
+    listed = catalogues(scene.file)
+    combined = next(every_combination([own.distinct for own in listed], COMBINED + 1))
+    agree = constraints_agree(scene.constraints, Bounds(lower, upper))
+    if len(combined) > COMBINED or not agree:
         return None
+    boxes = [with_rows(listed, combined, bound) for bound in (lower, upper)]
     at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
     there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal)
     beside = [_at(one, at) for one in others if one.mode_terms and _holds(one, at)]
@@ -184,9 +189,13 @@ def _nearest(
             scene.constraints,
             least=outlook_of(alone, asked, followed, glances),
         )
-        for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
+        starts = (y, 0.5 * (lower + upper), scene.initial)[:STARTS]
+        for start, low, high in (
+            (start, *box) for box in zip(*boxes, strict=True) for start in starts
+        ):
+            held = replace(problem, lower=low, upper=high)
             try:
-                best = minimise(problem, start, STEPS)
+                best = minimise(held, np.clip(start, low, high), STEPS)
             except EigassignError:
                 continue
             if best.seen.violation > MET:
