@@ -264,6 +264,9 @@ def _bounded(
 
 def every_combination(allowed: Sequence[Ints], at_once: int) -> Iterator[Ints]:
     """Yield all combinations (n, n_lists), so many at a time; the last list varies first."""
+    if not allowed:  # there is one, of nothing
+        yield np.zeros((1, 0), dtype=np.intp)
+        return
     sizes = tuple(map(len, allowed))
     for start in range(0, prod(sizes), at_once):
         places = np.arange(start, min(start + at_once, prod(sizes)))

@@ -180,11 +180,6 @@ def best_least_squares(problem: ExactAssignment, starts: int = STARTS) -> Found:
     return _best(problem, problem.rms, search, starts)
 
 
-def best_worst_case(problem: ExactAssignment, starts: int = STARTS) -> Found:
-    """max w |f/f_d − 1| by SLSQP on the epigraph: z ≥ ± e_k, z feasible at the start."""
-    return _best(problem, problem.worst, _epigraph, starts)
-
-
 def least_squares_from(problem: ExactAssignment, start: Floats) -> Floats:
     """The end of one ``least_squares`` within the bounds, to SciPy's own tolerances."""
     unit, roots = _Unit(problem), problem.roots

@@ -223,11 +223,7 @@ class Choices:
         allowed = [own.distinct for own in self.listed]
         self.count = prod(map(len, allowed)) * len(belows)
         self.is_whole = self.count <= MOST
-        rows = np.zeros((1, 0), dtype=np.intp)
-        if self.listed and self.is_whole:
-            rows = np.concatenate([*every_combination(allowed, MOST)])
-        elif self.listed:
-            rows = self._near(about)
+        rows = next(every_combination(allowed, MOST)) if self.is_whole else self._near(about)
         self.bases: dict[int, PosedProblem] = {}
         self.rows, self.of = (
             np.tile(rows, (len(belows), 1)),
@@ -249,7 +245,7 @@ class Choices:
         found = [centre]
         for pair in combinations(range(len(self.listed)), 2):
             some = [own.distinct if k in pair else centre[[k]] for k, own in enumerate(self.listed)]
-            found += [*np.concatenate([*every_combination(some, MOST)])]
+            found += [*next(every_combination(some, MOST))]
         return np.unique(found, axis=0)
 
     def choice(self, k: int) -> Choice:
@@ -527,7 +523,7 @@ def _of_lists(task: Task) -> list[Counts]:
         return []
     if prod(map(len, allowed)) > MOST:
         return []
-    rows = np.concatenate([*every_combination(allowed, MOST)])
+    rows = next(every_combination(allowed, MOST))
     low, high = (with_rows(listed, rows, y) for y in (lower, upper))
     if not np.array_equal(low, high):
         return []
