@@ -24,11 +24,9 @@ from weight_comparison import pulled
 import eigassign as ea
 from eigassign.mechanism import (
     NamedTrajectory,
-    PointMotion,
     Trajectories,
     Trajectory,
     drive_forces,
-    timing_law,
 )
 
 G = 9.81
@@ -212,24 +210,6 @@ def test_loads_are_those_of_each_trajectory_by_itself() -> None:
         alone = drives_of(own).along(own.trajectory, own.initial_design)[1]
         at = (samples >= rows.start) & (samples < rows.stop)
         np.testing.assert_allclose(tau[at], alone, rtol=1e-12)
-
-
-def test_a_short_quintic_needs_its_known_peak_between_samples() -> None:
-    """q̈ is 10/√3 Δq/T² at most, at τ = 1/2 − √3/6: none of the 11 samples."""
-    law, points = timing_law("quintic"), np.array([[0.0], [2.0]])
-    motion = PointMotion(points, np.array([0.0, 1.0]), law)
-    time_s = np.linspace(0.0, 1.0, 11)
-    path = Trajectory(time_s, motion.poses(time_s), None, known=motion)
-    tree = bar(2, 0.8, 70e9, 2700.0, {"area": 5e-4, "bending_inertia": 2e-12}, "revolute")
-    model = pulled(tree, [0.0, -G])
-    found = drive_forces(model.case, model.numbers, model.motion)
-    peak = 0.5 - np.sqrt(3.0) / 6.0
-    mass = 5e-4 * 2700.0 * 0.8
-    weight = 0.4 * mass * G * np.cos(2.0 * float(law.position(peak)))
-    exact = mass * 0.8**2 / 3.0 * 2.0 * 10.0 / np.sqrt(3.0) + weight
-    np.testing.assert_allclose(
-        found.exerted(path, np.array([peak]), model.y)[0, 0], exact, rtol=1e-6
-    )
 
 
 def test_both_sides_of_a_corner_count() -> None:

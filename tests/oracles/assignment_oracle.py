@@ -107,10 +107,6 @@ class ExactAssignment:
         """√J."""
         return float(np.linalg.norm(self.roots * self.errors(y)))
 
-    def worst(self, y: Floats) -> float:
-        """max w |f/f_d − 1|."""
-        return float(np.abs(self.scales * self.errors(y)).max())
-
     def violation(self, y: Floats) -> float:
         """The largest violation of a bound or constraint, relative to its range in the box."""
         out = np.maximum(self.lower - y, y - self.upper) / self.width
@@ -263,23 +259,6 @@ def _slsqp(problem: ExactAssignment, start: Floats) -> Floats:
         if not found.fun < value * (1.0 - 1e-6):
             break
         value = found.fun
-    return unit.y(v)
-
-
-def _epigraph(problem: ExactAssignment, start: Floats) -> Floats:
-    """min z over (v, z) with z ± e_k(v) ≥ 0; z in units of the largest error where it starts."""
-    unit = _Unit(problem)
-    best, v = problem.worst(start), unit.v(start)
-    for _ in range(6):
-        end = np.clip(_epigraph_from(unit, v, best), unit.low, unit.high)
-        reached = problem.worst(unit.y(end))
-        feasible = problem.violation(unit.y(end)) <= FEASIBLE
-        if feasible and problem.violation(unit.y(v)) > FEASIBLE:
-            best, v = reached, end
-            continue
-        if not feasible or not reached < best * (1.0 - 1e-10):
-            break
-        best, v = reached, end
     return unit.y(v)
 
 
