@@ -116,7 +116,7 @@ def test_room_is_widest_and_bands_stay_checked() -> None:
     q = case.trajectory.finely.q  # what is told is the room between the samples too
     assert aim.optimal == pytest.approx(room(np.array([*result.design.values()])), rel=1e-3)
     assert row.clearances[0].clear
-    assert row.reason.startswith("nearest band or gap: 8.77")
+    assert row.reason.startswith("nearest band or gap: 8.769 %")
 
 
 def test_a_price_of_the_mass_is_what_is_minimised_where_no_frequency_is_wanted() -> None:
