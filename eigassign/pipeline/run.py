@@ -230,10 +230,8 @@ def prepare(
     notes = [*variant, *mesh, *smaller, *moving, *plan.notes, *notes]
     path = with_instants(file, path) if assigned and path is not None else path
     if path is not None and (count := int(path.inserted.sum())):
-        notes.append(
-            f"{counted(count, 'instant')} between samples, of which targets ask something, are "
-            "looked at like samples: q is linear in time there"
-        )
+        instants = f"{counted(count, 'instant')} between samples, of which something is asked"
+        notes.append(f"{instants}, {'is' if count == 1 else 'are'} looked at like samples")
     return Scene(file, model, initial, path, plan, expansions, tuple(notes))
 
 

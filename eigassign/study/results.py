@@ -511,9 +511,9 @@ class CombinationRow:
 
 @dataclass(frozen=True)
 class CatalogueRow:
-    """The search of the catalogues; null where it was ended before it could tell, or cannot."""
+    """The best of the catalogues; the gap is null where nothing is known of it."""
 
-    nodes: Annotated[int | None, Fact("of its tree, or combinations gone through")]
+    nodes: Annotated[int | None, Fact("combinations that were looked at")]
     gap: Annotated[Share | None, Fact("relative to the objective")]
     best: Annotated[tuple[CombinationRow, ...], Fact("the best few, the best first")]
 

@@ -39,12 +39,9 @@ def named_design(file: CaseFile, followed: FollowedMode) -> Floats:
 def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories, y: Floats) -> Floats:
     """q (n_q,) at which it has that shape, of design y where coordinates follow the design.
 
-    Between samples of the whole trajectory q is linear in time. What trajectories set is as in the
-    file where the pose is given by its coordinates.
+    What trajectories set is as in the file where the pose is given by its coordinates.
     """
     pose = followed.at
     if pose.time is None:
         return frozen(np.append(np.array(pose.q), written_loads(file)))
-    rows = path.whole.rows_of(pose.trajectory)
-    time_s, own = path.whole.time_s[rows], path.whole.at(y)[0][rows]
-    return frozen(np.array([np.interp(pose.time, time_s, column) for column in own.T]))
+    return frozen(path.whole.pose(pose.time, pose.trajectory, y))

@@ -142,9 +142,9 @@ class Measurement(Part):
     """A measured frequency.
 
     Keys:
-        time: of the trajectory when it was measured; between samples q is linear in time. Along a
-            path of a tip q is that of the mechanism as it is written, whatever design explains the
-            measurements: give `q` where the machine followed the path with another one
+        time: of the trajectory when it was measured, at a sample or between. Along a path of a tip
+            q is that of the mechanism as it is written, whatever design explains the measurements:
+            give `q` where the machine followed the path with another one
         q: instead of the time: one value of each coordinate
         trajectory: name of the trajectory, where there are several
         mode: its number, counted from the lowest elastic one

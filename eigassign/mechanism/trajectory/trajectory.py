@@ -329,6 +329,11 @@ class Trajectories:
                 raise TrajectoryError(error.path, message, error.sample) from None
         return _stacked([q for q, _ in found]), _stacked([slopes for _, slopes in found])
 
+    def pose(self, time_s: float, name: str | None, y: Floats | None = None) -> Floats:
+        """q (n_q,) at any time of one trajectory, the first if None, at design y or the initial."""
+        part = next(part for part in self.parts if name in (None, part.name))
+        return np.array(part.trajectory.motion.poses(np.array([time_s]), y)[0])
+
     def between(self, rows: slice, y: Floats) -> Callable[[Floats], Floats]:
         """q (n, n_q) at places along some rows of one trajectory, at design y (n_y,).
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -190,9 +191,7 @@ def _nearest(
             least=outlook_of(alone, asked, followed, glances),
         )
         starts = (y, 0.5 * (lower + upper), scene.initial)[:STARTS]
-        for start, low, high in (
-            (start, *box) for box in zip(*boxes, strict=True) for start in starts
-        ):
+        for (low, high), start in product(zip(*boxes, strict=True), starts):
             held = replace(problem, lower=low, upper=high)
             try:
                 best = minimise(held, np.clip(start, low, high), STEPS)

@@ -67,13 +67,12 @@ def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
 
 
 def _at_time(path: Trajectories, time: float, name: str | None, key: str, where: str) -> Floats:
-    rows = path.rows_of(name)
-    time_s, q = path.time_s[rows], path.q[rows]
+    time_s = path.time_s[path.rows_of(name)]
     slack = 1e-9 * float(np.ptp(time_s))
     if not time_s[0] - slack <= time <= time_s[-1] + slack:
         lasts = f"the trajectory lasts from {time_s[0]:g} to {time_s[-1]:g} s"
         raise MechanismError(key, f"{where}{time:g} s is outside: {lasts}")
-    return np.array([np.interp(time, time_s, q[:, i]) for i in range(q.shape[1])])
+    return path.pose(time, name)
 
 
 def _with_loads(file: CaseFile, coordinates: ArrayLike, name: str | None) -> Floats:

@@ -71,37 +71,7 @@ def test_no_time_leaves_the_initial_design_and_says_so(tmp_path: Path) -> None:
 
 # An arm of two tubes with drives: three starts in a row lead to an optimum of 9.6 %, few to 4.69 %
 # (SLSQP on the exact epigraph from ten starts; the better one was found once).
-MANY_OPTIMA = """
-title: Arm with several optima
-mechanism:
-  space: planar
-  materials: {aluminium: {youngs_modulus: 70 GPa, density: 2700}}
-  sections:
-    upper: {shape: tube, outer_diameter: 66 mm, thickness: 4 mm}
-    fore: {shape: tube, outer_diameter: 60 mm, thickness: 3 mm}
-  links:
-    upper_arm: {length: 0.7, material: aluminium, section: upper, elements: 3}
-    forearm: {length: 0.6, material: aluminium, section: fore, elements: 3}
-  joints:
-    shoulder: {type: revolute, base: ground, follower: upper_arm.start}
-    elbow: {type: revolute, base: upper_arm.end, follower: forearm.start}
-  bodies:
-    motor: {at: upper_arm.end, mass: 2.5 kg, inertia: 2e-3}
-    tool: {at: forearm.end, mass: 1.8 kg, inertia: 1e-3}
-coordinates:
-  q1: {joint: shoulder, drive: {stiffness: 60e3, inertia: 1.0}}
-  q2: {joint: elbow, drive: {stiffness: 28e3, inertia: 0.3}}
-trajectory: {points: [[-20 deg, 95 deg], [50 deg, 30 deg]], duration: 0.8 s, samples: 31}
-design:
-  wu: {parameter: sections.upper.thickness, min: 2 mm, max: 12 mm}
-  wf: {parameter: sections.fore.thickness, min: 1 mm, max: 8 mm}
-  k1: {parameter: coordinates.q1.drive.stiffness, min: 10e3, max: 500e3}
-  k2: {parameter: coordinates.q2.drive.stiffness, min: 5e3, max: 200e3}
-targets:
-  - {mode: 1, frequency: 14 Hz}
-  - {mode: 2, frequency: 40 Hz, weight: 0.5}
-assignment: {objective: worst_case}
-"""
+MANY_OPTIMA = Path(__file__).with_name("many_optima.yaml").read_text(encoding="utf-8")
 
 
 def test_starts_that_agree_on_a_poor_optimum_are_not_enough(tmp_path: Path) -> None:

@@ -239,9 +239,9 @@ def test_measurements_are_read_in_si_and_placed(tmp_path: Path) -> None:
     assert [(r.label, r.mode, r.hz) for r in rows] == [("m.csv:2", 1, 190.0), ("m.csv:3", 2, 500.0)]
     np.testing.assert_allclose([r.deviation_hz for r in rows], [0.95, 5.0])
     assert [r.time_s for r in rows] == [0.5, 0.503]
-    path = case.trajectory
-    wanted = [np.interp(0.503, path.time_s, path.q[:, i]) for i in range(2)]
-    np.testing.assert_allclose(rows[1].q, wanted, rtol=1e-15)
+    path = case.trajectory  # between its samples, and not on the chord
+    chord = [np.interp(0.503, path.time_s, path.q[:, i]) for i in range(2)]
+    assert 1e-7 < np.abs(rows[1].q - chord).max() < 1e-5
     assert notes == ("m.csv: ignored the columns by",)
 
 

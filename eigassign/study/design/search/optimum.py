@@ -63,8 +63,9 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-MOST = 200_000  # choices that are gone through: more are those about the best, in two lists at most
-ROUNDS = 5  # times that others are made about a better one
+# Choices that are gone through: 81 000 take 3 s beside their solves. Of more, those about the best.
+MOST = 200_000
+ROUNDS = 5  # times that those about a better one are gone through
 TRIES = 100  # choices that are estimated before the best of them is searched
 TOGETHER = 64  # choices that are bounded together
 PROMISING = 4  # of designs all over the bounds: those that a choice with bands is searched from
@@ -209,7 +210,7 @@ def deadline_of(file: CaseFile) -> float:
 class Choices:
     """All choices of a task, and what no design of each is below: more and more, as it is asked.
 
-    Of the limits ``names`` only, where these are given, and then without bands that are not named.
+    Of the limits ``names`` only, where these are given; linear ones may then be missed as others.
     """
 
     def __init__(
@@ -225,25 +226,24 @@ class Choices:
         self.is_whole = self.count <= MOST
         rows = next(every_combination(allowed, MOST)) if self.is_whole else self._near(about)
         self.bases: dict[int, PosedProblem] = {}
-        self.rows, self.of = (
-            np.tile(rows, (len(belows), 1)),
-            np.repeat(range(len(belows)), len(rows)),
-        )
+        self.rows = np.tile(rows, (len(belows), 1))
+        self.of = np.repeat(range(len(belows)), len(rows))
         self.lower, self.upper = (with_rows(self.listed, self.rows, y) for y in (lower, upper))
         self.level = np.full(len(self.of), BOUNDED)
         kept = can_be_kept(task.scene.constraints, self.lower, self.upper)
-        self.soft = not kept.any()  # linear limits are missed least, as others are
+        self.soft = names is not None or not kept.any()  # linear limits are missed as others are
         self.missed = np.where(kept | self.soft, 0.0, np.inf)
         problem = self.base(0).problem
         cost = None if problem.cost is None else problem.cost.least(self.lower, self.upper)
         self.cost = np.zeros(len(self.of)) if cost is None else cost
         self.value = self.cost + problem.least_measure(np.zeros(0))
+        self.levels = 0 if problem.least is None else problem.least.levels
 
     def _near(self, about: Floats) -> Ints:
         """The combinations that differ from the nearest to a design in two lists at most."""
         centre = np.array([own.nearest(about) for own in self.listed])
         found = [centre]
-        for pair in combinations(range(len(self.listed)), 2):
+        for pair in combinations(range(len(self.listed)), min(2, len(self.listed))):
             some = [own.distinct if k in pair else centre[[k]] for k, own in enumerate(self.listed)]
             found += [*next(every_combination(some, MOST))]
         return np.unique(found, axis=0)
@@ -271,9 +271,7 @@ class Choices:
     @property
     def bounds_left(self) -> NDArray[np.bool_]:
         """True of each of which more can be known before it is searched."""
-        least = [self.base(k).problem.least for k in range(len(self.belows))]
-        levels = np.array([0 if one is None else one.levels for one in least])
-        return np.asarray(self.level < levels[self.of])
+        return np.asarray(self.level < self.levels)
 
     def ahead(self, open_: NDArray[np.bool_], behind: NDArray[np.bool_] | None = None) -> Ints:
         """Those that are open, the best first by what is known of them; some ``behind`` others."""
@@ -324,6 +322,11 @@ class _Search:
         self.made = self.tried = self.spent = 0
         self.keep = KEEP if self.every.is_discrete else 1
 
+    @property
+    def ranked(self) -> list[Outcome]:
+        """Those that were searched, the best first."""
+        return best_first(self.outcomes, lambda one: one.worth)
+
     def found(self) -> Found:
         """The best of all choices."""
         for _ in range(ROUNDS):
@@ -335,7 +338,7 @@ class _Search:
         if not self.outcomes and self.failed is not None:
             raise self.failed
         scene, every = self.task.scene, self.every
-        best, *others = best_first(self.outcomes, lambda one: one.worth)
+        best, *others = self.ranked
         if self.ended is not None:
             optima = replace(best.best, end=self.ended), *best.searched.optima[1:]
             best = replace(best, searched=replace(best.searched, optima=optima))
@@ -378,7 +381,7 @@ class _Search:
     def ahead(self) -> Ints:
         """The choices that may be better than the best few that were searched."""
         every = self.every
-        best = best_first(self.outcomes, lambda one: one.worth)[: self.keep]
+        best = self.ranked[: self.keep]
         open_ = every.level < DONE
         if len(best) == self.keep:
             missed, value = best[-1].worth
@@ -413,8 +416,7 @@ class _Search:
         if self.designs is not None and not self.task.followers:
             starts = [*self.designs.best_of(variant, PROMISING), *starts]
         if self.every.listed:
-            known = best_first(self.outcomes, lambda one: one.worth)[:1]
-            starts = [*(one.best.y for one in known), *starts][:2]
+            starts = [*(one.best.y for one in self.ranked[:1]), *starts][:2]
         return [np.clip(y, variant.problem.lower, variant.problem.upper) for y in starts]
 
     def search(self, k: int) -> None:
@@ -461,8 +463,10 @@ class _Search:
             return self.every.posed(k, task)
 
         starts = near or self.near(posed(levels[0]))[: 1 if self.every.is_discrete else None]
+        alone = len(self.every.of) == 1
+        most = most_starts(self.task.scene.file, alone) if spread else 0
         found = search_starts(
-            *(levels, posed, starts, self.made, self.deadline, self.progress, spread)
+            *(levels, posed, starts, self.made, self.deadline, self.progress, most)
         )
         self.made, self.spent = self.made + found.starts, self.spent + found.exact_solves
         self.ended = found.ended or self.ended
@@ -472,8 +476,7 @@ class _Search:
         """The choices about the best one, where there are too many for all; None if none is new."""
         if self.every.is_whole or not self.outcomes:
             return None
-        best = best_first(self.outcomes, lambda one: one.worth)[0]
-        more = Choices(self.task, self.every.belows, best.best.y, None)
+        more = Choices(self.task, self.every.belows, self.ranked[0].best.y, None)
         known = {one.choice for one in self.outcomes}
         for k in range(len(more.of)):
             if more.choice(k) in known:

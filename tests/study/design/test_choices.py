@@ -1,0 +1,99 @@
+"""Lists beside what is continuous, and bands: one search, against trying every combination."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from assignment_problems import random_problem
+
+import eigassign as ea
+from eigassign.assignment import Bounds, LinearConstraint, ListedValues, solve_assignment
+from eigassign.errors import InfeasibleError
+from eigassign.study import AssignmentRow
+
+HERE = Path(__file__).parent
+
+
+def answered(name: str, **changes: object) -> tuple[ea.Case, ea.Result, AssignmentRow]:
+    case = ea.load_case({**yaml.safe_load((HERE / f"{name}.yaml").read_text()), **changes})
+    result = ea.assign(case)
+    assert result.results.assignment is not None
+    return case, result, result.results.assignment
+
+
+def test_a_list_beside_two_drives_meets_all_limits_between_the_samples_too() -> None:
+    """One start for each tube leads to compromises that miss some."""
+    case, result, row = answered("list_and_drives")
+    assert row.verdict == "reached"
+    path = case.trajectory.finely
+    hz = case.model().frequencies(path.q, np.array([*result.design.values()]), 2)
+    go, back = (hz[path.rows_of(name)] for name in ("go", "back"))
+    assert 8.349 < go[:, 0].min() < go[:, 0].max() < 9.651
+    assert 23.298 < back[:, 1].min() < back[:, 1].max() < 24.702
+
+
+def test_every_combination_gets_its_starts() -> None:
+    """The first five of twelve, each of which ten starts with its rows held end at."""
+    _, _, row = answered("two_lists_and_drives")
+    best = ["a70x3 b35x2", "a70x3 b45x2", "a80x4 b35x2", "a60x2 b35x2", "a80x4 b45x2"]
+    worth = [0.0046213, 0.0049627, 0.0052319, 0.0054645, 0.0055506]
+    assert row.catalogue is not None
+    assert [" ".join(one.choices.values()) for one in row.catalogue.best] == best
+    np.testing.assert_allclose([one.objective for one in row.catalogue.best], worth, rtol=1e-3)
+
+
+def test_of_27_000_combinations_the_cheapest_are_proved_in_the_order_of_their_price() -> None:
+    _, _, row = answered("six_lists")
+    assert row.optimality.kind == "proved"
+    assert row.catalogue is not None
+    prices = [one.price for one in row.catalogue.best[:3]]
+    assert prices == pytest.approx([35.5, 37.1, 37.6])
+
+
+def test_a_limit_contradicts_with_the_linear_one_that_forbids_what_would_meet_it() -> None:
+    """Lists and a linear limit that rules all combinations out which keep the other."""
+    design = {
+        "A": {"parameter": "sections.A.outer_diameter", "values": ["50 mm", "90 mm"]},
+        "m": {"parameter": "bodies.mot.mass", "values": [2.0, 2.5]},
+        "constraints": {"thin": {"terms": {"A": 1}, "max": "60 mm"}},
+    }
+    low = {"mode": 1, "at_least": "9 Hz", "trajectory": "go"}
+    changes = {"design": design, "targets": [low]}
+    _, _, row = answered("list_and_drives", **changes)
+    assert row.verdict == "infeasible"
+    assert sorted(row.conflict) == ["mode 1 at least 9 Hz along 'go'", "thin"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_program_over_lists_is_that_of_trying_all_combinations(seed: int) -> None:
+    problem, rng = random_problem(seed, n_y=4), np.random.default_rng(seed)
+    low, width = problem.lower, problem.upper - problem.lower
+    rows = low[:2] + width[:2] * rng.random((4, 2)), low[3:] + width[3:] * rng.random((3, 1))
+    listed = ListedValues("pair", (0, 1), rows[0]), ListedValues("one", (3,), rows[1])
+    c = rng.normal(size=4) / width
+    middle = float(c @ (low + 0.5 * width))
+    keeps = [LinearConstraint("c", c, -np.inf, middle + rng.uniform(-1.5, 0.5))]
+    held = []
+    for pair in rows[0]:
+        for one in rows[1]:
+            y = [*pair, None, *one]
+            lower, upper = (
+                np.array([edge[j] if v is None else v for j, v in enumerate(y)])
+                for edge in (problem.lower, problem.upper)
+            )
+            try:
+                held.append(solve_assignment(*problem.arguments[:4], Bounds(lower, upper), keeps))
+            except InfeasibleError:
+                continue
+    if not held:
+        with pytest.raises(InfeasibleError):
+            solve_assignment(*problem.arguments, keeps, catalogues=listed)
+        return
+    found = solve_assignment(*problem.arguments, keeps, catalogues=listed)
+    best = sorted(one.objective_optimal for one in held)
+    assert found.search is not None
+    np.testing.assert_allclose([one.objective for one in found.search.best], best[:5], rtol=1e-6)
+    assert found.search.relative_gap <= 1e-9
