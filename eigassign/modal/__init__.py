@@ -42,7 +42,7 @@ __all__, __getattr__, __dir__ = face(
         "statics": "Flexibility compliances sags",
         "storage": "expansion_arrays tree_arrays",
         "surrogate": "Surrogate",
-        "under_load": "WeightChanges buckling sag_of_nodes strut_error weight_changes",
+        "under_load": "WeightChanges buckling sag_changes sag_of_nodes strut_error weight_changes",
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.recursion": "expand_subspace",
     },

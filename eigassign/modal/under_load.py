@@ -11,6 +11,9 @@ the mode moves are those that the mode meets while u₀ bends it. Both are linea
 Weight mixes modes: with the small matrix C of all modes up to a few above those asked for, mode k
 changes by |C_kk| + Σ_j min(|C_kj|, g C_kj²/|λ_j − λ_k|) at most, g = 9.81 m/s²; of sag only modes
 count that are near.
+
+Of gravity that is stated a finer computation tells the sag: `sag_changes` assembles the mechanism
+anew as it is bent, of second order in g by stress, geometry and loops that close elsewhere.
 """
 
 from __future__ import annotations
@@ -21,8 +24,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.case.schema.joints import RIDING
+from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes
+from eigassign.mechanism.assembly.sagged import sagged
+from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.kinematics.parameters import is_imported
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.exact.standing import buckling_share
 from eigassign.modal.finer_meshes import standing_frequencies
@@ -39,6 +47,9 @@ FAR = (np.inf, 0.1)
 # others, of an L loaded across its plane, are 2.5 times as large
 STRUTS = 2.5
 UNLOADED = 0.02  # of the buckling load, up to which struts are not doubted
+# Of 167 changes above 1e-4 of 60 random chains, loops and bent arms, at the largest weight that is
+# not warned of, a corotational program has one above 1.1 times what is assembled, 1.4 times that
+MARGIN = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +99,52 @@ def _mixing(C: Floats, lam: Floats, k: int, far: float) -> Floats:
     apart, c = apart[others] / STANDARD_GRAVITY, np.abs(C[..., k, others])
     mixed = c * np.divide(c, np.maximum(c, apart), out=np.zeros_like(c), where=c > 0.0)
     return np.asarray(mixed.sum(axis=-1) / lam[k])
+
+
+def sag_changes(
+    model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int], g: ArrayLike
+) -> Floats | None:
+    """By how much sag under g (n_axes,) changes frequencies, relative, (n_samples, n_modes).
+
+    About: against the mechanism assembled as it is bent by u = (1 − K_T⁻¹ K_g) u₀. Infinite where
+    that buckles. None where it is not known: of riders, imported parts, springs whose axes turn on
+    the ground and redundant loops, and where other coordinates than before swing freely.
+    """
+    x, weight = model.x(q, y), model.pencil.weight
+    if weight is None or not _bends_as_known(model):
+        return None
+    n, highest, theta = model.under_load.n_u, max(modes), model.pencil.theta(x)
+    hz = standing_frequencies(model.refined(1.0)[1], x, highest)
+    bent, down = np.full(hz.shape, np.nan), np.asarray(g, dtype=np.float64)
+    for k, pose in enumerate(model.under_load.at(x)):
+        u = pose.displaced(pose.weight() @ down[:, None])[:, 0]
+        if n:
+            K_T, K_g = (
+                model.pencil.sparse(each @ theta[:, k])[:n]
+                for each in (model.pencil.stiffness, weight.stiffness)
+            )
+            u[:n] -= factorise(K_T[:, :n]).solve(K_g @ u)
+        try:
+            pencil = sagged(model.poses, model.meshes, pose, x[k], u)
+        except MechanismError:
+            return None
+        if len(pencil.rigid) != model.n_rigid:
+            return None
+        bent[k] = standing_frequencies(pencil, x[k : k + 1], highest)[0]
+    change = MARGIN * np.abs(bent / hz - 1.0)[:, np.array(modes) - 1]
+    return np.where(np.isfinite(change), change, np.inf)
+
+
+def _bends_as_known(model: Model) -> bool:
+    """True where beams and rigid links alone are joined by what `sagged` knows to turn."""
+    case, tree = model.poses.case, model.motion.tree
+    planar, mechanism = case.mechanism.space == "planar", case.mechanism
+    return not (
+        any(joint.type in RIDING for joint in mechanism.joints.values())
+        or any(is_imported(case, name) for name in mechanism.links)
+        or any(spring.between[1] == "ground" for spring in mechanism.springs.values())
+        or (3 if planar else 6) * len(tree.loops) != len(tree.passive)
+    )
 
 
 def sag_of_nodes(

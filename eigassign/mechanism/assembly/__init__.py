@@ -14,4 +14,5 @@ Read in this order; each imports only from those above it:
     energies          energies of a mode in links, drives, springs, weight and bodies
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]
     dynamics          what motion and loads add to eq. (1), at a pose
+    sagged            the mechanism as its weight has bent it, assembled anew
 """

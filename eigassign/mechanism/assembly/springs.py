@@ -24,7 +24,7 @@ from eigassign.mechanism.assembly.node_motion import (
     combined,
 )
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
-from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
+from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
     DOFS,
     Objects,
@@ -121,6 +121,7 @@ class SpringEnds:
             here = apply(carried(np.eye(3).astype(object), arm), here)
         R = mount  # in the ground, where that is first
         if start != GROUND:
+            mount = multiply(self.parameters.moved.get(start, STILL).turn, mount)
             R = multiply(self.motion.placement(start[0]).world_rotation, mount)
         seen = carried(R, np.zeros(3, dtype=object))
         return SpringMotion(start, end, stiffness, apply(seen, here), apply(seen, there), R, arm)

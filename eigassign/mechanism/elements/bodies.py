@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.parts import tensor
 from eigassign.mechanism.elements.mesh import (
     Entries,
     LinkMesh,
@@ -17,8 +18,8 @@ from eigassign.mechanism.elements.mesh import (
     chain_dofs,
     rigid_motion,
 )
-from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, vector
+from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply, vector
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Scalar
 
@@ -40,8 +41,13 @@ def add_bodies(
     for key, body in case.mechanism.bodies.items():
         link, _, node = body.at.partition(".")
         if link == name:
-            offset = parameters.vector(f"bodies.{key}.offset", body.offset)
+            turn = parameters.moved.get((link, node), STILL).turn
+            offset = multiply(turn, parameters.vector(f"bodies.{key}.offset", body.offset))
             lever = offset + arms.get(node, 0.0)
+            if isinstance(body.inertia, tuple):
+                J = turn @ np.array(tensor(body.inertia)) @ turn.T
+                inertia = tuple(J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
+                body = body.model_copy(update={"inertia": inertia})
             _add(parameters, f"bodies.{key}", body, mass, nodes["@origin" if arms else node], lever)
 
 

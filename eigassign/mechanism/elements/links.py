@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +151,33 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
     named = {"start": 0, "end": len(positions) - 1} | {f"@{r}": pieces[0][2] for r in riders}
     strand = Strand(list(beams.slots), positions, turn, bent, profiles, lengths)
     return beams.mesh(case, parameters, name, positions, named, (strand,))
+
+
+class BentElement(NamedTuple):
+    """An element from node to node of a bent link; ``turn`` as of `_Beams.add`."""
+
+    ends: tuple[int, int]
+    turn: Floats
+    h: float
+    profile: Profile
+
+
+def bent_link(
+    case: CaseFile,
+    parameters: ModelParameters,
+    name: str,
+    places: Floats,
+    named: Mapping[str, int],
+    elements: Sequence[BentElement],
+) -> LinkMesh:
+    """A link of beams of which each element lies as it will, between nodes at ``places`` (n, 3)."""
+    beams, strands = _Beams(len(places), case.mechanism.space), []
+    points = [vector(place.tolist()) for place in places]
+    for ends, turn, h, profile in elements:
+        beams.add(profile, h, turn, list(ends))
+        rows = [beams.slots[k] for k in ends], [points[k] for k in ends]
+        strands.append(Strand(*rows, turn, [shear(profile, h)], [profile], [h]))
+    return beams.mesh(case, parameters, name, points, named, strands)
 
 
 def _atom_by_atom(terms: Sequence[ElementTerm]) -> list[ElementTerm]:

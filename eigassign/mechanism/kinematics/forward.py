@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
-from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
+from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
     Floats,
     Objects,
@@ -27,7 +28,7 @@ from eigassign.mechanism.kinematics.rotations import (
     multiply,
     present,
 )
-from eigassign.mechanism.kinematics.topology import JointEdge, NodeName, Topology
+from eigassign.mechanism.kinematics.topology import JointEdge, NodeName, Topology, split
 from eigassign.series.expression import Scalar
 
 
@@ -238,7 +239,7 @@ class _Placing:
         own, name = self.tree.of_joint(edge.joint), edge.joint
         joint = self.case.mechanism.joints[name]
         varies = any(path.startswith(f"joints.{name}.") for path in self.parameters.by_path)
-        if own or varies:
+        if own or varies or self.parameters.moved:
             values = [self.values[k] for k in own]
             return walked(self.case, self.parameters, name, edge.turned, values)
         keys = ("type", "angle", "orientation", "position")
@@ -255,13 +256,29 @@ def walked(
     backwards: bool,
     values: Sequence[Scalar],
 ) -> JointMotion:
-    """Motion of a joint with its mounting and position, from base to follower or backwards."""
+    """Motion of a joint with its mounting and position, from base to follower or backwards.
+
+    Between nodes that are turned by R_b and R_f: R_b R R_fᵀ, R_b d, R_f A.
+    """
     joint, path = case.mechanism.joints[name], f"joints.{name}"
     mount = mounting(parameters.angles(path, joint))
     motion = _mounted(joint, mount, joint_motion(joint, values))
     position = parameters.vector(f"{path}.position", joint.position)
     motion = motion._replace(translation=position + motion.translation)
+    if parameters.moved:
+        motion = _between(parameters, joint, name, motion)
     return turned(motion) if backwards else motion
+
+
+def _between(
+    parameters: ModelParameters, joint: Any, name: str, motion: JointMotion
+) -> JointMotion:
+    """The motion of a joint between nodes that are turned."""
+    ends = (joint.base, f"@{name}") if joint.type in RIDING else split(joint.base)
+    b, f = (parameters.moved.get(node, STILL) for node in (ends, split(joint.follower)))
+    A = np.concatenate([multiply(f.turn, motion.freedoms[k : k + 3]) for k in (0, 3)])
+    R = multiply(multiply(b.turn, motion.rotation), f.turn.T)
+    return JointMotion(R, multiply(b.turn, motion.translation), A)
 
 
 def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,16 @@ from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, Scalar
 
 Floats = NDArray[np.float64]
+
+
+class Moved(NamedTuple):
+    """How a node of a bent link is shifted, m (3,), and turned (3, 3), in the link's axes."""
+
+    shift: Floats
+    turn: Floats
+
+
+STILL = Moved(np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,7 @@ class ModelParameters:
     passive: tuple[Scalar, ...] = ()
     loads: tuple[str, ...] = ()
     scales: Floats = field(default_factory=lambda: np.zeros(0))  # (n_loads,)
+    moved: Mapping[NodeName, Moved] = field(default_factory=dict)  # nodes of links that are bent
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -183,6 +194,9 @@ def node_position(
 
     A node "@joint" is the place where a carriage or nut stands: the joint's own coordinate.
     """
+    if node in parameters.moved:
+        still = node_position(case, replace(parameters, moved={}), tree, node)
+        return np.asarray(still + parameters.moved[node].shift)
     link, name = node
     data = case.mechanism.links[link]
     if name.startswith("@"):

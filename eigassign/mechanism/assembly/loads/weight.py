@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy import sparse
@@ -84,10 +84,10 @@ def _stressed(scene: Loaded, name: str, g: Objects, acting: Acting) -> list[Term
     mesh, reduction = scene.whole(name), scene.nodes.meshes[name].reduction
     out, planar = Entries((mesh.n_local, mesh.n_local)), scene.nodes.space == "planar"
     if link_type(scene.case, name) == "beam":
-        _add_strand(out, mesh.strands[0], g, acting, planar)
+        _add_row(out, mesh.strands, g, acting, planar)
     else:
         for strand, force in zip(mesh.strands, _end_forces(scene, mesh, g, acting), strict=True):
-            _add_strand(out, strand, g, {int(strand.slots[-1][0]): force}, planar)
+            _add_row(out, (strand,), g, {int(strand.slots[-1][0]): force}, planar)
     if reduction is None:
         return out.terms()
     T = reduction.basis
@@ -125,15 +125,16 @@ def _whole_beam(strand: Strand, g: Objects) -> tuple[Objects, Objects]:
     return k, multiply(m, np.concatenate([g, still, g, still]))
 
 
-def _add_strand(out: Entries, strand: Strand, g: Objects, acting: Acting, planar: bool) -> None:
-    """k_σ of a row of elements, their forces summed from its end."""
-    turn, R = strand.turned(1), strand.turned(4)
+def _add_row(
+    out: Entries, strands: Sequence[Strand], g: Objects, acting: Acting, planar: bool
+) -> None:
+    """k_σ of strands one after the other, the forces of their elements summed from the end."""
     still = np.zeros(6, dtype=object)
-    beyond = still  # about the last node, in the link's axes
-    g = multiply(turn, np.array([one_atom(v) for v in g]))
-    for k in range(len(strand.profiles) - 1, -1, -1):
-        h = strand.lengths[k]
-        p = np.array([scaled(g, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
+    beyond, g = still, np.array([one_atom(v) for v in g])  # about the last node, link's axes
+    for strand, k in [(s, k) for s in strands for k in range(len(s.profiles))][::-1]:
+        turn, R, h = strand.turned(1), strand.turned(4), strand.lengths[k]
+        own = multiply(turn, g)
+        p = np.array([scaled(own, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
         beyond = beyond + acting.get(int(strand.slots[k + 1][0]), still)
         forces, beyond = _through_element(beyond, turn, p, h)
         dofs = np.append(strand.slots[k], strand.slots[k + 1])
