@@ -123,3 +123,12 @@ def test_near_a_dead_point_what_is_of_second_order_is_most() -> None:
     said = sag_changes(case.model(), case.file.mechanism.assembly.at["q0"], [], (1,), g)
     assert said is not None
     assert 0.034 < said[0, 0] < 0.04
+
+
+def test_a_hanging_beam_bends_less_the_more_it_is_pulled() -> None:
+    """Two modes of another program at its nonlinear rest: 0.38984 and 10.09536 Hz."""
+    folder = Path(__file__).parents[1] / "mechanism" / "weight_references"
+    case = ea.load_case(folder / "pendulum.yaml")
+    said = sag_changes(case.model(), [-1.1], case.initial_design, (1, 2), [0.0, -9.81])
+    assert said is not None
+    np.testing.assert_allclose(said[0] / 1.1, [0.017005, 0.026233], rtol=0.03)
