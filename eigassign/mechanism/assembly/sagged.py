@@ -115,7 +115,6 @@ def _elements(strand: Strand, own: Beams, v: Floats) -> Iterator[_Element]:
     ends = pairwise(int(slots[0]) for slots in strand.slots)
     for k, (pair, h, each) in enumerate(zip(ends, own.alike.h, d, strict=True)):
         step = h * X + each[6:9] - each[:3] - np.cross(each[3:6], h * X)
-        step *= step[0] / np.linalg.norm(step)
         turn = Rotation.from_rotvec(each[9:] - each[3:6]).as_matrix()
         yield _Element(pair, axes, step, turn, own, k)
 
