@@ -21,23 +21,7 @@ from eigassign.cli import main
 from eigassign.pipeline import solve_case
 from eigassign.study import BuiltCase
 
-CASE = """
-title: arm
-mechanism:
-  space: planar
-  gravity: [0, -9.81]
-  materials: {st: {youngs_modulus: 205 GPa, density: 7850}}
-  sections: {A: {shape: tube, outer_diameter: 60 mm, thickness: 3 mm}}
-  links: {a: {length: 0.8, material: st, section: A, elements: 2}}
-  joints: {j1: {type: revolute, base: ground, follower: a.start}}
-  bodies: {tool: {at: a.end, mass: 6}, hub: {at: a.start, mass: 1}}
-coordinates: {q1: {joint: j1, drive: {stiffness: 60000}}}
-trajectory: {points: [[0], [1]], duration: 2 s, samples: 9}
-design:
-  tool: {parameter: bodies.tool.mass, min: 1, max: 12}
-  hub: {parameter: bodies.hub.mass, min: 0, max: 4}
-  k: {parameter: coordinates.q1.drive.stiffness, min: 2e4, max: 1e5}
-"""
+CASE = Path(__file__).with_name("random_verdicts_case.yaml").read_text(encoding="utf-8")
 LINK, INITIAL = 7850 * np.pi / 4 * (0.06**2 - 0.054**2) * 0.8, np.array([6.0, 1.0, 6e4])  # kg, y
 LOW, HIGH = np.array([1.0, 0.0, 2e4]), np.array([12.0, 4.0, 1e5])
 NEAR = 1e-5  # of a limit: by less the peak of a torque is above what it is at the finest instants

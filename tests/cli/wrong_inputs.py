@@ -4,38 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
-GOOD = """\
-title: A small arm
-mechanism:
-  space: planar
-  materials:
-    steel: {youngs_modulus: 210 GPa, density: 7850}
-  sections:
-    rod: {shape: circle, diameter: 20 mm}
-  links:
-    upper: {length: 0.5, material: steel, section: rod, elements: 2}
-    fore: {length: 0.4, material: steel, section: rod, elements: 2}
-  joints:
-    shoulder: {type: revolute, base: ground, follower: upper.start}
-    elbow: {type: revolute, base: upper.end, follower: fore.start}
-  bodies:
-    tool: {at: fore.end, mass: 0.1}
-coordinates:
-  q1: {joint: shoulder}
-  q2: {joint: elbow}
-trajectory:
-  tip: fore.end
-  waypoints: [[0.5, 0.3], [0.4, 0.4], [0.3, 0.5]]
-  samples: 5
-  branch: {elbow: [0 deg, 180 deg]}
-design:
-  m: {parameter: bodies.tool.mass, min: 0, max: 1}
-expansion: {order: 3, q: auto, y: auto, modes: [1]}
-targets:
-  - {mode: 1, frequency: 180 Hz}
-validation: {max_error: 50 %}
-"""
+GOOD = Path(__file__).with_name("wrong_inputs_good.yaml").read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)

@@ -102,11 +102,11 @@ def said_and_true(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_what_is_said_of_sag_covers_a_corotational_program() -> None:
-    """1e-4 is what the two programs differ by; 1.3 is what is said too much."""
+    """Less than 1e-4 is nothing; what is said too much is 30 %, or 4 % of the largest."""
     pairs = [said_and_true(seed) for seed in (0, 1, 2, 3, 6)]
     said, true = (np.array(each) for each in zip(*pairs, strict=True))
-    assert (true <= said + 1e-4).all()
-    assert (said <= 1.3 * true + 1e-4).all()
+    assert (true <= np.maximum(said, 1e-4)).all()
+    assert (said <= np.maximum(1.3 * true, true + 0.04 * true.max(axis=1, keepdims=True))).all()
 
 
 @pytest.mark.slow

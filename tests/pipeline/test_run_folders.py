@@ -113,30 +113,7 @@ def test_modes_expanded_together_are_kept_as_the_series_of_their_matrix(tmp_path
     assert any("one cluster" in note for note in outcome.results.notes)
 
 
-TWINS = """
-title: Twins
-mechanism:
-  space: planar
-  materials:
-    steel: {youngs_modulus: 210 GPa, density: 7850}
-  sections:
-    bar: {shape: circle, diameter: 10 mm}
-  links:
-    left: {length: 0.5, material: steel, section: bar, elements: 3}
-    right: {length: 0.5, material: steel, section: bar, elements: 3}
-  joints:
-    a: {type: revolute, base: ground, follower: left.start}
-    b: {type: revolute, base: ground, follower: right.start, position: [1, 0]}
-  bodies:
-    tip: {at: left.end, mass: 0.1}
-    twin: {at: right.end, mass: 0.1}
-coordinates:
-  qa: {joint: a, drive: locked}
-  qb: {joint: b, drive: locked}
-design:
-  m: {parameter: bodies.tip.mass, min: 0, max: 0.2}
-expansion: {q: [0, 0]}
-"""
+TWINS = Path(__file__).with_name("run_folders_twins.yaml").read_text(encoding="utf-8")
 
 
 # Files that a case names are part of what it is

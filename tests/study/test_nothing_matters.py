@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from eigassign.case import parse
 from eigassign.modal import raise_order
 from eigassign.study import BuiltCase
 
-TEXT = """
-title: A locked arm and a material that no link is made of
-mechanism:
-  space: planar
-  materials:
-    steel: {youngs_modulus: 210 GPa, density: 7850}
-    spare: {youngs_modulus: 70 GPa, density: 2700}
-  sections: {rod: {shape: circle, diameter: 20 mm}}
-  links: {arm: {length: 0.5, material: steel, section: rod, elements: 4}}
-  joints: {base: {type: revolute, base: ground, follower: arm.start}}
-coordinates: {q1: {joint: base, drive: locked}}
-trajectory: {q: [[0], [0.5], [1.0]], duration: 1 s}
-design: {rho: {parameter: materials.spare.density, min: 2000, max: 3000}}
-expansion: {order: auto}
-targets: [{mode: 1, frequency: 60 Hz}]
-"""
+TEXT = Path(__file__).with_name("nothing_matters.yaml").read_text(encoding="utf-8")
 
 
 def test_the_order_is_at_least_one() -> None:

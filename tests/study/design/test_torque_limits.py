@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,23 +12,7 @@ import eigassign as ea
 from eigassign.case import parse
 from eigassign.mechanism import timing_law
 
-CASE = """\
-title: one link, few samples of a fast motion
-mechanism:
-  space: planar
-  gravity: {gravity}
-  materials: {{st: {{youngs_modulus: 205 GPa, density: 7850}}}}
-  sections: {{A: {{shape: tube, outer_diameter: 60 mm, thickness: 3 mm}}}}
-  links: {{a: {{length: {length}, material: st, section: A, elements: 2}}}}
-  joints: {{j1: {{type: revolute, base: ground, follower: a.start}}}}
-  bodies: {{tool: {{at: a.end, mass: {mass}}}}}
-coordinates: {{q1: {{joint: j1, drive: {{stiffness: 60000}}}}}}
-trajectory: {{points: [[{start}], [{end}]], duration: {duration} s, samples: {samples}, timing: {timing}}}
-design:
-  tool: {{parameter: bodies.tool.mass, min: {mass}, max: 14}}
-  torque: {{q1: {{max: {torque} N m}}}}
-targets: [{target}]
-"""  # noqa: E501
+CASE = Path(__file__).with_name("torque_limits_case.txt").read_text(encoding="utf-8")
 PER_LENGTH = 7850.0 * np.pi / 4.0 * (0.06**2 - 0.054**2)  # kg/m
 FAULT = {
     **{"gravity": "none", "length": 0.8, "mass": 9.0, "start": 0.0, "end": 2.0, "duration": 1.0},
