@@ -48,8 +48,8 @@ FAR = (np.inf, 0.1)
 STRUTS = 2.5
 UNLOADED = 0.02  # of the buckling load, up to which struts are not doubted
 # What is assembled is off by a tenth of itself, or by this share of the largest change of a mode:
-# with either a corotational program, at the largest weight that is not warned of, has 4 of 105 random
-# chains, loops and bent arms with a mode above what is told, up to 2 times
+# with either, at the largest weight that is not warned of, a corotational program has 4 of 105
+# random chains, loops and bent arms with a mode above what is told, up to 2 times
 MARGIN, SHARED = 1.1, 0.03
 
 
