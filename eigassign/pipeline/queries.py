@@ -27,7 +27,7 @@ from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.free_part import part_lines
 from eigassign.mechanism.kinematics.limits import resting_pose
-from eigassign.mechanism.kinematics.parameters import written_loads
+from eigassign.mechanism.kinematics.parameters import is_imported, written_loads
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.output.figures.graph import FigurePlan
@@ -55,6 +55,11 @@ PART_MB = 0.05  # 330 MB in `check`, 420 MB in a search
 Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
 Words = Annotated[tuple[str, ...], Fact(is_key=True)]
 TooHigh = Annotated[list[Share] | None, Fact("at most", optional=True, may_lack=True)]
+
+
+# Of the kinetic energy: a mode in which all mass with a node's motion has less moves none. Of the
+# modes of a solid column those out of the plane have 2e-7 at most, others 1e-3 at least.
+STILL = 1e-5
 
 
 @dataclass(frozen=True)
@@ -204,8 +209,26 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
-        *(weight.row, found, (*digits_lines(file), *weight.notes), weight.warnings),
+        weight.row,
+        found,
+        (*_between_nodes(case, q, y, len(hz)), *digits_lines(file), *weight.notes),
+        weight.warnings,
     )
+
+
+def _between_nodes(case: BuiltCase, q: Floats, y: Floats, count: int) -> Iterator[str]:
+    """Name the modes that move no node: an imported part alone, which in a plane may leave it."""
+    file, model = case.file, case.model()
+    parts = [name for name in file.mechanism.links if is_imported(file, name)]
+    if not parts or file.mechanism.space != "planar":
+        return
+    nodes = model.shapes(q, y, count).nodes.values()
+    moved = np.max([np.linalg.norm(node.motion[:, :3], axis=1) for node in nodes], axis=0)
+    still = [str(k) for k in np.flatnonzero(moved**2 * model.mass(y) < STILL) + 1]
+    if still:
+        these = f"mode {still[0]} moves" if len(still) == 1 else f"modes {', '.join(still)} move"
+        between = f"{' or '.join(parts)} moves between its nodes alone, out of the plane as a rule"
+        yield f"{these} no node: {between}"
 
 
 def _default_q(case: BuiltCase) -> Sequence[float]:
