@@ -41,7 +41,8 @@ def grid(case: ea.Case, count: int = 9) -> np.ndarray:
 
 def test_the_lightest_design_keeps_its_limits_and_none_on_a_grid_is_lighter() -> None:
     limit = {"mode": 1, "at_least": 0.14, "trajectory": "lift"}
-    case, result, row, aim = solved("crane_boom", "lightest", [limit])
+    keys = {"objective": "lightest", "max_error": 0.05}  # the sag changes so soft a boom by 4 %
+    case, result, row, aim = solved("crane_boom", None, [limit], assignment=keys)
     assert row.verdict == "reached"
     initially = "initially 7960 kg, with limits broken"
     assert row.reason == f"lightest design found: 8208 kg ({initially}), all limits kept"
@@ -123,6 +124,7 @@ def test_a_price_of_the_mass_is_what_is_minimised_where_no_frequency_is_wanted()
     limit = {"mode": 1, "at_least": 0.14, "trajectory": "lift"}
     content = yaml.safe_load((CASES / "crane_boom.yaml").read_text())
     content["design"]["mass"] = {"price": "4 / kg"}
+    content["assignment"] = {"max_error": 0.05}
     case = ea.load_case({**content, "targets": [limit]})
     result = ea.assign(case).results
     assert result.assignment is not None
@@ -136,6 +138,7 @@ def test_a_price_of_the_mass_is_what_is_minimised_where_no_frequency_is_wanted()
 
 def test_a_search_that_was_ended_before_has_only_improved() -> None:
     keys = {"objective": {"highest": {"mode": 1, "trajectory": "lift"}}, "steps": 1, "starts": 1}
+    keys["max_error"] = 0.05
     _, _, row, _ = solved("crane_boom", None, None, assignment=keys)
     assert row.verdict == "improved"
     assert "not first-order optimal" in row.reason

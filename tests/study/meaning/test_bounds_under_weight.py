@@ -172,19 +172,20 @@ THIN = """design:
   m: {parameter: bodies.load.mass, min: 10, max: 2000}
 """
 LISTED = "design: {m: {parameter: bodies.load.mass, values: [10, 110, 1500, 2000]}}\n"
-GOAL = "targets: [{mode: 1, frequency: 0.3 Hz}]\n"
+# the sag changes what is so soft by 2.1 %
+GOAL = "targets: [{mode: 1, frequency: 0.3 Hz}]\nassignment: {max_error: 5 %%%s}\n"
 
 
 @pytest.mark.parametrize(
     ("design", "asked"),
     [
-        (LOAD % "", GOAL),
-        (LOAD % ", tolerance: 10 %", GOAL),
-        (LOAD % "", GOAL + "assignment: {method: one_shot}\n"),
+        (LOAD % "", GOAL % ""),
+        (LOAD % ", tolerance: 10 %", GOAL % ""),
+        (LOAD % "", GOAL % ", method: one_shot"),
         (LOAD % "", "targets: [{mode: 1, at_least: 0.3 Hz}]\n"),
         (LOAD % "", "targets: [{keep_out: [0.2 Hz, 0.5 Hz]}]\n"),
         (THIN, "targets: [{mode: 1, at_least: 0.3 Hz}]\n"),
-        (LISTED, GOAL),
+        (LISTED, GOAL % ""),
     ],
     ids=["mass", "tolerance", "one shot", "limit", "band", "section", "catalogue"],
 )  # fmt: skip
