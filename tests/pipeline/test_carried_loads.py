@@ -196,7 +196,8 @@ def test_no_design_of_a_grid_keeps_a_random_limit_and_is_better(seed: int) -> No
     weights = np.gradient(path.time_s)
     weights[[0, -1]] /= 2
     grid = [np.array(y) for y in product(*(np.linspace(low, high, 13) for _, low, high in own))]
-    peaks = [np.abs(model.drives.along(path.finely, y)[1][:, column]).max() for y in grid]
+    whole, times = path.parts[0].trajectory, np.linspace(*path.time_s[[0, -1]], 4001)
+    peaks = [np.abs(model.drives.exerted(whole, times, y)[:, column]).max() for y in grid]
     hz = [model.frequencies(path.at(y)[0], y, 1)[:, 0] for y in grid]
     means = [weights @ one / weights.sum() for one in hz]
     asked = round(float(rng.uniform(min(means), max(means))), 4)
