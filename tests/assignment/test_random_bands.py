@@ -40,9 +40,11 @@ def banded(seed: int) -> tuple[ea.Case, float, float]:
 
 
 def along(case: ea.Case, q: np.ndarray, y: np.ndarray, low: float, high: float) -> np.ndarray:
-    """At random instants, q linear in time between the samples: the modes below each edge."""
-    at = np.random.default_rng(0).uniform(0, len(q) - 1, INSTANTS)
-    between = np.column_stack([np.interp(at, np.arange(len(q)), column) for column in q.T])
+    """At random instants: the modes below each edge."""
+    (path,) = case.trajectory.parts
+    last = path.trajectory.time_s[-1]
+    at = np.random.default_rng(0).uniform(0.0, last, INSTANTS)
+    between = path.trajectory.motion.poses(at)
     model = case.model()
     available = model.n_dof - model.n_rigid
     count = min(4, available)
@@ -173,7 +175,7 @@ def counts(case: ea.Case, y: np.ndarray, asked: Asked) -> np.ndarray:
     inner = np.random.default_rng(1).uniform(asked.first, asked.last, COUNTED)
     knots = asked.time_s[(asked.time_s > asked.first) & (asked.time_s < asked.last)]
     at = np.concatenate([inner, knots, [asked.first, asked.last]])
-    q = np.column_stack([np.interp(at, part.time_s, column) for column in part.q.T])
+    q = part.motion.poses(at)
     middle = np.interp(at, asked.time_s, asked.middle_hz)
     model = case.model()
     available = model.n_dof - model.n_rigid

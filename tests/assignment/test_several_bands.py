@@ -154,8 +154,8 @@ def are_clear(problem: Problem, designs: Floats, between: int = 0) -> Floats:
         own_at = np.union1d(np.linspace(time[0], time[-1], count), ends)
         at.append(own_at)
         names += [part.name] * len(own_at)
-        q.append([np.interp(own_at, time, column) for column in part.trajectory.q.T])
-    instants, poses = np.concatenate(at), np.hstack(q).T
+        q.append(part.trajectory.motion.poses(own_at))
+    instants, poses = np.concatenate(at), np.concatenate(q)
     top = max(own.high for own in problem.bands)
     clear = np.array([model.mass(y) <= problem.heaviest * (1.0 + 1e-9) for y in designs])
     hz = _frequencies(case, poses, designs[clear], top)
@@ -206,9 +206,7 @@ def objective(problem: Problem, y: Floats) -> float:
             own = [band for band in problem.bands if part.name in band.names]
             ends = [end for band in own for end in (band.first, band.last)]
             at = np.union1d(time, np.clip(ends, time[0], time[-1])) if ends else time
-            poses.append(
-                np.array([np.interp(at, time, column) for column in part.trajectory.q.T]).T
-            )
+            poses.append(part.trajectory.motion.poses(at))
             weights.append(_trapezoidal(at))
         hz = case.model().frequencies(np.concatenate(poses), y, mode)[:, mode - 1]
         weights = np.concatenate(weights)

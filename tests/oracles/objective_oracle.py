@@ -78,16 +78,14 @@ class Aimed:
 
 
 def of_case(case: Any, instants: int = 0) -> Aimed:
-    """The problem of a loaded case; at so many instants, q being linear in time, if any."""
+    """The problem of a loaded case; at so many instants of the motion, if any."""
     file, path = case.file, case.trajectory
     spans, q = {None: slice(None)}, path.q
     if instants:
-        parts = [path.q[path.rows_of(part.name)] for part in path.parts]
-        fine, times = instants // len(parts), [part.trajectory.time_s for part in path.parts]
+        fine, times = instants // len(path.parts), [part.trajectory.time_s for part in path.parts]
         at = [np.unique(np.append(np.linspace(t[0], t[-1], fine), t)) for t in times]
         q = np.concatenate([
-            np.array([np.interp(a, t, column) for column in own.T]).T
-            for a, t, own in zip(at, times, parts, strict=True)
+            part.trajectory.motion.poses(a) for part, a in zip(path.parts, at, strict=True)
         ])  # fmt: skip
         ends = np.cumsum([0, *map(len, at)])
         for part, first, last in zip(path.parts, ends[:-1], ends[1:], strict=True):

@@ -49,9 +49,9 @@ def solved(case: dict[str, Any]) -> tuple[BuiltCase, Result, AssignmentRow]:
 
 
 def at_instants(built: BuiltCase, result: Result, count: int) -> np.ndarray:
-    path = built.trajectory
-    at = np.linspace(0.0, len(path.q) - 1.0, INSTANTS)
-    q = np.array([np.interp(at, np.arange(len(path.q)), column) for column in path.q.T]).T
+    (part,) = built.trajectory.parts
+    at = np.linspace(0.0, part.trajectory.time_s[-1], INSTANTS)
+    q = part.trajectory.motion.poses(at)
     return built.model().frequencies(q, np.array(list(result.design.values())), count)
 
 

@@ -89,8 +89,8 @@ def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
 def test_the_limits_hold_at_5000_instants() -> None:
     case, result = load_case(CASES / "drilling_arm.yaml"), drilled()
     model, y = case.model(), np.array(list(result.design.values()))
-    q, time_s = case.trajectory.q, case.trajectory.time_s
-    fine = np.array([np.interp(np.linspace(0, 10, 5000), time_s, c) for c in q.T]).T
+    (part,) = case.trajectory.parts
+    fine = part.trajectory.motion.poses(np.linspace(0, 10, 5000))
     found = compliances(model, {"forearm.end": [[1, 0], [0, 1]]})
     x = model.x(fine, y)
     w = found.at(x, np.zeros(x.shape[1], dtype=bool))[0].max(axis=0)
@@ -275,9 +275,9 @@ def test_the_cheapest_design_is_that_of_slsqp_from_30_starts(seed: int) -> None:
     y = np.array(list(result.design.values()))
     assert np.isfinite(best)
     assert cost((y - lower) / width) <= best + 1e-3 * abs(best)
-    path = case.trajectory
-    at = np.linspace(0, len(path.q) - 1, 5000)
-    fine = np.array([np.interp(at, np.arange(len(path.q)), column) for column in path.q.T]).T
+    (part,) = case.trajectory.parts
+    at = np.linspace(0.0, part.trajectory.time_s[-1], 5000)
+    fine = part.trajectory.motion.poses(at)
     missed = max(float((one.way.at(fine, y) / one.upper[0]).max()) for one in limits) - 1.0
     if result.results.shortcoming is None:
         assert missed <= 2e-4

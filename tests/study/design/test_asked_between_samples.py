@@ -56,9 +56,8 @@ def test_a_band_is_clear_with_another_number_of_modes_below_it_along_each_trajec
 
 
 def modes_inside(case: ea.Case, result: ea.Result, at: float, low: float, high: float) -> int:
-    """How many modes are in a band at an instant, q being linear from sample to sample."""
-    time_s, q = case.trajectory.time_s, case.trajectory.q
-    pose = np.array([[np.interp(at, time_s, column) for column in q.T]])
+    """How many modes are in a band at an instant."""
+    pose = case.trajectory.pose(at, None)[None]
     hz = case.model().frequencies(pose, np.array(list(result.design.values())), 3)
     return int(((hz > low) & (hz < high)).sum())
 
