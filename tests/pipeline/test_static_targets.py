@@ -275,14 +275,15 @@ def test_the_cheapest_design_is_that_of_slsqp_from_30_starts(seed: int) -> None:
     y = np.array(list(result.design.values()))
     assert np.isfinite(best)
     assert cost((y - lower) / width) <= best + 1e-3 * abs(best)
-    (part,) = case.trajectory.parts
-    at = np.linspace(0.0, part.trajectory.time_s[-1], 5000)
-    fine = part.trajectory.motion.poses(at)
+    paths = [part.trajectory for part in case.trajectory.parts]
+    fine = np.concatenate([
+        path.motion.poses(np.linspace(path.time_s[0], path.time_s[-1], 5000)) for path in paths
+    ])  # fmt: skip
     missed = max(float((one.way.at(fine, y) / one.upper[0]).max()) for one in limits) - 1.0
-    if result.results.shortcoming is None:
+    if (said := result.results.shortcoming) is None or "% with twice the elements: give" in said:
         assert missed <= 2e-4
     else:
-        assert "% between samples: give" in result.results.shortcoming
+        assert "% between samples: give" in said
         assert missed > 0.9e-4
 
 
