@@ -53,6 +53,13 @@ def test_of_27_000_combinations_the_cheapest_are_proved_in_the_order_of_their_pr
     assert prices == pytest.approx([35.5, 37.1, 37.6])
 
 
+def test_all_at_their_cheapest_bound_with_every_limit_met_is_a_proof() -> None:
+    """Bands along profiles and for one load alone, geometry among the parameters."""
+    case, result, row = answered("cheapest_corner")
+    assert [*result.design.values()] == [low for low, _ in case.file.box]
+    assert (row.verdict, row.optimality.kind, row.optimality.gap) == ("reached", "proved", 0.0)
+
+
 def test_a_limit_contradicts_with_the_linear_one_that_forbids_what_would_meet_it() -> None:
     """Lists and a linear limit that rules all combinations out which keep the other."""
     design = {
