@@ -10,7 +10,7 @@ Reading order:
     solver        solve: OSQP, then an active-set method that goes to round-off
     optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
     exact         the optimum of the exact problem, and parameters from measurements
-    listed        parameters that take listed values, and the program over them
+    listed        parameters that take listed values
     assign        build, solve, judge: from targets to the optimal design
 """
 
@@ -27,7 +27,6 @@ __all__, __getattr__, __dir__ = face(
         "exact.sequential": "End Optimum minimise",
         "exact.design_point": "first_order",
         "linear": "LinearConstraint LinearModel",
-        "listed": "ListedValues",
         "optimality": "Certificate best_candidate judge",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.band": "ForbiddenBand",

@@ -2,20 +2,18 @@
 
 `build_program` makes the quadratic program of eqs. (13)–(14) from linear models of λ,
 `solve_program` gives candidates for its optimum, `best_candidate` returns the one whose residuals
-prove it. Where catalogues list what some parameters may be, `solve_catalogue` chooses first, and
-the program is that of the others.
+prove it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.linear import LinearConstraint
-from eigassign.assignment.listed import CatalogueSearch, ListedValues, held, solve_catalogue
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
@@ -51,8 +49,7 @@ class Assignment(Brief):
     rad²/s², predicted by the linear models. J as in `program`: the mean square relative error in λ.
     Residuals are recomputed and dimensionless (`optimality`), each at most 1e-8. ``undetermined``
     counts the directions of the free parameters that change no target: there the initial design is
-    kept as nearly as the limits allow (`solver`). ``search``: what the catalogues were searched
-    with, None without any.
+    kept as nearly as the limits allow (`solver`).
     """
 
     names: tuple[str, ...]
@@ -68,7 +65,6 @@ class Assignment(Brief):
     objective_optimal: float
     active: tuple[ActiveLimit, ...]
     undetermined: int
-    search: CatalogueSearch | None = None
 
 
 def solve_assignment(
@@ -79,7 +75,6 @@ def solve_assignment(
     bounds: Bounds,
     constraints: Sequence[LinearConstraint] = (),
     names: Sequence[str] | None = None,
-    catalogues: Sequence[ListedValues] = (),
 ) -> Assignment:
     """The design y within its limits that minimises J of eqs. (13)–(14), in relative error.
 
@@ -87,21 +82,15 @@ def solve_assignment(
     ``time_weights`` (n_t,) in s are those of the integral over time (`trapezoidal_weights`, of
     several trajectories one after the other); ``y0`` (n_y,) is the point dy counts from,
     ``y_initial`` (n_y,) the design to improve on; ``names`` of the parameters (y1, y2, … if not
-    given) serve messages and the list of active limits. The columns of ``catalogues`` take listed
-    values only, the rows within the bounds.
+    given) serve messages and the list of active limits.
 
     Raises:
         UsageError: shapes that do not fit, values that are not finite, empty ranges.
         InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
-        AccuracyError: the KKT residuals of the best answer found exceed 1e-8; or no combination
-            of the catalogues was found.
+        AccuracyError: the KKT residuals of the best answer found exceed 1e-8.
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
     program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)
-    search = solve_catalogue(program, catalogues) if catalogues else None
-    if search is not None:
-        program = held(program, catalogues, search.best[0].rows)
-    listed = {column for catalogue in catalogues for column in catalogue.columns}
     solution = solve_program(program)
     optimum, certificate = best_candidate(program, solution.candidates)
     dy = optimum.y - program.y0
@@ -117,19 +106,14 @@ def solve_assignment(
         gap=certificate.gap,
         objective_initial=program.objective(finite("initial design", y_initial, 1)),
         objective_optimal=program.objective(optimum.y),
-        active=tuple(_active_limits(program, optimum, listed)),
+        active=tuple(_active_limits(program, optimum)),
         undetermined=solution.undetermined,
-        search=search,
     )
 
 
-def _active_limits(
-    program: QuadraticProgram, answer: ProgramAnswer, listed: Collection[int]
-) -> Iterator[ActiveLimit]:
-    """Bounds met exactly, not of ``listed`` columns; then constraints met to 1e-8 of their unit."""
+def _active_limits(program: QuadraticProgram, answer: ProgramAnswer) -> Iterator[ActiveLimit]:
+    """Bounds met exactly; then constraints met to 1e-8 of their unit."""
     for j, name in enumerate(program.names):
-        if j in listed:
-            continue
         near = np.array([program.lower[j], program.upper[j]]) == answer.y[j]
         yield from _limit(name, "bound", near, answer.bound_multipliers[j])
     row, reach = program.C @ answer.y, ACCEPT * program.scales.rows

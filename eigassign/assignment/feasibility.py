@@ -26,28 +26,19 @@ def refuse_impossible(program: QuadraticProgram) -> None:
     Raises:
         InfeasibleError: with the names of all such constraints.
     """
-    lowest, highest = reach(program)
-    slack = TOUCH * program.scales.rows + row_rounding(program)
+    C = program.C
+    with np.errstate(invalid="ignore"):  # 0 · inf, a parameter that does not occur
+        ends = np.stack([C * program.lower, C * program.upper])
+    ends = np.where(C == 0.0, 0.0, ends)
+    lowest, highest = ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)
+    rounding = 1e-15 * (np.abs(C) @ np.abs(program.y_start))  # some units in the last place
+    slack = TOUCH * program.scales.rows + rounding
     bad = (program.c_lower > highest + slack) | (program.c_upper < lowest - slack)
     if not bad.any():
         return
     lines = [_range_message(program, int(k), lowest[k], highest[k]) for k in np.flatnonzero(bad)]
     names = tuple(program.constraint_names[k] for k in np.flatnonzero(bad))
     raise InfeasibleError("; ".join(lines), names)
-
-
-def row_rounding(program: QuadraticProgram) -> Floats:
-    """The round-off (n_c,) of C y, some units in the last place of its terms."""
-    return np.asarray(1e-15 * (np.abs(program.C) @ np.abs(program.y_start)))
-
-
-def reach(program: QuadraticProgram) -> tuple[Floats, Floats]:
-    """Smallest and largest value (n_c,) of each constraint over the bounds."""
-    C = program.C
-    with np.errstate(invalid="ignore"):  # 0 · inf, a parameter that does not occur
-        ends = np.stack([C * program.lower, C * program.upper])
-    ends = np.where(C == 0.0, 0.0, ends)
-    return ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)
 
 
 def _range_message(program: QuadraticProgram, k: int, lowest: float, highest: float) -> str:

@@ -92,22 +92,6 @@ class QuadraticProgram:
         """dJ/dy (n_y,), per SI unit of y."""
         return np.asarray(2.0 * self.A.T @ (self.A @ (y - self.y0) + self.b))
 
-    @property
-    def bounds(self) -> Bounds:
-        """The bounds of all y."""
-        return Bounds(self.lower, self.upper)
-
-    @property
-    def constraints(self) -> list[LinearConstraint]:
-        """The limits of C y, one by one."""
-        each = zip(self.constraint_names, self.C, self.c_lower, self.c_upper, strict=True)
-        return [LinearConstraint(*own) for own in each]
-
-    def within(self, bounds: Bounds, constraints: Sequence[LinearConstraint]) -> QuadraticProgram:
-        """The program of the same J within other limits, in units that suit them."""
-        start = self.y_start
-        return _program(self.names, self.A, self.b, self.y0, start, bounds, constraints)
-
 
 def build_program(
     goals: Goals,
@@ -127,18 +111,6 @@ def build_program(
     names = tuple(f"y{j + 1}" for j in range(y0.size)) if names is None else tuple(names)
     _require_sizes(goals, y0.size, start, bounds, constraints, names)
     A, b = _relative_rows(goals, positive("time weights", time_weights))
-    return _program(names, A, b, y0, start, bounds, constraints)
-
-
-def _program(
-    names: tuple[str, ...],
-    A: Floats,
-    b: Floats,
-    y0: Floats,
-    start: Floats,
-    bounds: Bounds,
-    constraints: Sequence[LinearConstraint],
-) -> QuadraticProgram:
     start = np.clip(start, bounds.lower, bounds.upper)
     C = np.array([c.coefficients for c in constraints]).reshape(len(constraints), y0.size)
     return QuadraticProgram(

@@ -10,7 +10,7 @@ import pytest
 
 from eigassign.case import parse
 from eigassign.pipeline import Result, solve_case
-from eigassign.study import AssignmentRow, BuiltCase, CatalogueRow
+from eigassign.study import AssignmentRow, BuiltCase
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD, REST = TEXT.replace("samples: 152", "samples: 11").split("design: #")
@@ -98,29 +98,6 @@ def with_lists(
     return BuiltCase(parse((head + design + TAIL + targets + more).encode(), "case.yaml"))
 
 
-def exact_objectives(case: BuiltCase, hz: float = 190.0) -> dict[tuple[str, ...], float]:
-    """The weighted mean square error of every combination, by its labels."""
-    model, q = case.model(), case.trajectory.q
-    weights = np.convolve(np.diff(case.trajectory.time_s), [0.5, 0.5])
-    found = {}
-    for rows in itertools.product(*(range(len(c.rows)) for c in case.file.design.catalogues)):
-        pairs = list(zip(case.file.design.catalogues, rows, strict=True))
-        y = [value for own, row in pairs for value in own.rows[row]]
-        error = model.frequencies(q, y, 1)[:, 0] / hz - 1.0
-        label = tuple(own.choices[row] for own, row in pairs)
-        found[label] = float(weights @ error**2 / weights.sum())
-    return found
-
-
-def searched(case: BuiltCase, kind: str = "proved") -> tuple[Result, CatalogueRow]:
-    result = solve_case(case)
-    row = result.results.assignment
-    assert row is not None
-    assert row.catalogue is not None
-    assert row.optimality.kind == kind
-    return result, row.catalogue
-
-
 def test_a_search_of_catalogues_without_time_proves_nothing_and_says_so() -> None:
     row = solve_case(with_lists("0, 80 g", "28 mm", "assignment: {seconds: 1e-9}\n"))
     found = row.results.assignment
@@ -128,27 +105,6 @@ def test_a_search_of_catalogues_without_time_proves_nothing_and_says_so() -> Non
     assert found.optimality.kind == "local"
     assert "of 6 combinations of the catalogues; time used up" in found.optimality.words
     assert "unfinished: time used up" in found.reason
-
-
-def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:
-    """Rejected or confirmed by the whole list of J of eqs. (13)–(14), from the expansion itself."""
-    case = with_lists(
-        "0, 80 g, 160 g, 250 g", "28 mm, 30 mm, 32 mm", "assignment: {method: one_shot}\n"
-    )
-    result, search = searched(case, "bounded")
-    weights = np.convolve(np.diff(case.trajectory.time_s), [0.5, 0.5])
-    wanted, J = (2.0 * np.pi * 190.0) ** 2, {}
-    for label in exact_objectives(case):
-        named = zip(case.file.design.catalogues, label, strict=True)
-        y = np.array([v for own, name in named for v in own.rows[own.choices.index(name)]])
-        hz = result.linearised.frequencies(case.trajectory.q, y)[:, 0]
-        J[label] = float(weights @ ((2.0 * np.pi * hz) ** 2 / wanted - 1.0) ** 2)
-    best = sorted(J, key=lambda key: J[key])[:5]
-    assert [tuple(one.choices.values()) for one in search.best] == best
-    assert search.gap == 0.0
-    assert search.nodes is not None
-    assert result.results.error is not None
-    assert result.results.error.one_shot == result.results.error.exact
 
 
 @pytest.mark.parametrize(("masses", "below"), [("0, 10 g", 1), ("240 g, 250 g", 2)])

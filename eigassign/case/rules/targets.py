@@ -16,7 +16,7 @@ from eigassign.case.rules.lookups import (
     trajectories,
     trajectory_names,
 )
-from eigassign.case.schema.design import PRICE, is_entry
+from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.targets import TARGETS, StaticTarget, kinds_of
 from eigassign.case.schema.trajectory import DURATION, TIME, TipTrajectory
 from eigassign.case.suggestions import listed, shown, unknown
@@ -134,10 +134,10 @@ def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
 
 
 def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
-    """The paper's program has wanted frequencies, bounds, lists, linear constraints, no more."""
+    """The paper's program has wanted frequencies, bounds, linear constraints, no more."""
     if text(tree, "assignment", "method") != "one_shot":
         return
-    instead = "method: one_shot takes only frequency targets of numbered modes, bounds, lists and "
+    instead = "method: one_shot takes only frequency targets of numbered modes, bounds and "
     instead += "linear constraints: write method: sequential"
     if at(tree, "assignment", "objective") not in (None, "least_squares"):
         yield ("assignment", "objective"), f"is not least_squares: {instead}"
@@ -155,9 +155,9 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
             limited = "limits" if key == "torque" or set(names(limits)) != {"price"} else "prices"
             yield ("design", key), f"{limited} {what}: {instead}"
     for name, body in design_entries(tree):
-        for choice, values in (choices(body) or ())[:1]:
-            if at(values, PRICE) is not None:
-                yield ("design", name, "choices", choice, PRICE), f"is a price: {instead}"
+        for key in ("values", "choices"):
+            if at(body, key) is not None:
+                yield ("design", name, key), f"is a list: {instead}"
 
 
 # --- Objectives that are no error of wanted frequencies

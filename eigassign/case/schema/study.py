@@ -72,8 +72,8 @@ class AssignmentKeys(Part):
 
     Keys:
         method: `sequential` goes on to the optimum of the exact problem; `one_shot` is the paper's
-            single quadratic program, for frequency targets of numbered modes, bounds, lists and
-            linear limits
+            single quadratic program, for frequency targets of numbered modes, bounds and linear
+            limits
         objective: what is made small or large: `least_squares` the mean square error, `worst_case`
             the largest weighted error, `lightest` the mass, `{highest: 1}` the least frequency of a
             mode, `widest` the least relative room of all bands and gaps, of numbered modes

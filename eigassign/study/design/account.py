@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import MET, ON, Appraisal
-from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.listed import KEEP
 from eigassign.assignment.requirements.requirement import Requirement, Solved
@@ -24,8 +23,7 @@ from eigassign.study.design.clearance import LIMIT, check_band, followed_between
 from eigassign.study.design.conclusions import aim_row, extreme, is_proved
 from eigassign.study.design.judgement import judged_modes
 from eigassign.study.design.one_shot import cost
-from eigassign.study.design.search.optimum import Found
-from eigassign.study.design.search.variants import Task, variant_of
+from eigassign.study.design.search.optimum import Found, Outcome
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
     ActiveRow,
@@ -161,7 +159,7 @@ def assignment_row(
         clearances=clearances,
         model_error=raised if np.isfinite(raised) else None,
         conflict=conflicting,
-        catalogue=_catalogue(scene, answer, wanted),
+        catalogue=_catalogue(scene, found),
         limits=limits,
         shortcoming=said.shortcoming,
         aim=aim,
@@ -344,51 +342,32 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> CatalogueRow | None:
-    """The best combinations of the catalogues; of the one shot's what they are exactly worth."""
-    own, found, one_shot = scene.file.design.catalogues, answer.found, answer.one_shot
-    if not own:
+def _catalogue(scene: Scene, found: Found | None) -> CatalogueRow | None:
+    """The best combinations of the catalogues."""
+    own, best = scene.file.design.catalogues, list[CombinationRow]()
+    if not own or found is None:
         return None
-    if found is not None:
-        few = [
-            (one.searched.variant.requirements, one.choice.rows, one.best) for one in found.outcomes
-        ]
-        worth = [(own, rows, best.y, best.objective, best.seen) for own, rows, best in few[:KEEP]]
-        looked, gap = found.choices - found.untried, 0.0 if _is_settled(found) else None
-    elif one_shot is not None and one_shot.search is not None:
-        search, variant = one_shot.search, variant_of(Task(scene, tuple(wanted)), ())
-        exact, asked = variant.problem, variant.requirements
-        each = ((one.rows, one.y, exact.appraise(one.y)) for one in search.best)
-        worth = [(asked, rows, y, exact(y, seen), seen) for rows, y, seen in each]
-        looked, gap = search.solved, search.relative_gap
-    else:
-        return None
-    best = []
-    for asked, rows, y, value, seen in worth:
-        choices = {c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}
-        best.append(_combination(scene, asked, choices, y, value, seen))
-    return CatalogueRow(looked, gap, tuple(best))
+    for one in found.outcomes[:KEEP]:
+        rows = zip(own, one.choice.rows, strict=True)
+        choices = {catalogue.name: catalogue.choices[k] for catalogue, k in rows}
+        best.append(_combination(scene, one, choices))
+    gap = 0.0 if _is_settled(found) else None
+    return CatalogueRow(found.choices - found.untried, gap, tuple(best))
 
 
-def _combination(
-    scene: Scene,
-    asked: Requirements,
-    choices: Mapping[str, str],
-    y: Floats,
-    objective: float,
-    seen: Appraisal,
-) -> CombinationRow:
-    """One combination with what it is worth; one that was solved for ``asked``."""
-    curves = ((one, hz) for one, hz, _ in asked.curves(seen) if one.is_goal)
-    errors = [float(one.outside(hz, hz).max()) for one, hz in curves]
+def _combination(scene: Scene, one: Outcome, choices: Mapping[str, str]) -> CombinationRow:
+    """One combination with what it is worth."""
+    best, asked = one.best, one.searched.variant.requirements
+    curves = ((each, hz) for each, hz, _ in asked.curves(best.seen) if each.is_goal)
+    errors = [float(each.outside(hz, hz).max()) for each, hz in curves]
     return CombinationRow(
         choices=choices,
-        design=y,
-        objective=objective,
-        violation=0.0 if scene.file.assignment.method == "one_shot" else seen.violation,
+        design=best.y,
+        objective=best.objective,
+        violation=best.seen.violation,
         error=max(errors, default=None),
-        mass=scene.model.mass(y),
-        price=cost(scene, y),
+        mass=scene.model.mass(best.y),
+        price=cost(scene, best.y),
     )
 
 
@@ -411,17 +390,9 @@ def _merits(
 
 def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> OptimalityRow:
     """How good the optimum is known to be."""
-    found, one_shot = answer.found, answer.one_shot
+    found = answer.found
     if found is None:
-        search = one_shot and one_shot.search
-        if not search:
-            return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
-        gap = search.relative_gap
-        words = (
-            f"the best of the catalogues for the linearised problem only, to {100 * gap:.2g} % of "
-            f"its objective, with {search.solved} combinations solved"
-        )
-        return OptimalityRow("bounded", None, gap, words)
+        return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
     best = found.best
     if not found.are_listed and is_proved(scene, found):
         met = best.seen.violation <= MET

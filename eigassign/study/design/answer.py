@@ -1,7 +1,7 @@
 """From a case's targets to its answer: the paper's one shot, and the optimum of the exact problem.
 
-The one shot is always made where all that is asked is wanted frequencies within bounds, lists and
-linear constraints; it is the answer of `method: one_shot`, and a start of the sequential method
+The one shot is always made where all that is asked is wanted frequencies within bounds and linear
+constraints; it is the answer of `method: one_shot`, and a start of the sequential method
 otherwise.
 """
 
@@ -82,14 +82,14 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
     """The design asked for by the case's method.
 
     Raises CaseError where a mode to be followed has no shape of its own; under `method: one_shot`
-    InfeasibleError where bounds, lists and linear constraints contradict each other, AccuracyError
+    InfeasibleError where bounds and linear constraints contradict each other, AccuracyError
     where it cannot be vouched for.
     """
     require_one_shape(scene, wanted)
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
     plain = all(one.in_one_shot for one in (*wanted, *scene.limits))
-    if wanted and plain and scene.expanded is not None:
+    if wanted and plain and not scene.file.design.catalogues and scene.expanded is not None:
         try:
             one_shot = assign_design(scene, wanted)
         except EigassignError as error:  # also where its design cannot follow the path of a tip
@@ -101,10 +101,7 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
             raise AccuracyError("the one-shot program has no answer")
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
         return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
-    starts = []
-    if one_shot is not None:  # of catalogues the best few combinations
-        search = one_shot.search
-        starts = [one_shot.y] if search is None else [one.y for one in search.best]
+    starts = [] if one_shot is None else [one_shot.y]
     found, robust, more = _between_samples(scene, wanted, starts, progress)
     notes += more
     steps = scene.file.assignment.steps

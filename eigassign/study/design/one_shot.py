@@ -1,7 +1,7 @@
 """The paper's answer: one quadratic program about one expansion point.
 
 The linear model of eq. (9) comes from the partially linearised expansion, the design from the
-quadratic program of eqs. (13)–(14) (`eigassign.assignment`), over catalogues too.
+quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
         Bounds(*scene.bounds),
         scene.constraints,
         tuple(file.design.parameters),
-        catalogues(file),
     )
 
 

@@ -138,6 +138,7 @@ NOT_IN_ONE_SHOT = {
     "followed mode": (T, "  - {¦mode: {like: 1, at: {time: 0}}, frequency: 3}\n", "targets[0].mode"),
     "mass": (D, "  ¦mass: {max: 3}\n", "design.mass"),
     "torque": (D, "  ¦torque: {q1: {max: 3}}\n", "design.torque"),
+    "list": (D, f"  d: {{{ROD}, ¦values: [2 cm, 3 cm]}}\n", "design.d.values"),
 }
 # fmt: on
 

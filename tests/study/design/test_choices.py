@@ -7,11 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from assignment_problems import random_problem
 
 import eigassign as ea
-from eigassign.assignment import Bounds, LinearConstraint, ListedValues, solve_assignment
-from eigassign.errors import InfeasibleError
 from eigassign.study import AssignmentRow
 
 HERE = Path(__file__).parent
@@ -72,35 +69,3 @@ def test_a_limit_contradicts_with_the_linear_one_that_forbids_what_would_meet_it
     _, _, row = answered("list_and_drives", **changes)
     assert row.verdict == "infeasible"
     assert sorted(row.conflict) == ["mode 1 at least 9 Hz along 'go'", "thin"]
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_the_program_over_lists_is_that_of_trying_all_combinations(seed: int) -> None:
-    problem, rng = random_problem(seed, n_y=4), np.random.default_rng(seed)
-    low, width = problem.lower, problem.upper - problem.lower
-    rows = low[:2] + width[:2] * rng.random((4, 2)), low[3:] + width[3:] * rng.random((3, 1))
-    listed = ListedValues("pair", (0, 1), rows[0]), ListedValues("one", (3,), rows[1])
-    c = rng.normal(size=4) / width
-    middle = float(c @ (low + 0.5 * width))
-    keeps = [LinearConstraint("c", c, -np.inf, middle + rng.uniform(-1.5, 0.5))]
-    held = []
-    for pair in rows[0]:
-        for one in rows[1]:
-            y = [*pair, None, *one]
-            lower, upper = (
-                np.array([edge[j] if v is None else v for j, v in enumerate(y)])
-                for edge in (problem.lower, problem.upper)
-            )
-            try:
-                held.append(solve_assignment(*problem.arguments[:4], Bounds(lower, upper), keeps))
-            except InfeasibleError:
-                continue
-    if not held:
-        with pytest.raises(InfeasibleError):
-            solve_assignment(*problem.arguments, keeps, catalogues=listed)
-        return
-    found = solve_assignment(*problem.arguments, keeps, catalogues=listed)
-    best = sorted(one.objective_optimal for one in held)
-    assert found.search is not None
-    np.testing.assert_allclose([one.objective for one in found.search.best], best[:5], rtol=1e-6)
-    assert found.search.relative_gap <= 1e-9
