@@ -17,12 +17,10 @@ from eigassign.case.suggestions import listed, shown
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports import (
-    harwell_boeing,
     keyword_lists,
     matlab,
     matrix_file,
     nastran,
-    op4,
 )
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
@@ -40,9 +38,6 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     matrix_file.read_matrix_market,
     matrix_file.read_numpy,
     matlab.read_matlab,
-    op4.read_binary,
-    op4.read_text,
-    harwell_boeing.read_harwell_boeing,
     nastran.read_bulk,
     keyword_lists.read_substructure,
     keyword_lists.read_nodes,
@@ -51,8 +46,8 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     matrix_file.read_table,
 )
 _KNOWN = (
-    "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market, Harwell-Boeing), MATLAB or "
-    "NumPy, nor a square table of numbers"
+    "Nastran (DMIG, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy, nor a square "
+    "table of numbers"
 )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported, read_matrix
 from scipy import sparse
-from scipy.io import hb_write, mmwrite
+from scipy.io import mmwrite
 from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from writers import (
@@ -25,12 +25,9 @@ from writers import (
     dmig,
     dofs,
     grids,
-    harwell_boeing,
     mapping,
     matlab,
     matlab73,
-    op4_binary,
-    op4_text,
     substructure,
 )
 
@@ -62,23 +59,6 @@ def of_dmig(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
     return {"file": "part.pch", "nodes": BY_ID}
 
 
-def of_op4(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    texts(
-        folder,
-        part_op4=op4_text("KAA", K, "dense") + op4_text("MAA", M, "bigmat"),
-        part_dof=dofs(labels),
-        nodes_csv=CSV,
-    )
-    return {"file": "part.op4", "nodes_file": ["part.dof", "nodes.csv"], "nodes": BY_ID}
-
-
-def of_op4_binary(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    data = op4_binary("KAA", K, "dense", ">") + op4_binary("MAA", M, "sparse", ">")
-    (folder / "part.op4").write_bytes(data)
-    texts(folder, part_dof=dofs(labels), nodes_bdf=grids(PLACES, wide=True))
-    return {"file": "part.op4", "nodes_file": ["part.dof", "nodes.bdf"], "nodes": BY_ID}
-
-
 def of_abaqus(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
     inp = "*NODE\n" + "".join(f"{n}, {x!r}, 0., 0.\n" for n, (x, *_) in PLACES.items())
     texts(folder, K_mtx=abaqus_labels(K, labels), M_mtx=abaqus_labels(M, labels), part_inp=inp)
@@ -98,10 +78,12 @@ def of_calculix(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> T
 
 
 def of_ansys(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    mmwrite(folder / "M.mmf", sparse.coo_array(M), symmetry="symmetric", precision=17)
-    (folder / "M.mmf.mtx").rename(folder / "M.mmf")
-    texts(folder, K_hb=harwell_boeing(K), p_mapping=mapping(labels), nodes_csv=CSV)
-    files = {"stiffness": "K.hb", "mass": "M.mmf", "nodes_file": ["nodes.csv", "p.mapping"]}
+    for name, A in (("K", K), ("M", M)):
+        file = folder / f"{name}.mmf"
+        mmwrite(file, sparse.coo_array(A), symmetry="symmetric", precision=17)
+        (folder / f"{name}.mmf.mtx").rename(file)
+    texts(folder, p_mapping=mapping(labels), nodes_csv=CSV)
+    files = {"stiffness": "K.mmf", "mass": "M.mmf", "nodes_file": ["nodes.csv", "p.mapping"]}
     return {**files, "nodes": BY_ID}
 
 
@@ -135,7 +117,7 @@ def of_tables(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tre
 
 
 WRITERS: tuple[Writer, ...] = (
-    of_dmig, of_op4, of_op4_binary, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
+    of_dmig, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
     of_matlab73, of_numpy, of_tables,
 )  # fmt: skip
 
@@ -182,20 +164,6 @@ def same(file: Path, K: np.ndarray, data: str | bytes, digits: int = 17) -> None
     np.testing.assert_array_equal(found, texts(K) if digits < 17 else K)
 
 
-@pytest.mark.parametrize("layout", ["dense", "sparse", "bigmat"])
-@pytest.mark.parametrize(("width", "digits"), [(16, 10), (23, 17), (26, 20)])
-def test_op4_in_text(tmp_path: Path, K: np.ndarray, layout: str, width: int, digits: int) -> None:
-    same(tmp_path / "K.op4", K, op4_text("KAA", K, layout, width), digits)
-
-
-@pytest.mark.parametrize("layout", ["dense", "sparse", "bigmat"])
-@pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize("size", [4, 8])
-def test_op4_in_binary(tmp_path: Path, K: np.ndarray, layout: str, order: str, size: int) -> None:
-    exact = K if size == 8 else K.astype(np.float32).astype(float)
-    same(tmp_path / "K.op4", exact, op4_binary("KAA", K, layout, order, size))
-
-
 @pytest.mark.parametrize(("wide", "digits"), [(True, 10), (False, 3)])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_dmig(tmp_path: Path, K: np.ndarray, wide: bool, digits: int, end: str) -> None:
@@ -206,19 +174,6 @@ def test_dmig(tmp_path: Path, K: np.ndarray, wide: bool, digits: int, end: str) 
 def test_dmig_between_commas(tmp_path: Path) -> None:
     text = "DMIG,KAAX,0,6,2,0,,,2\nDMIG,KAAX,5,1,,5,1,2.5+3\n,7,1,-1.D3\nDMIG,KAAX,7,1,,7,1,4.\n"
     same(tmp_path / "K.pch", np.array([[2500.0, -1000.0], [-1000.0, 4.0]]), text)
-
-
-@pytest.mark.parametrize(("rhs", "e"), [(False, "E"), (True, "D")])
-def test_harwell_boeing(tmp_path: Path, K: np.ndarray, rhs: bool, e: str) -> None:
-    same(tmp_path / "K.hb", K, harwell_boeing(K, rhs, e))
-
-
-def test_harwell_boeing_of_scipy_has_narrower_columns_than_it_says(
-    tmp_path: Path, K: np.ndarray
-) -> None:
-    hb_write(tmp_path / "K.hb", sparse.csc_array(K))
-    found = read_matrix(tmp_path / "K.hb", "key").toarray()
-    np.testing.assert_allclose(found, K, rtol=1e-15)
 
 
 def test_a_line_without_end_is_refused_in_little_memory(tmp_path: Path) -> None:
@@ -289,7 +244,7 @@ def test_a_matrix_is_told_by_its_content_and_not_by_its_ending(
 ) -> None:
     np.save(tmp_path / "K.npy", K)
     same(tmp_path / "K.txt", K, (tmp_path / "K.npy").read_bytes())
-    same(tmp_path / "K.npz", K, harwell_boeing(K))
+    same(tmp_path / "K.npz", K, coordinate(K))
 
 
 @pytest.mark.parametrize("e", "ED")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import h5py
@@ -52,66 +51,6 @@ def grids(places: dict[int, tuple[float, float, float]], wide: bool = False) -> 
     return "\n".join(out) + "\n"
 
 
-def strings(A: np.ndarray, j: int) -> list[tuple[int, np.ndarray]]:
-    """Runs of entries that are not zero: first row from 1, values."""
-    rows = np.flatnonzero(A[:, j])
-    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-    return [(int(run[0]) + 1, A[run, j]) for run in runs if len(run)]
-
-
-def op4_text(name: str, A: np.ndarray, layout: str, width: int = 23) -> str:
-    n, digits = len(A), width - 7
-    most = 80 // width
-    rows = -n if layout == "bigmat" else n
-    out = [f"{n:8d}{rows:8d}{6:8d}{2:8d}{name:<8}1P,{most}E{width}.{digits}"]
-
-    def put(values: np.ndarray) -> None:
-        texts = [f"{v:{width}.{digits}E}" for v in values]
-        out.extend("".join(texts[k : k + most]) for k in range(0, len(texts), most))
-
-    for j in range(n):
-        runs = strings(A, j)
-        if layout == "dense":
-            first, last = runs[0][0], runs[-1][0] + len(runs[-1][1]) - 1
-            out.append(f"{j + 1:8d}{first:8d}{2 * (last - first + 1):8d}")
-            put(A[first - 1 : last, j])
-            continue
-        head = 2 if layout == "bigmat" else 1
-        out.append(f"{j + 1:8d}{0:8d}{sum(head + 2 * len(v) for _, v in runs):8d}")
-        for row, values in runs:
-            words = 2 * len(values) + 1
-            out.append(f"{words:8d}{row:8d}" if head == 2 else f"{65536 * words + row:12d}")
-            put(values)
-    return "\n".join([*out, f"{n + 1:8d}{1:8d}{1:8d}", f"{1.0:{width}.{digits}E}"]) + "\n"
-
-
-def op4_binary(name: str, A: np.ndarray, layout: str, order: str = "<", size: int = 8) -> bytes:
-    n, per = len(A), size // 4
-    rows = -n if layout == "bigmat" else n
-
-    def record(*whole: int, body: bytes = b"") -> bytes:
-        data = struct.pack(f"{order}{len(whole)}i", *whole) + body
-        mark = struct.pack(f"{order}i", len(data))
-        return mark + data + mark
-
-    out = record(n, rows, 6, per, body=name.ljust(8).encode())
-    for j in range(n):
-        runs = strings(A, j)
-        if layout == "dense":
-            first, last = runs[0][0], runs[-1][0] + len(runs[-1][1]) - 1
-            body = A[first - 1 : last, j].astype(f"{order}f{size}").tobytes()
-            out += record(j + 1, first, len(body) // 4, body=body)
-            continue
-        body = b""
-        for row, values in runs:
-            words = per * len(values) + 1
-            heads = (words, row) if layout == "bigmat" else (65536 * words + row,)
-            body += struct.pack(f"{order}{len(heads)}i", *heads)
-            body += values.astype(f"{order}f{size}").tobytes()
-        out += record(j + 1, 0, len(body) // 4, body=body)
-    return out + record(n + 1, 1, per, body=np.ones(1, f"{order}f{size}").tobytes())
-
-
 def abaqus_labels(A: np.ndarray, labels: Labels) -> str:
     return "".join(
         f"{labels[i][0]},{labels[i][1]}, {labels[j][0]},{labels[j][1]}, {A[i, j]:.17e}\n"
@@ -147,23 +86,6 @@ def substructure(matrices: dict[str, np.ndarray], labels: Labels) -> str:
             texts = [f"{v:.17e}" for v in A[i, : i + 1]]
             out += [" , ".join(texts[k : k + 4]) + "," for k in range(0, len(texts), 4)]
     return "\n".join(out) + "\n"
-
-
-def harwell_boeing(A: np.ndarray, rhs: bool = False, e: str = "E") -> str:
-    half = sparse.csc_array(np.tril(A))
-    pointers, rows = half.indptr + 1, half.indices + 1
-
-    def block(values: np.ndarray, most: int, form: str) -> list[str]:
-        texts = [format(v, form).replace("E", e) for v in values.tolist()]
-        return ["".join(texts[k : k + most]) for k in range(0, len(texts), most)]
-
-    parts = [block(pointers, 8, "10d"), block(rows, 8, "10d"), block(half.data, 3, "26.18E")]
-    lines = [len(part) for part in parts]
-    head = [f"{'a part':<72}{'key':<8}", "".join(f"{v:14d}" for v in (sum(lines), *lines, rhs))]
-    head += [f"{'RSA':<14}" + "".join(f"{v:14d}" for v in (*A.shape, half.nnz, 0))]
-    head += [f"{'(8I10)':<16}{'(8I10)':<16}{f'(1P,3{e}26.18)':<20}{f'(1P,3{e}26.18)':<20}"]
-    head += [f"{'F':<14}{1:14d}{0:14d}"] if rhs else []
-    return "\n".join([*head, *(line for part in parts for line in part)]) + "\n"
 
 
 def matlab(file: Path, matrices: dict[str, np.ndarray], version: str, packed: bool = True) -> None:
