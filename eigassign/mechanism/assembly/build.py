@@ -19,7 +19,7 @@ from eigassign.mechanism.assembly.affine_entries import (
     pattern,
 )
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
-from eigassign.mechanism.assembly.loads.loaded import Loaded
+from eigassign.mechanism.assembly.loads.statics import Loaded
 from eigassign.mechanism.assembly.loads.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions, close_rigid_loops
 from eigassign.mechanism.assembly.pencil import Pencil, Weight

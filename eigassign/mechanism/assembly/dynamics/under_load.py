@@ -44,9 +44,8 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
 )
 from eigassign.mechanism.assembly.loads.beam_stress import Numbers, end_forces, stress_terms
 from eigassign.mechanism.assembly.loads.imported import CROSSED
-from eigassign.mechanism.assembly.loads.loaded import Loaded, first_moment
 from eigassign.mechanism.assembly.loads.second_order import add_second_order
-from eigassign.mechanism.assembly.loads.statics import Loads
+from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, first_moment
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.elements.beam import (
     Shear,

@@ -6,8 +6,7 @@ Read in this order; each imports only from those above it:
 
     beam_stress   k_σ of a beam element from its end forces and its own load
     imported      k_σ of a part that is known by its matrices alone
-    loaded        a mechanism that loads act on, and where its loops tell their forces
-    statics       loads, and the wrenches through the joints: explicit for trees, solved for loops
+    statics       a mechanism that loads act on; the wrenches through its joints, loops included
     curvature     levers and joints: where displacements are of second order in the motion
     second_order  all terms of K_g but those of beams
     elastic       forces of the weight that hang on stiffnesses: redundant loops and springs

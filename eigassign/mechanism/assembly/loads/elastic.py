@@ -16,7 +16,7 @@ import numpy as np
 
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links, pulled, scattered
-from eigassign.mechanism.assembly.loads.loaded import Loaded
+from eigassign.mechanism.assembly.loads.statics import Loaded
 from eigassign.mechanism.assembly.node_motion import MotionRow
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects

@@ -18,8 +18,7 @@ from eigassign.mechanism.assembly.loads.curvature import (
     end_strains,
 )
 from eigassign.mechanism.assembly.loads.imported import imported_terms
-from eigassign.mechanism.assembly.loads.loaded import Loaded
-from eigassign.mechanism.assembly.loads.statics import Loads, Statics, handed, statics
+from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
 from eigassign.mechanism.assembly.node_motion import (
     MotionRow,
     apply,

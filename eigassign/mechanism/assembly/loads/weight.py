@@ -15,9 +15,13 @@ from eigassign.mechanism.assembly.loads.beam_stress import (
     stress_terms,
 )
 from eigassign.mechanism.assembly.loads.elastic import sagging
-from eigassign.mechanism.assembly.loads.loaded import Loaded, first_moment, hangs_on_stiffness
 from eigassign.mechanism.assembly.loads.second_order import add_second_order, on_nodes
-from eigassign.mechanism.assembly.loads.statics import Loads
+from eigassign.mechanism.assembly.loads.statics import (
+    Loaded,
+    Loads,
+    first_moment,
+    hangs_on_stiffness,
+)
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term, summed
 from eigassign.mechanism.kinematics.loop_closure import passive_motion
