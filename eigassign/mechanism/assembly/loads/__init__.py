@@ -7,8 +7,7 @@ Read in this order; each imports only from those above it:
     beam_stress   k_σ of a beam element from its end forces and its own load
     imported      k_σ of a part that is known by its matrices alone
     statics       a mechanism that loads act on; the wrenches through its joints, loops included
-    curvature     levers and joints: where displacements are of second order in the motion
-    second_order  all terms of K_g but those of beams
+    second_order  all terms of K_g but those of beams: arms, joints, springs, imported parts
     elastic       forces of the weight that hang on stiffnesses: redundant loops and springs
     weight        the weight as loads, and the beams that it stresses
 """
