@@ -8,6 +8,5 @@ Read in this order; each imports only from those above it:
     imported      k_σ of a part that is known by its matrices alone
     statics       a mechanism that loads act on; the wrenches through its joints, loops included
     second_order  all terms of K_g but those of beams: arms, joints, springs, imported parts
-    elastic       forces of the weight that hang on stiffnesses: redundant loops and springs
-    weight        the weight as loads, and the beams that it stresses
+    weight        the weight as loads, and the beams that it stresses; forces that hang on stiffnesses
 """
