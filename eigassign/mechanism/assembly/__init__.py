@@ -2,8 +2,7 @@
 
 Read in this order; each imports only from those above it:
 
-    pencil            K = Σ θ_j(q, y) K_j, M = Σ θ_j(q, y) M_j: what everything else evaluates
-    affine_entries    where entries go, and with what function of (q, y)
+    pencil            K = Σ θ_j(q, y) K_j, M likewise: what all else evaluates; where entries go
     congruence        Bᵀ k B and Bᵀ m B of every link: where eq. (1) is formed
     node_motion       Q: the elastic motion of every node, loops between rigid links included
     springs           springs between nodes

@@ -12,17 +12,18 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.affine_entries import (
-    AffineEntries,
-    Entries,
-    Ints,
-    pattern,
-)
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.loads.statics import Loaded
 from eigassign.mechanism.assembly.loads.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions, close_rigid_loops
-from eigassign.mechanism.assembly.pencil import Pencil, Weight
+from eigassign.mechanism.assembly.pencil import (
+    AffineEntries,
+    Entries,
+    Ints,
+    Pencil,
+    Weight,
+    pattern,
+)
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.assembly.affine_entries import AffineEntries, Row
+from eigassign.mechanism.assembly.pencil import AffineEntries, Row
 from eigassign.mechanism.elements.mesh import Reduction, Term, total
 from eigassign.mechanism.kinematics.rotations import multiply, scaled, some
 from eigassign.series.expression import Scalar

@@ -21,9 +21,9 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
-from eigassign.mechanism.assembly.affine_entries import AffineEntries, Entries, joined
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
 from eigassign.mechanism.assembly.node_motion import MotionRows
+from eigassign.mechanism.assembly.pencil import AffineEntries, Entries, joined
 from eigassign.mechanism.assembly.springs import SpringEnds, resists
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference

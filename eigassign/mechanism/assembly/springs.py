@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eigassign.case.case_file import CaseFile
-from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.node_motion import (
     MotionRow,
     MotionRows,
@@ -23,6 +22,7 @@ from eigassign.mechanism.assembly.node_motion import (
     apply,
     combined,
 )
+from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
 from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (

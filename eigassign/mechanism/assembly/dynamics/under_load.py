@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
-from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.build import by_name, local_links
 from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     STEP,
@@ -47,6 +46,7 @@ from eigassign.mechanism.assembly.loads.imported import CROSSED
 from eigassign.mechanism.assembly.loads.second_order import add_second_order
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, first_moment
 from eigassign.mechanism.assembly.node_motion import combined
+from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import (
     Shear,
     element_mass,

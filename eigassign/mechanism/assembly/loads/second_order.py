@@ -20,7 +20,6 @@ import itertools
 import numpy as np
 
 from eigassign.case.schema.joints import RIDING
-from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import add_stressed
 from eigassign.mechanism.assembly.loads.imported import imported_terms
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
@@ -30,6 +29,7 @@ from eigassign.mechanism.assembly.node_motion import (
     apply,
     combined,
 )
+from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import PLANES, Shear, shares
 from eigassign.mechanism.kinematics.forward import walked
 from eigassign.mechanism.kinematics.parameters import is_imported

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.congruence import (
     LocalLink,
     add_links,
@@ -37,6 +36,7 @@ from eigassign.mechanism.assembly.loads.statics import (
     hangs_on_stiffness,
 )
 from eigassign.mechanism.assembly.node_motion import MotionRow
+from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term, summed
