@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import gravity, local_links
 from eigassign.mechanism.assembly.congruence import pulled, scattered
-from eigassign.mechanism.assembly.node_motion import MotionRow, combined
-from eigassign.mechanism.assembly.springs import SpringEnds
+from eigassign.mechanism.assembly.node_motion import MotionRow, SpringEnds, combined
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import DOFS, multiply

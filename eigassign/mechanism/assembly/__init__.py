@@ -4,8 +4,7 @@ Read in this order; each imports only from those above it:
 
     pencil            K = Σ θ_j(q, y) K_j, M likewise: what all else evaluates; where entries go
     congruence        Bᵀ k B and Bᵀ m B of every link: where eq. (1) is formed
-    node_motion       Q: the elastic motion of every node, loops between rigid links included
-    springs           springs between nodes
+    node_motion       Q: the elastic motion of every node, loops of rigid links included; springs
     rigid_body_modes  free motions that no spring or weight resists, made columns of their own
     loads             the stiffness that loads add in a pose, above all the weight
     total_mass        the mass of all links and bodies as a function of the design

@@ -15,7 +15,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.loads.statics import Loaded
 from eigassign.mechanism.assembly.loads.weight import add_weight
-from eigassign.mechanism.assembly.node_motion import NodeMotions, close_rigid_loops
+from eigassign.mechanism.assembly.node_motion import NodeMotions, add_springs, close_rigid_loops
 from eigassign.mechanism.assembly.pencil import (
     AffineEntries,
     Entries,
@@ -25,7 +25,6 @@ from eigassign.mechanism.assembly.pencil import (
     pattern,
 )
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
-from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh

@@ -21,8 +21,8 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import add_drives, compiled_pattern, local_links
 from eigassign.mechanism.assembly.congruence import add_links
+from eigassign.mechanism.assembly.node_motion import add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries, Pencil, theta_at
-from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.mesh import Entries, Term
 from eigassign.mechanism.kinematics.forward import Kinematics

@@ -22,9 +22,8 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
-from eigassign.mechanism.assembly.node_motion import MotionRows
+from eigassign.mechanism.assembly.node_motion import MotionRows, SpringEnds, resists
 from eigassign.mechanism.assembly.pencil import AffineEntries, Entries, joined
-from eigassign.mechanism.assembly.springs import SpringEnds, resists
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters

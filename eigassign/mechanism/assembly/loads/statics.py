@@ -24,8 +24,14 @@ import numpy as np
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
-from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, NodeMotions, pivots
-from eigassign.mechanism.assembly.springs import SpringEnds, SpringMotion
+from eigassign.mechanism.assembly.node_motion import (
+    MotionRow,
+    MotionRows,
+    NodeMotions,
+    SpringEnds,
+    SpringMotion,
+    pivots,
+)
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk

@@ -35,9 +35,8 @@ from eigassign.mechanism.assembly.loads.statics import (
     first_moment,
     hangs_on_stiffness,
 )
-from eigassign.mechanism.assembly.node_motion import MotionRow
+from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
-from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term, summed
 from eigassign.mechanism.kinematics.loop_closure import passive_motion
