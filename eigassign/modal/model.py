@@ -22,10 +22,9 @@ from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
-from eigassign.mechanism.assembly.energies import EnergyForms, energy_forms
+from eigassign.mechanism.assembly.energies import EnergyForms, TotalMass, energy_forms
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.mechanism.drives import DriveForces, drive_forces
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics

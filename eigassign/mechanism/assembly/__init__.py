@@ -7,9 +7,8 @@ Read in this order; each imports only from those above it:
     node_motion       Q: the elastic motion of every node, loops of rigid links included; springs
     rigid_body_modes  free motions that no spring or weight resists, made columns of their own
     loads             the stiffness that loads add in a pose, above all the weight
-    total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
-    energies          energies of a mode in links, drives, springs, weight and bodies
+    energies          the total mass; energies of a mode in links, drives, springs, weight, bodies
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]
     dynamics          what motion and loads add to eq. (1), at a pose
     sagged            the mechanism as its weight has bent it, assembled anew
