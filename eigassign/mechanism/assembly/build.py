@@ -28,14 +28,13 @@ from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, sepa
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh
-from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.limits import property_limits, rails
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.parameters import parameters as variables
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats
-from eigassign.mechanism.kinematics.topology import build_tree
+from eigassign.mechanism.kinematics.topology import build_tree, coordinates
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Scalar
 

@@ -4,8 +4,7 @@ Read in this order; each imports only from those above it:
 
     rotations     rotation matrices and rigid transformations
     joints        rotation, translation and motion subspace A of each type of joint
-    topology      spanning tree of links, loop-closing joints, freedoms
-    coordinates   the case's q against joint coordinates: s = A q + b
+    topology      spanning tree, loop-closing joints, freedoms; coordinates, s = A q + b
     parameters    numbers of the mechanism, lengths and node positions; design parameters
     forward       twists of the links, from the ground to the tips
     loop_closure  passive freedoms p(q, y) and their rates P q̇; the assembly branch

@@ -17,7 +17,6 @@ import numpy as np
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
-from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
 from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
@@ -28,7 +27,13 @@ from eigassign.mechanism.kinematics.rotations import (
     multiply,
     present,
 )
-from eigassign.mechanism.kinematics.topology import JointEdge, NodeName, Topology, split
+from eigassign.mechanism.kinematics.topology import (
+    CoordinateMap,
+    JointEdge,
+    NodeName,
+    Topology,
+    split,
+)
 from eigassign.series.expression import Scalar
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,
@@ -24,7 +23,7 @@ from eigassign.mechanism.kinematics.parameters import (
     written_loads,
 )
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, multiply
-from eigassign.mechanism.kinematics.topology import Topology
+from eigassign.mechanism.kinematics.topology import CoordinateMap, Topology
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
 from eigassign.mechanism.imports.parts import imported_part
-from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.rotations import Objects, vector
-from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree
+from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree, coordinates
 from eigassign.mechanism.solids.part import couplings
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, Scalar
