@@ -27,9 +27,8 @@ from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, sha
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.drives import DriveForces, drive_forces
 from eigassign.mechanism.elements.mesh import LinkMesh
-from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.forward import Kinematics, LinkFrames
 from eigassign.mechanism.kinematics.limits import Label
-from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing

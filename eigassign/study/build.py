@@ -28,7 +28,7 @@ from eigassign.mechanism.assembly.build import (
 )
 from eigassign.mechanism.assembly.energies import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
-from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
+from eigassign.mechanism.kinematics.forward import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,

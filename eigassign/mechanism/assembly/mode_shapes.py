@@ -19,8 +19,7 @@ from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, mo
 from eigassign.mechanism.elements.beam import Shear, fields
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand, element_motion
-from eigassign.mechanism.kinematics.forward import Placement
-from eigassign.mechanism.kinematics.link_frames import LinkFrames
+from eigassign.mechanism.kinematics.forward import LinkFrames, Placement
 from eigassign.mechanism.kinematics.rotations import Objects
 
 Floats = NDArray[np.float64]
