@@ -4,8 +4,7 @@ Read in this order; each imports only from those above it:
 
     tip_path  where the tip has to be and how it is turned: paths, attitudes, both with their times
     chain     the tip as a function of the mechanism's state, with its Jacobian
-    state     a chain in one measure for metres and radians; first guesses
-    solver    Newton, Levenberg-Marquardt, and tracing a path
+    solver    one measure, first guesses, Newton, Levenberg-Marquardt, tracing a path
     failures  why a path cannot be followed, in words
     follow    from the first sample along the whole path
     redesign  how the coordinates along a path follow the design

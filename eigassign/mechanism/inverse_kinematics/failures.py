@@ -8,7 +8,7 @@ import numpy as np
 
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import Floats
-from eigassign.mechanism.inverse_kinematics.state import TipProblem
+from eigassign.mechanism.inverse_kinematics.solver import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 

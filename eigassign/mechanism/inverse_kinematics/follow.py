@@ -26,15 +26,16 @@ from eigassign.mechanism.inverse_kinematics.failures import (
 from eigassign.mechanism.inverse_kinematics.solver import (
     DEAD,
     ROUND_OFF,
+    TipProblem,
     Trace,
     interpolated,
     levenberg,
     loop_regularity,
     lost,
     newton,
+    prepare,
     trace,
 )
-from eigassign.mechanism.inverse_kinematics.state import TipProblem, prepare
 from eigassign.mechanism.inverse_kinematics.tip_path import Course
 
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad

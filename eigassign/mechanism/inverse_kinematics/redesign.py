@@ -39,6 +39,7 @@ from eigassign.mechanism.inverse_kinematics.follow import (
 )
 from eigassign.mechanism.inverse_kinematics.solver import (
     ROUND_OFF,
+    TipProblem,
     handedness,
     least_norm,
     levenberg,
@@ -47,7 +48,6 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     within,
 )
-from eigassign.mechanism.inverse_kinematics.state import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import Course
 
 

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from eigassign.mechanism.inverse_kinematics.chain import reduced
 from eigassign.mechanism.inverse_kinematics.follow import Followed, at_parameters
 from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign
-from eigassign.mechanism.inverse_kinematics.solver import least_norm
-from eigassign.mechanism.inverse_kinematics.state import TipProblem
+from eigassign.mechanism.inverse_kinematics.solver import TipProblem, least_norm
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, smooth
 from eigassign.mechanism.trajectory.timing import TimingLaw
 
