@@ -26,16 +26,14 @@ import numpy as np
 
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, ChainDesign, Floats, reduced
-from eigassign.mechanism.inverse_kinematics.failures import (
-    other_branch,
-    out_of_reach,
-    with_design,
-)
 from eigassign.mechanism.inverse_kinematics.follow import (
     RESIDUAL,
     Followed,
     as_assembled,
+    other_branch,
+    out_of_reach,
     require_reached,
+    with_design,
 )
 from eigassign.mechanism.inverse_kinematics.solver import (
     ROUND_OFF,
