@@ -29,8 +29,7 @@ from scipy import sparse
 
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.solids.elements import KINDS, dofs, gradients, lame, mass, slopes
-from eigassign.mechanism.solids.part import AT_ONCE, SolidPart
-from eigassign.mechanism.solids.surfaces import Coupling, crossed, moments
+from eigassign.mechanism.solids.part import AT_ONCE, Coupling, SolidPart, crossed, moments
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

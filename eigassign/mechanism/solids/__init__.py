@@ -4,7 +4,6 @@ Read in this order; each imports only from those above it:
 
     elements   stiffness and mass of tetrahedra of 4 and 10 nodes and hexahedra of 20
     mesh_file  a mesh from a file of gmsh, Abaqus, CalculiX or Nastran, within limits
-    surfaces   nodes that stand for surfaces, rigid or distributing
     enriched   how far a mesh errs, by functions of one degree more
-    part       K, M and rigid motion of a part, for E = 1 and ρ = 1
+    part       K, M and rigid motion of a part, for E = 1 and ρ = 1; nodes for surfaces
 """
