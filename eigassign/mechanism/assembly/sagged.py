@@ -29,7 +29,7 @@ from eigassign.mechanism.assembly.dynamics.under_load import Beams, LoadedPose
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.links import BentElement, bent_link
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
-from eigassign.mechanism.elements.profiles import BeamValues
+from eigassign.mechanism.elements.sections import BeamValues
 from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import X
 from eigassign.mechanism.kinematics.parameters import Moved

@@ -2,8 +2,7 @@
 
 Read in this order; each imports only from those above it:
 
-    sections       area, moments of inertia and shear coefficient of cross-sections
-    profiles       stiffnesses and masses of a beam along each element, tapered or not
+    sections       cross-sections, and stiffnesses and masses of a beam along each element
     beam           stiffness and consistent mass of a beam element; its shape functions
     mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
     bodies         rigid links, point masses and rigid bodies at nodes

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.elements.profiles import Profile
+from eigassign.mechanism.elements.sections import Profile
 from eigassign.series.expression import Scalar, is_constant
 
 Floats = NDArray[np.float64]

@@ -24,7 +24,7 @@ from eigassign.mechanism.elements.mesh import (
     chain_dofs,
     rigid_motion,
 )
-from eigassign.mechanism.elements.profiles import (
+from eigassign.mechanism.elements.sections import (
     Profile,
     beam_profiles,
     beam_values,

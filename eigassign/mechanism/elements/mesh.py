@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.elements.beam import Shear
-from eigassign.mechanism.elements.profiles import Profile
+from eigassign.mechanism.elements.sections import Profile
 from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects, multiply, skew
 from eigassign.series.expression import Expression, Scalar, atom_of, parts
 

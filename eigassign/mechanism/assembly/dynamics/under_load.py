@@ -55,7 +55,7 @@ from eigassign.mechanism.elements.beam import (
     shear,
 )
 from eigassign.mechanism.elements.mesh import Entries, Strand
-from eigassign.mechanism.elements.profiles import SHARES, STATIONS, BeamValues, Profile
+from eigassign.mechanism.elements.sections import SHARES, STATIONS, BeamValues, Profile
 from eigassign.mechanism.elements.solid_stress import PAIRS
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics

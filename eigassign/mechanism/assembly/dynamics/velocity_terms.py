@@ -41,7 +41,7 @@ from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.elements.beam import fields
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
-from eigassign.mechanism.elements.profiles import field_inertia
+from eigassign.mechanism.elements.sections import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported
