@@ -27,8 +27,7 @@ from eigassign.mechanism.assembly.build import add_drives, compiled_pattern, loc
 from eigassign.mechanism.assembly.congruence import add_links
 from eigassign.mechanism.assembly.node_motion import add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries, Pencil, theta_at
-from eigassign.mechanism.elements.bodies import add_bodies
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, add_bodies
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters, written_loads

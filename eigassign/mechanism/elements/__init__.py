@@ -4,8 +4,7 @@ Read in this order; each imports only from those above it:
 
     sections       cross-sections, and stiffnesses and masses of a beam along each element
     beam           stiffness and consistent mass of a beam element; its shape functions
-    mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
-    bodies         rigid links, point masses and rigid bodies at nodes
+    mesh           a link's affine k(y), m(y), its nodes, its rigid motion N(y), its bodies
     sparse_factor  factors of symmetric definite sparse matrices, and their largest modes
     solid_stress   k_σ of a solid part for each load on its nodes
     craig_bampton  fixed-interface modes instead of a link's interior dofs

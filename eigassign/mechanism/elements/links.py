@@ -16,12 +16,13 @@ from eigassign.mechanism.elements.beam import (
     element_stiffness,
     shear,
 )
-from eigassign.mechanism.elements.bodies import add_bodies, rigid_link
 from eigassign.mechanism.elements.mesh import (
     Entries,
     LinkMesh,
     Strand,
+    add_bodies,
     chain_dofs,
+    rigid_link,
     rigid_motion,
 )
 from eigassign.mechanism.elements.sections import (

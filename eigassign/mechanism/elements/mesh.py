@@ -1,4 +1,4 @@
-"""A link as a finite-element mesh in its own frame: affine matrices, nodes, rigid motion.
+"""A link as a finite-element mesh in its own frame: affine matrices, nodes, rigid motion, bodies.
 
 The matrices are sums of (scalar coefficient) × (constant sparse matrix); equal coefficients are
 merged, and what is constant becomes one matrix.
@@ -6,17 +6,22 @@ merged, and what is constant becomes one matrix.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.parts import tensor
 from eigassign.mechanism.elements.beam import Shear
 from eigassign.mechanism.elements.sections import Profile
-from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects, multiply, skew
+from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
+from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects, multiply, skew, vector
+from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Expression, Scalar, atom_of, parts
 
 Floats = NDArray[np.float64]
@@ -193,3 +198,55 @@ def add_body(
     mS = multiply(S, m)
     block = np.block([[m, mS * -1.0], [mS, J - multiply(S, mS)]])
     entries.add_scalars(block.ravel().tolist(), np.repeat(slots, 6), np.tile(slots, 6))
+
+
+def add_bodies(
+    case: CaseFile,
+    parameters: ModelParameters,
+    name: str,
+    mass: Entries,
+    nodes: Mapping[str, Ints],
+    arms: Mapping[str, Objects] = MappingProxyType({}),
+) -> None:
+    """The point masses and rigid bodies fixed to a link's nodes.
+
+    ``arms`` are the places of nodes without slots of their own, which hang on the origin rigidly.
+    """
+    for key, body in case.mechanism.bodies.items():
+        link, _, node = body.at.partition(".")
+        if link == name:
+            turn = parameters.moved.get((link, node), STILL).turn
+            offset = multiply(turn, parameters.vector(f"bodies.{key}.offset", body.offset))
+            lever = offset + arms.get(node, 0.0)
+            if isinstance(body.inertia, tuple):
+                J = turn @ np.array(tensor(body.inertia)) @ turn.T
+                inertia = tuple(J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
+                body = body.model_copy(update={"inertia": inertia})
+            _add(parameters, f"bodies.{key}", body, mass, nodes["@origin" if arms else node], lever)
+
+
+def _add(
+    parameters: ModelParameters, path: str, body: Any, mass: Entries, slots: Ints, lever: Objects
+) -> None:
+    """One body; an inertia that is one number is I_zz of a planar one."""
+    inertia: list[Scalar] = [0.0] * 6  # Ixx, Iyy, Izz, Ixy, Ixz, Iyz
+    if isinstance(body.inertia, (tuple, list)):
+        inertia[: len(body.inertia)] = [float(v) for v in body.inertia]
+    else:
+        inertia[2] = parameters.number(f"{path}.inertia", body.inertia)
+    add_body(mass, slots, parameters.number(f"{path}.mass", body.mass), inertia, lever)
+
+
+def rigid_link(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
+    """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
+    space = case.mechanism.space
+    link: Any = case.mechanism.links[name]
+    width, slots = len(DOFS[space]), chain_dofs(1, space)
+    nodes, mass = {"@origin": slots[0]}, Entries((width, width))
+    named = ["start", *(["end"] if link.length is not None else []), *(link.nodes or {})]
+    arms = {key: node_position(case, parameters, tree, (name, key)) for key in named}
+    center = parameters.vector(f"links.{name}.center", link.center)
+    _add(parameters, f"links.{name}", link, mass, slots[0], center)
+    add_bodies(case, parameters, name, mass, nodes, arms)
+    rigid = rigid_motion([vector([0.0])], slots, width, space)
+    return LinkMesh(width, nodes, arms, [], mass.terms(), rigid)

@@ -19,13 +19,13 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
 from eigassign.mechanism.elements.mesh import (
     Entries,
     LinkMesh,
     Lost,
     Term,
+    add_bodies,
     chain_dofs,
     rigid_motion,
 )

@@ -32,8 +32,7 @@ from eigassign.mechanism.assembly.node_motion import (
     SpringMotion,
     pivots,
 )
-from eigassign.mechanism.elements.bodies import add_bodies
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, summed
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, add_bodies, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
 from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
 from eigassign.mechanism.kinematics.parameters import (
