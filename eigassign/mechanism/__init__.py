@@ -28,7 +28,7 @@ __all__, __getattr__, __dir__ = face(
         "assembly.dynamics.velocity_terms": "velocity_terms",
         "drives": "DriveForces drive_forces",
         "elements.beam": "fields",
-        "elements.free_part": "free_part_lines part_lines",
+        "elements.superelement": "free_part_lines part_lines",
         "elements.mesh": "total",
         "elements.sections": "section_values",
         "elements.sparse_factor": "factorise kept_factor largest_beside",

@@ -25,7 +25,7 @@ from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
-from eigassign.mechanism.elements.free_part import part_lines
+from eigassign.mechanism.elements.superelement import part_lines
 from eigassign.mechanism.kinematics.limits import resting_pose
 from eigassign.mechanism.kinematics.parameters import is_imported, written_loads
 from eigassign.modal.exact.roundoff import rounding_error

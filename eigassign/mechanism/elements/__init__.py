@@ -8,7 +8,6 @@ Read in this order; each imports only from those above it:
     sparse_factor  factors of symmetric definite sparse matrices, and their largest modes
     solid_stress   k_σ of a solid part for each load on its nodes
     craig_bampton  fixed-interface modes instead of a link's interior dofs
-    superelement   links from another finite-element program, or from the mesh of a solid part
-    free_part      mass, inertia and free-free frequencies of a part, in words
+    superelement   links from another program, or from the mesh of a solid part; what a part is
     links          the mesh of any link: beam, frame, rigid, superelement or solid
 """
