@@ -46,8 +46,7 @@ __all__, __getattr__, __dir__ = face(
         "solids.mesh_file": "read_mesh",
         "solids.part": "Coupling joined solid_part",
         "trajectory.csv": "read_samples",
-        "trajectory.motion": "PointMotion",
-        "trajectory.timing": "timing_law",
+        "trajectory.motion": "PointMotion timing_law",
         "trajectory.trajectory": ("NamedTrajectory Trajectories Trajectory build_trajectory rates"),
     },
 )

@@ -50,8 +50,9 @@ from eigassign.mechanism.trajectory.motion import (
     PointMotion,
     SampledMotion,
     TipMotion,
+    shared_times,
+    timing_law,
 )
-from eigassign.mechanism.trajectory.timing import shared_times, timing_law
 
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
