@@ -9,8 +9,7 @@ Read in this order; each imports only from those above it:
     assembly            K = Bᵀ k B and M = Bᵀ m B with B = [Q, N T], affine in scalar functions
     inverse_kinematics  the coordinates q along a path of the tip
     trajectory          q(t) from samples, files, points or tip paths
-    forces              forces at nodes, and the weight, on the unknowns of the pencil
-    drives              torques and forces that the drives exert along trajectories
+    forces              forces at nodes and the weight, on the unknowns; what drives exert
 """
 
 from eigassign.faces import face
@@ -26,7 +25,7 @@ __all__, __getattr__, __dir__ = face(
         "assembly.node_motion": "require_consistent",
         "assembly.dynamics.under_load": "stiffness_under_load",
         "assembly.dynamics.velocity_terms": "velocity_terms",
-        "drives": "DriveForces drive_forces",
+        "forces": "DriveForces drive_forces",
         "elements.beam": "fields",
         "elements.superelement": "free_part_lines part_lines",
         "elements.mesh": "total",

@@ -25,8 +25,8 @@ from eigassign.mechanism.assembly.dynamics.under_load import (
 from eigassign.mechanism.assembly.energies import EnergyForms, TotalMass, energy_forms
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.drives import DriveForces, drive_forces
 from eigassign.mechanism.elements.mesh import LinkMesh
+from eigassign.mechanism.forces import DriveForces, drive_forces
 from eigassign.mechanism.kinematics.forward import Kinematics, LinkFrames
 from eigassign.mechanism.kinematics.limits import Label
 from eigassign.modal.arguments import samples
