@@ -2,12 +2,11 @@
 
 Read in this order; each imports only from those above it:
 
-    entries         what readers share: limits, places of entries, numbers
-    matrix_file     Matrix Market and NumPy
-    matlab_child    MATLAB's .mat by SciPy and h5py, in a process of its own
-    matlab          what that process makes of a file
-    nastran         Nastran's DMIG cards and grid points
-    keyword_lists   Abaqus, CalculiX, Ansys: entries, freedoms of rows, nodes
-    reading         a file of any of them, told by its content
-    parts           K, M, rows and places of a link's nodes, in SI
+    entries       what readers share: limits, places of entries, numbers
+    matrix_file   Matrix Market and NumPy
+    matlab_child  MATLAB's .mat by SciPy and h5py, in a process of its own
+    matlab        what that process makes of a file
+    programs      Nastran, Abaqus, CalculiX, Ansys: matrices, freedoms of rows, nodes
+    reading       a file of any of them, told by its content
+    parts         K, M, rows and places of a link's nodes, in SI
 """

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports.entries import LARGEST, UnfitError
-from eigassign.mechanism.imports.nastran import CARD, fields_of
+from eigassign.mechanism.imports.programs import CARD, fields_of
 from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
