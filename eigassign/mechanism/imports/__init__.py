@@ -2,8 +2,7 @@
 
 Read in this order; each imports only from those above it:
 
-    entries       what readers share: limits, places of entries, numbers
-    matrix_file   Matrix Market and NumPy
+    entries       what readers share: limits, places of entries; Matrix Market, NumPy, tables
     matlab_child  MATLAB's .mat by SciPy and h5py, in a process of its own
     matlab        what that process makes of a file
     programs      Nastran, Abaqus, CalculiX, Ansys: matrices, freedoms of rows, nodes
