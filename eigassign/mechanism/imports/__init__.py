@@ -6,6 +6,5 @@ Read in this order; each imports only from those above it:
     matlab_child  MATLAB's .mat by SciPy and h5py, in a process of its own
     matlab        what that process makes of a file
     programs      Nastran, Abaqus, CalculiX, Ansys: matrices, freedoms of rows, nodes
-    reading       a file of any of them, told by its content
-    parts         K, M, rows and places of a link's nodes, in SI
+    parts         K, M, rows and places of a link's nodes, in SI, from files told by content
 """
