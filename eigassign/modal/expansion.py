@@ -29,8 +29,8 @@ from eigassign.modal.taylor.vectors import (
     taylor_vectors,
     vector_set,
 )
+from eigassign.series.algebra import Polynomials, monomials, polynomials, reciprocal
 from eigassign.series.multi_index import LowerSet
-from eigassign.series.power_series import Polynomials, monomials, polynomials, reciprocal
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20

@@ -51,8 +51,8 @@ from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.taylor.bordered import Solve
 from eigassign.modal.taylor.rayleigh import inverse_root, quadratics
 from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.series.algebra import matrix_product
 from eigassign.series.multi_index import lower_set, total_degree
-from eigassign.series.power_series import matrix_product
 
 Floats = NDArray[np.float64]
 # Relative distance in λ below which modes are followed together. Where two veered seven periods

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.projection import project_at, project_terms
+from eigassign.series.algebra import matrix_product, multiply, power_taylor, reciprocal
 from eigassign.series.multi_index import LowerSet, first_of_each
-from eigassign.series.power_series import matrix_product, multiply, power_taylor, reciprocal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -23,8 +23,8 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
 from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.series.algebra import monomials_of, multiply
 from eigassign.series.multi_index import LowerSet, lower_set, partially_linear, total_degree
-from eigassign.series.power_series import monomials_of, multiply
 
 Floats = NDArray[np.float64]
 
