@@ -59,7 +59,7 @@ def imported_terms(
 def _strut_terms(
     mesh: LinkMesh, wrenches: Mapping[str, Objects], space: str, bent: bool
 ) -> list[Term]:
-    moved, of_nodes = _motions(mesh)
+    moved, of_nodes = _node_motions(mesh)
     kept = [d - 3 for d in DOFS[space] if d >= 3]
     phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)
     Mr, first, m = _momentum(mesh, space)
@@ -94,7 +94,7 @@ def _turned_twice(phi: Floats, X: Floats, axis: int) -> Floats:
     return np.asarray(0.5 * (np.outer(phi[axis], X @ phi) - X[axis] * (phi.T @ phi)))
 
 
-def _motions(mesh: LinkMesh) -> tuple[dict[str, Floats], sparse.csr_array]:
+def _node_motions(mesh: LinkMesh) -> tuple[dict[str, Floats], sparse.csr_array]:
     """The motion (6, n) of each node in the n dofs of all nodes, and these among all dofs."""
     own = np.concatenate([slots[slots >= 0] for slots in mesh.nodes.values()])
     of_nodes = sparse.csr_array(
