@@ -34,7 +34,7 @@ __all__, __getattr__, __dir__ = face(
         "imports.parts": "imported_part matrix_of read_contents",
         "inverse_kinematics.chain": "TipChain TipEvaluation reduced tip_chain",
         "inverse_kinematics.follow": "follow",
-        "inverse_kinematics.tip_path": ("Course planar_attitude spatial_attitude spline straight"),
+        "inverse_kinematics.tip_path": "Course planar_attitude spatial_attitude spline straight",
         "kinematics.forward": "Placement build_link_frames",
         "kinematics.joints": "joint_motion turned",
         "kinematics.loop_closure": "all_moving",
@@ -45,6 +45,6 @@ __all__, __getattr__, __dir__ = face(
         "solids.part": "Coupling joined solid_part",
         "trajectory.csv": "read_samples",
         "trajectory.motion": "PointMotion timing_law",
-        "trajectory.trajectory": ("NamedTrajectory Trajectories Trajectory build_trajectory rates"),
+        "trajectory.trajectory": "NamedTrajectory Trajectories Trajectory build_trajectory rates",
     },
 )

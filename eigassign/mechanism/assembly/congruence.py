@@ -13,7 +13,7 @@ With constant symmetric matrices a of k = Σ κ_i(y) k_i and m = Σ μ_i(y) m_i,
         | 0       0 |,           | sym.     Tᵀ (Nᵀ m N) T |,
 
 for k N = 0 exactly: a rigid motion strains nothing. Where entries go, with what function of (q, y),
-is the matter of `affine_entries`.
+is the matter of `pencil`.
 """
 
 from __future__ import annotations

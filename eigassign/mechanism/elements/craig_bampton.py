@@ -9,7 +9,7 @@ constant matrix of the link is projected on it. Where the link itself changes wi
 what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
 rigid-body motion is in the span at every y. Under gravity that of an imported part holds its sag as
 well, K_ii⁻¹ (M r)_i of translations r: the weight's stiffness, which joins M r to the nodes
-(`assembly.loads.imported`), is nothing then on what is left out. What that changes is measured
+(`assembly.loads.stress`), is nothing then on what is left out. What that changes is measured
 against the whole links (`modal.finer_meshes`).
 
 The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,

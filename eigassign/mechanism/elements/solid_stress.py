@@ -13,7 +13,7 @@ F_s what the coupling puts on the nodes of a surface, w_s the part of second ord
     distributing    Σ F_s · w_s = −F · (θ × (θ × d))/2 − (M + d × F) · φ,
                     J φ = ∫ (θ × s) × u dA + θ × C θ/2,   C = ∫ s sᵀ dA
 
-with (F, M) on its node, θ its turn, r, s, d and J as in `surfaces`, so that
+with (F, M) on its node, θ its turn, r, s, d and J as in `part`, so that
 ∫ (s + θ × s + θ × (θ × s)/2) × (s + u) dA = 0. Nodes turn by rotation vectors.
 """
 

@@ -26,12 +26,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes, seen_from
-from eigassign.mechanism.imports import (
-    keyword_lists,
-    matlab,
-    matrix_file,
-    nastran,
-)
+from eigassign.mechanism.imports import entries, matlab, programs
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
@@ -49,15 +44,15 @@ from eigassign.mechanism.imports.entries import (
 
 T = TypeVar("T")
 _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
-    matrix_file.read_matrix_market,
-    matrix_file.read_numpy,
+    entries.read_matrix_market,
+    entries.read_numpy,
     matlab.read_matlab,
-    nastran.read_bulk,
-    keyword_lists.read_substructure,
-    keyword_lists.read_nodes,
-    keyword_lists.read_entries,
-    keyword_lists.read_labels,
-    matrix_file.read_table,
+    programs.read_bulk,
+    programs.read_substructure,
+    programs.read_nodes,
+    programs.read_entries,
+    programs.read_labels,
+    entries.read_table,
 )
 _KNOWN = (
     "Nastran (DMIG, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy, nor a square "

@@ -1,6 +1,6 @@
 """Nastran's punched matrices and grid points; lists of Abaqus, CalculiX and Ansys.
 
-DMIG     KAAX     0     6     2     0           8        name, 0, form, type, …, columns
+    DMIG     KAAX     0     6     2     0           8        name, 0, form, type, …, columns
     DMIG*    KAAX              1               1             a column: node, component
     *                          1               1  1.2345678901D+04      rows: node, component, value
 

@@ -169,7 +169,7 @@ def follow(
     The first sample is the solution nearest to ``start`` (angles modulo 2π, and within π of it);
     without one, nearest to where the loops were put together, else bent least, with angles in
     [0, 2π). Chains with more coordinates than the tip fixes take the steps of least norm,
-    dq = J⁺ dp, a slide of L (see `state`) counting as 1 rad. The tip is on its path to RESIDUAL
+    dq = J⁺ dp, a slide of L (see `solver`) counting as 1 rad. The tip is on its path to RESIDUAL
     times L in m, and RESIDUAL in rad; loops stay in the assembly of the model.
 
     Raises TrajectoryError naming the first sample that is out of reach, outside the branch, or

@@ -12,7 +12,7 @@ space of rows of ∂T/∂q(q_k(y0), y0) only, with the orthonormal basis V_k,
 
     q_k = q_k(y0) + V_k ξ_k,    dq_k/dy = −V_k (∂T/∂q V_k)⁻¹ ∂T/∂y ,
 
-which at y0 is the change of least norm, a slide of L counting as 1 rad (see `state`).
+which at y0 is the change of least norm, a slide of L counting as 1 rad (see `solver`).
 
 Shapes: n samples, n_q coordinates, n_y design parameters, n_z entries of a state u.
 """

@@ -1,4 +1,4 @@
-"""Bringing the tip of a chain to given points: one measure for metres and radians, first guesses, Newton.
+"""Bringing the tip to given points: metres and radians in one measure, first guesses, Newton.
 
 Inside, states are u = z / c with c = 1 rad for what turns and c = L for what slides, and turning
 counts L per radian among the residuals: so everything is in metres over a dimensionless u. L is the
@@ -6,13 +6,11 @@ longest lever of a loop-free chain of turning joints, else the size of the path:
 largest distance from the origin if that is more. First guesses are spread over all that the chain
 can do.
 
-Shapes: n states or seeds, n_q coordinates, n_p passive freedoms, n_z = n_q + n_p entries of a
-state, m task components.
-
 A solution is traced along a tip path by a predictor and a Newton corrector, in steps of a bounded
 size, whatever the samples are; Hermite interpolation of the trace gives first guesses for those.
 
-Shapes: n states u (n, n_q + n_p) of an `TipProblem`, m task components.
+Shapes: n states or seeds, n_q coordinates, n_p passive freedoms, n_z = n_q + n_p entries of a
+state, m task components.
 """
 
 from __future__ import annotations

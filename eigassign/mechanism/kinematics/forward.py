@@ -312,9 +312,6 @@ def shifted(twist: Objects, lever: Objects) -> Objects:
     return np.concatenate([twist[:3] + cross(twist[3:], lever), twist[3:]])
 
 
-Floats = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class LinkFrames:
     """World frames of all links as functions of x = (q, y)."""

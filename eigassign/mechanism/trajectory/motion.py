@@ -2,9 +2,7 @@
 
 Point to point, q(t) runs between joint coordinates, each segment by the same timing law.
 
-Shapes: m points, n samples in time, n_q coordinates. SI units, angles in rad.
-
-points           q = q_k + s(τ) Δq,           q̇ = s'(τ) Δq/T,   q̈ = s''(τ) Δq/T²
+    points           q = q_k + s(τ) Δq,           q̇ = s'(τ) Δq/T,   q̈ = s''(τ) Δq/T²
     sampled          the not-a-knot cubic spline through the samples, from corner to corner
     path of a tip    u̇ = W(u) ṗ,   ü = (∂W/∂u · u̇) ṗ + W(u) p̈,   p(t) = path(s(t/T))
 
@@ -12,7 +10,7 @@ u holds the coordinates and the passive freedoms of loops, p the position and th
 tip; W(u) = J⁺ closes the loops and takes the least motion where there is a choice. ∂W/∂u · u̇ is
 its derivative along u̇, by differences of fourth order in u, in which W is analytic.
 
-Shapes: n times, n_q coordinates, n_z entries of a state u. SI units, angles in rad.
+Shapes: n times, m points, n_q coordinates, n_z entries of a state u. SI units, angles in rad.
 """
 
 from __future__ import annotations

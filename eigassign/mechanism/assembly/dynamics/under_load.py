@@ -41,10 +41,9 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     stacked,
     whole_size,
 )
-from eigassign.mechanism.assembly.loads.beam_stress import Numbers, end_forces, stress_terms
-from eigassign.mechanism.assembly.loads.imported import CROSSED
 from eigassign.mechanism.assembly.loads.second_order import add_second_order
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, first_moment
+from eigassign.mechanism.assembly.loads.stress import CROSSED, Numbers, end_forces, stress_terms
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import (

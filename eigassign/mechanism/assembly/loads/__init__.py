@@ -4,9 +4,8 @@ The drives hold the pose; n are the internal forces that the loads cause there. 
 once: the weight has loads that are functions of (q, y), any others are variables (`dynamics`).
 Read in this order; each imports only from those above it:
 
-    beam_stress   k_σ of a beam element from its end forces and its own load
-    imported      k_σ of a part that is known by its matrices alone
+    stress        k_σ of beam elements and of imported parts from what acts on them
     statics       a mechanism that loads act on; the wrenches through its joints, loops included
     second_order  all terms of K_g but those of beams: arms, joints, springs, imported parts
-    weight        the weight as loads, and the beams that it stresses; forces that hang on stiffnesses
+    weight        the weight as loads, the beams it stresses; forces that hang on stiffnesses
 """

@@ -21,8 +21,8 @@ import numpy as np
 
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.assembly.congruence import add_stressed
-from eigassign.mechanism.assembly.loads.imported import imported_terms
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
+from eigassign.mechanism.assembly.loads.stress import imported_terms
 from eigassign.mechanism.assembly.node_motion import (
     MotionRow,
     MotionRows,

@@ -64,7 +64,7 @@ from eigassign.series.expression import Scalar
 class Loaded:
     """A mechanism that loads act on; the passive freedoms of ``known`` are known.
 
-    ``bent``: parts known by their matrices bend between their nodes as beams do, see `imported`.
+    ``bent``: parts known by their matrices bend between their nodes as beams do, see `stress`.
     """
 
     case: CaseFile

@@ -23,17 +23,17 @@ from eigassign.mechanism.assembly.congruence import (
     pulled,
     scattered,
 )
-from eigassign.mechanism.assembly.loads.beam_stress import (
-    ElementForces,
-    axial_forces,
-    stress_terms,
-)
 from eigassign.mechanism.assembly.loads.second_order import add_second_order, on_nodes
 from eigassign.mechanism.assembly.loads.statics import (
     Loaded,
     Loads,
     first_moment,
     hangs_on_stiffness,
+)
+from eigassign.mechanism.assembly.loads.stress import (
+    ElementForces,
+    axial_forces,
+    stress_terms,
 )
 from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
