@@ -32,7 +32,6 @@ MATRIX = 1_000_000_000  # of a matrix of a superelement
 MESH = 200_000_000  # of a mesh of a solid: 10⁵ elements take some 20 MB
 VALUES = 8_000_000  # of JSON: up to 80 bytes of memory each, whatever stands there
 CACHE = 1_000_000_000  # of the cache: 30 000 files, which a run that stores lists in 0.4 s
-STORED = 1_000_000_000  # of what this program wrote: the cache
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
 _KINDS = {

@@ -17,7 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
-    "h5py": {"hdf5", "mechanism", "output"},
+    "h5py": {"mechanism", "pipeline"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja
     "rich": {"output"},

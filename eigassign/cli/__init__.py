@@ -11,7 +11,7 @@ Reading order:
     inspect    check, modes, schema
     start      init, docs
     batch      batch
-    cache      cache path, list, clear
+    cache      cache path, clear
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -28,21 +27,6 @@ def examples(*commands: str, after: str = "") -> str:
     """The end of a command's help: how it is used; the tests run each of them."""
     parts = ["\n".join(["\b", "Examples:", *(f"  {command}" for command in commands)])]
     return "\n\n".join([*parts, *([f"\b\n{after}"] if after else [])])
-
-
-class Age(click.ParamType):  # type: ignore[type-arg]
-    """``30d``: so many seconds."""
-
-    name = "age"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """``value`` in seconds, or a usage error at its option."""
-        found = re.fullmatch(r"([0-9]{1,9}) ?([hdw])", value)
-        if found is None:
-            self.fail(f"{value!r} is no age, as 12h, 30d or 8w.", param, ctx)
-        return int(found[1]) * {"h": 3600.0, "d": 86400.0, "w": 604800.0}[found[2]]
 
 
 class Number(click.FloatRange):
@@ -116,7 +100,7 @@ caching = several(
     click.option(
         "--no-cache",
         is_flag=True,
-        help="Neither read nor write the cache. $EIGASSIGN_CACHE is auto (keep what takes over "
+        help="Neither read nor write the cache. $EIGASSIGN_CACHE is auto (keep what took over "
         "0.1 s to compute; the default), always or never.",
     ),
     cache_dir,

@@ -16,7 +16,7 @@ from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
 if TYPE_CHECKING:
-    from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, RunSize
+    from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
 
 _DRAWING = ("out", "force", "figures", "allow_outside")
@@ -40,8 +40,8 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     """Check case files, and say what they amount to.
 
     Lists every problem as file:line:column: key: message, also those of the first 100 variants of a
-    sweep. For a valid case it prints warnings of implausible values, the degrees of freedom, errors
-    of the model, and how much memory a run takes.
+    sweep. For a valid case it prints warnings of implausible values, the degrees of freedom, and
+    errors of the model.
     """
     from eigassign.pipeline import queries
     from eigassign.pipeline.stages import Stages
@@ -110,19 +110,7 @@ def _described(name: str, answer: CheckAnswer) -> list[str]:
         *_trajectories(answer),
     ]
     lines += [f"  {note}" for note in answer.notes]
-    lines += [f"  {line}" for line in _held(answer.size)] if answer.size else []
     return [*lines, f"  next: {answer.next}"]
-
-
-def _held(size: RunSize) -> list[str]:
-    """Coefficients, and memory to two digits."""
-    modes = f"mode{'s' if len(size.modes) > 1 else ''} {', '.join(map(str, size.modes))}"
-    lines = [f"memory: about {float(f'{size.memory_mb:.2g}'):.0f} MB"]
-    if size.order:
-        each = " each" if len(size.modes) > 1 else ""
-        expansion = f"expansion of {modes} to order {size.order}"
-        lines.insert(0, f"{expansion}: {size.coefficients} coefficients{each}")
-    return lines
 
 
 @click.command(

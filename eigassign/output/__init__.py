@@ -36,7 +36,7 @@ __all__, __getattr__, __dir__ = face(
         "documents": "results_document to_json",
         "result_files": "sample_files",
         "schema": "FILES NUMBERS results_schema",
-        "store.cache": "Cache default_directory",
+        "store.cache": "Cache content_key default_directory",
         "store.run_folder": "run_folder",
         "store.run_record": "is_untouched",
         "tables": "Table modes_table run_tables validation_table",

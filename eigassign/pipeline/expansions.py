@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import comb
+from time import process_time
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.errors import UsageError
-from eigassign.hdf5 import Array, content_key, pack
 from eigassign.modal.arguments import MOST_TERMS
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
 from eigassign.output.documents import dumps
-from eigassign.output.store.cache import Cache
+from eigassign.output.store.cache import Cache, content_key
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions, Scene
 
+Array = NDArray[Any]
 _log = logging.getLogger(__name__)
 
 
@@ -65,45 +69,11 @@ def affordable_order(model: Model, order: int) -> int:
     return fitting[-1] if fitting else 1
 
 
-@dataclass(frozen=True)
-class ExpansionSize:
-    """About what the full expansion of a plan takes; ``coefficients`` of each mode."""
-
-    order: int
-    coefficients: int
-    memory_mb: float
-    seconds: float  # by which the cache decides what to keep
-
-
-def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
-    """Estimated: one mode to order p in n variables takes, with the linearised one beside it, about
-
-        t = 1.2 μs · C(2n + p, p) + 20 ns · n_θ V H + 0.3 μs · n_dof H + 10 μs · n_dof,
-        V = C(n + ⌊(p−1)/2⌋, n),  H = C(n + ⌊p/2⌋, n)
-
-    for the C(2n + p, p) products of two coefficients, the n_θ terms of the pencil between pairs of
-    eigenvector coefficients, the H solves, and once for all modes the modes at the point. Of 200
-    expansions (shipped cases with 1 to 256 times their elements and random chains, to order 14)
-    those of over 50 ms take 0.3 to 2.2 times as long; shorter ones some milliseconds more.
-    Each pair and each product holds about 24 bytes at the peak.
-    """
-    if not plan.order:
-        return ExpansionSize(0, 0, 0.0, 0.0)
-    n, p = int(model.pencil.active.sum()), affordable_order(model, plan.order)
-    products, solves = comb(2 * n + p, p), comb(n + p // 2, n)
-    met, n_dof = model.pencil.n_theta * comb(n + (p - 1) // 2, n) * solves, model.pencil.n_dof
-    each = 1.2e-6 * products + 20e-9 * met + 0.3e-6 * n_dof * solves
-    memory_mb = 24.0 * (met + products) / 1e6
-    seconds = (1 + len(plan.more_q)) * (len(plan.modes) * each + 10e-6 * n_dof)
-    return ExpansionSize(p, comb(n + p, p), memory_mb, seconds)
-
-
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
 ) -> tuple[tuple[Expansion, Expansion], bool]:
     """The two expansions about one point, and True where they come from the cache."""
-    one = replace(plan, more_q=())
-    if cache is None or expansion_size(model, one).seconds < cache.least_s:
+    if cache is None:
         return _made(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)
     if (stored := cache.load(entry)) is not None:
@@ -111,8 +81,10 @@ def _expansions(
             return _made(model, plan, full_order, stored), True
         except UsageError as error:
             _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
+    start = process_time()
     fresh = _made(model, plan, full_order)
-    cache.store(entry, expansion_arrays(*fresh), _meta(plan))
+    if process_time() - start >= cache.least_s:
+        cache.store(entry, expansion_arrays(*fresh))
     return fresh, False
 
 
@@ -143,16 +115,6 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
 
 
-def _meta(plan: Plan) -> dict[str, str]:
-    """Words for those who list the cache."""
-    return {
-        "what": f"expansion of order {plan.order}",
-        "modes": ", ".join(map(str, plan.modes)),
-        "q0": ", ".join(f"{value:.6g}" for value in plan.q0),
-        "y0": ", ".join(f"{value:.6g}" for value in plan.y0),
-    }
-
-
 def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     """coefficients.json and coefficients.h5 of a scene's expansions.
 
@@ -181,8 +143,20 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     meta = {"case": scene.file.title, "sha256": scene.file.sha256, "x_names": ", ".join(names)}
     return {
         "coefficients.json": (dumps(document) + "\n").encode(),
-        "coefficients.h5": pack("coefficients", {**point, **flat}, meta),
+        "coefficients.h5": _hdf5({**point, **flat}, meta),
     }
+
+
+def _hdf5(arrays: Mapping[str, Array], words: Mapping[str, str]) -> bytes:
+    """A file with a dataset for each array, and ``words`` as attributes of the group ``meta``."""
+    import h5py
+
+    body = io.BytesIO()
+    with h5py.File(body, "w") as file:
+        for name, array in arrays.items():
+            file[name] = array
+        file.create_group("meta").attrs.update(words)
+    return body.getvalue()
 
 
 def _table(expansion: Expansion) -> dict[str, Array]:

@@ -29,11 +29,9 @@ from eigassign.mechanism.elements.superelement import part_lines
 from eigassign.mechanism.kinematics.limits import resting_pose
 from eigassign.mechanism.kinematics.parameters import is_imported, written_loads
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
-from eigassign.pipeline.expansions import expansion_size
 from eigassign.pipeline.stages import new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks.accuracy import digits_lines
@@ -43,13 +41,11 @@ from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
 from eigassign.study.meaning.sensitivity import anatomies
 from eigassign.study.pictures import drawing
-from eigassign.study.planning import Plan, expansion_needed, plan_expansion, shown_point
+from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import ModeAnatomy, WeightRow
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
-ALONE_MB = 150.0  # MB of a process, and for each unknown of a part before it is reduced: of 7 437
-PART_MB = 0.05  # 330 MB in `check`, 420 MB in a search
 
 
 Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
@@ -81,16 +77,6 @@ class ModesAnswer:
 
 
 @dataclass(frozen=True)
-class RunSize:
-    """What a run holds: its full expansion, ``coefficients`` of each mode, and about all of it."""
-
-    modes: tuple[int, ...]
-    order: int  # 0: nothing is expanded
-    coefficients: int
-    memory_mb: float  # of a process
-
-
-@dataclass(frozen=True)
 class CheckAnswer:
     """A case in figures; ``warnings`` are plausibility problems that do not stop a run."""
 
@@ -104,7 +90,6 @@ class CheckAnswer:
     trajectories: tuple[tuple[str, int, float], ...]  # of each its name, samples and duration
     targets: int
     notes: tuple[str, ...]
-    size: RunSize | None  # None of a case without a point to expand at
     next: str  # what to do with it
     warnings: tuple[Problem, ...]
 
@@ -270,7 +255,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         asked = requirements_of(file, path)
         design_limits(file, model, path)
     notes += read_measurements(case)[1]
-    plan, warnings = None, file.warnings
+    warnings = file.warnings
     if trajectory is not None or file.expansion.q != "auto":
         needed = expansion_needed(file)
         plan = plan_expansion(file, model, trajectory, needed=needed)
@@ -296,16 +281,9 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         trajectories=each,
         targets=len(file.targets),
         notes=tuple(notes),
-        size=None if plan is None else _size(model, plan),
         next=next_step(file),
         warnings=warnings,
     )
-
-
-def _size(model: Model, plan: Plan) -> RunSize:
-    size, whole = expansion_size(model, plan), [mesh.reduction for mesh in model.meshes.values()]
-    memory_mb = ALONE_MB + size.memory_mb + PART_MB * sum(r.mesh.n_local for r in whole if r)
-    return RunSize(plan.modes, size.order, size.coefficients, memory_mb)
 
 
 def next_step(case: CaseFile) -> str:

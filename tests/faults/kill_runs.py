@@ -61,7 +61,8 @@ def judged(scene: Scene, where: str, found: Counter[str]) -> None:
     """Count what is wrong, and show it."""
     wrong = faults(scene)
     cache = Cache(scene.root / "cache")
-    wrong += [f"{entry.path.name} is damaged" for entry in cache.entries() if not entry.intact]
+    found_files = [path for path in cache.directory.iterdir() if path.suffix == ".arrays"]
+    wrong += [f"{path.name} is damaged" for path in found_files if cache.load(path.stem) is None]
     found["faults"] += len(wrong)
     for fault in wrong:
         say(f"{where}: {fault}")

@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.hdf5 import pack
-
 Arrays = dict[str, NDArray[Any]]
 Damage = Callable[[Arrays, np.random.Generator], None]
 
@@ -66,11 +64,11 @@ DAMAGES: tuple[Damage, ...] = (
 )
 
 
-def forged(key: str, arrays: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> bytes:
-    """The file that holds ``arrays`` under ``key``, damaged in one way and with the right hash."""
+def forged(arrays: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> Arrays:
+    """``arrays``, damaged in one way."""
     copies = {name: array.copy() for name, array in arrays.items()}
     DAMAGES[int(rng.integers(len(DAMAGES)))](copies, rng)
-    return pack(key, copies, {})
+    return copies
 
 
 def damaged(whole: bytes, rng: np.random.Generator) -> bytes:

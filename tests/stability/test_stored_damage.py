@@ -11,7 +11,6 @@ import pytest
 from damage import damaged, forged
 
 import eigassign as ea
-from eigassign.hdf5 import pack
 from eigassign.modal import expansion_arrays
 from eigassign.output import Cache
 from eigassign.pipeline import affordable_order, expand_plan, expansion_key
@@ -45,11 +44,15 @@ def test_files_of_the_cache(
     true, _ = expand_plan(model, plan, None)
     entry = expansion_key(model, plan, affordable_order(model, plan.order))
     arrays = expansion_arrays(true.full, true.linear)
-    whole, path = pack(entry, arrays, {}), tmp_path / f"{entry}.h5"
     rng, cache, believed = np.random.default_rng(12), Cache(tmp_path), 0
+    cache.store(entry, arrays)
+    whole = (tmp_path / f"{entry}.arrays").read_bytes()
     caplog.set_level(logging.CRITICAL)
     for k in range(2 * count):
-        path.write_bytes(damaged(whole, rng) if k < count else forged(entry, arrays, rng))
+        if k < count:
+            (tmp_path / f"{entry}.arrays").write_bytes(damaged(whole, rng))
+        else:
+            cache.store(entry, forged(arrays, rng))
         found, notes = expand_plan(model, plan, cache)
         again = expansion_arrays(found.full, found.linear)
         assert {n: a.shape for n, a in again.items()} == {n: a.shape for n, a in arrays.items()}

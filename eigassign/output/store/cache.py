@@ -1,45 +1,47 @@
 """A folder of results that need not be computed again, one file of arrays per content key.
 
+    eigassign-stored 3 <SHA-256 of the key and of all bytes after this line>
+    the arrays as NumPy's ``savez`` writes them
+
 A hit is bit for bit what was stored. A file that is not exactly what its writer finished is renamed
 to ``*.damaged`` with a warning, and the caller computes anew. A folder that cannot be read or
-written costs one warning, never the run.
+written costs one warning, never the run. The hash tells damage; it is no signature.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
+import io
+import json
 import logging
-import math
 import os
-import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from eigassign.errors import StorageError, UsageError
-from eigassign.files import CACHE, at_home, raised
-from eigassign.hdf5 import Array, DamagedError, get, pack
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import EigassignError, StorageError, UsageError
+from eigassign.files import CACHE, at_home, raised, read_bytes
 from eigassign.output.store.atomic import replace_synced, sweep_files
 
+Array = NDArray[Any]
+
 VARIABLE = "EIGASSIGN_CACHE"
-WORTH_S = 0.1  # of work: reading a file and making its key take 5 ms, writing it 10 ms and a sync
+WORTH_S = 0.1  # of work: making a key and reading a file take 5 ms, writing it 10 ms and a sync
 _RULES = {"always": 0.0, "auto": WORTH_S, "never": None}
 _log = logging.getLogger(__name__)
-_SUFFIX = ".h5"
+_SUFFIX = ".arrays"
 _DAMAGED = ".damaged"
+_START = b"eigassign-stored 3 "
 
 
-@dataclass(frozen=True)
-class CacheEntry:
-    """One file of the cache; ``intact``: its content has the hash that it begins with."""
-
-    key: str
-    path: Path
-    size_bytes: int
-    modified_s: float  # seconds since 1970
-    meta: Mapping[str, str]
-    intact: bool
+class DamagedError(EigassignError):
+    """The bytes are not what a finished writer left; the message says how they differ."""
 
 
 def default_directory() -> Path | None:
@@ -69,7 +71,7 @@ def least_work() -> float | None:
 
 
 class Cache:
-    """Arrays by content key in ``directory``, for what takes ``least_s`` or more to compute."""
+    """Arrays by content key in ``directory``, for what took ``least_s`` or more to compute."""
 
     def __init__(self, directory: Path, least_s: float = 0.0) -> None:
         self.directory, self.least_s = directory, least_s
@@ -84,7 +86,7 @@ class Cache:
             sweep_files(self.directory, _is_ours)
         path = self.directory / f"{key}{_SUFFIX}"
         try:
-            return get(path, key).arrays
+            return _unpack(key, read_bytes(path, CACHE))
         except FileNotFoundError:
             return None
         except DamagedError as error:
@@ -96,35 +98,27 @@ class Cache:
                 self._warn(f"the cache cannot be read ({error}); computing without it")
         return None
 
-    def store(self, key: str, arrays: Mapping[str, Array], meta: Mapping[str, str]) -> None:
-        """Keep ``arrays`` under ``key``; ``meta`` is for people who list the cache.
+    def store(self, key: str, arrays: Mapping[str, Array]) -> None:
+        """Keep ``arrays`` under ``key``; the first time the oldest files go, if it is too full.
 
-        The first time the oldest files go where all of them are over the limit. Raises UsageError
-        for arrays or names that cannot be stored, never for a full disk.
+        Raises UsageError for arrays of objects, never for a full disk.
         """
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
-            replace_synced(self.directory / f"{key}{_SUFFIX}", pack(key, arrays, meta))
+            replace_synced(self.directory / f"{key}{_SUFFIX}", _packed(key, arrays))
             if not self._trimmed:
                 self._trimmed = True
                 self._trim()
         except OSError as error:
             self._warn(f"the cache cannot be written ({error}); going on without it")
 
-    def entries(self) -> tuple[CacheEntry, ...]:
-        """Files of the cache, oldest first, each read and checked; none of them is changed."""
-        paths = [path for *_, path in self._by_age() if path.suffix == _SUFFIX]
-        found = [entry for path in paths for entry in _read_entry(path)]
-        return tuple(sorted(found, key=lambda entry: (entry.modified_s, entry.key)))
-
-    def clear(self, older_than_s: float = -math.inf) -> int:
-        """Delete entries of that age, damaged ones too, and temporary files of killed writers.
+    def clear(self) -> int:
+        """Delete all entries, damaged ones too, and temporary files of killed writers.
 
         Returns how many. Raises StorageError when one cannot be deleted.
         """
-        swept, latest = sweep_files(self.directory, _is_ours), time.time() - older_than_s
-        files = [path for modified_s, _, path in self._by_age() if modified_s <= latest]
-        for path in files:
+        swept, files = sweep_files(self.directory, _is_ours), self._by_age()
+        for _, _, path in files:
             try:
                 path.unlink(missing_ok=True)
             except OSError as error:
@@ -145,7 +139,7 @@ class Cache:
         found = []
         with contextlib.suppress(OSError), os.scandir(self.directory) as files:
             for file in files:
-                if _is_ours(file.name) and file.name.endswith((_SUFFIX, _DAMAGED)):
+                if _is_ours(file.name):
                     with contextlib.suppress(OSError):  # gone since it was listed
                         status = file.stat(follow_symlinks=False)
                         found.append((status.st_mtime, status.st_size, Path(file.path)))
@@ -170,12 +164,48 @@ def _is_ours(name: str) -> bool:
     return len(stem) == 64 and set(stem) <= set("0123456789abcdef")
 
 
-def _read_entry(path: Path) -> Iterator[CacheEntry]:
+# --- The bytes of a file, and the key of what it holds
+
+
+def content_key(arrays: Mapping[str, Array], algorithm: str) -> str:
+    """SHA-256, 64 hex digits, of ``algorithm`` and of names, dtypes, shapes and values of arrays.
+
+    Values count in little-endian bytes and C order, whatever the memory looks like.
+    """
+    little = {name: a.astype(a.dtype.newbyteorder("<")) for name, a in sorted(arrays.items())}
+    layout = {name: [array.dtype.str, array.shape] for name, array in little.items()}
+    digest = hashlib.sha256(json.dumps([algorithm, layout]).encode())
+    for array in little.values():
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _packed(key: str, arrays: Mapping[str, Array]) -> bytes:
+    body = io.BytesIO()
     try:
-        status = path.lstat()
-        meta, intact = get(path, path.stem).words, True
-    except FileNotFoundError:  # gone since it was listed
-        return
-    except (DamagedError, OSError):
-        meta, intact = {}, False
-    yield CacheEntry(path.stem, path, status.st_size, status.st_mtime, meta, intact)
+        np.savez(body, allow_pickle=False, **arrays)
+    except ValueError as error:
+        raise UsageError(f"these arrays cannot be stored: {error}") from error
+    return _sealed(key, body.getbuffer()) + body.getbuffer()
+
+
+def _sealed(key: str, body: bytes | memoryview) -> bytes:
+    """The first line of a file."""
+    digest = hashlib.sha256(key.encode())
+    digest.update(body)
+    return _START + digest.hexdigest().encode() + b"\n"
+
+
+def _unpack(key: str, data: bytes) -> dict[str, Array]:
+    """What `_packed` made a file of, read-only; raises DamagedError where any byte differs."""
+    body = memoryview(data)[len(_START) + 65 :]
+    if data[: len(_START) + 65] != _sealed(key, body):
+        raise DamagedError("its content does not have the hash that it begins with")
+    try:
+        with np.load(io.BytesIO(body), allow_pickle=False) as stored:
+            arrays = dict(stored)
+    except (ValueError, LookupError, OSError, zipfile.BadZipFile) as error:
+        raise DamagedError(f"it was never stored ({type(error).__name__})") from error
+    for array in arrays.values():
+        array.setflags(write=False)
+    return arrays
