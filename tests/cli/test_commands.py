@@ -258,7 +258,7 @@ def test_optimize_leaves_a_foreign_folder_alone_unless_forced(capsys: Captured) 
     assert Path("mine.1/thesis.txt").read_text() == "years of work"
 
 
-def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(
+def test_no_cache_leaves_no_cache_and_a_cache_is_cleared(
     capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("EIGASSIGN_CACHE", "always")
@@ -266,8 +266,6 @@ def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(
     assert not Path("cache").exists()
     assert main(["optimize", "good.yaml", "--cache-dir", "elsewhere", *LITTLE]) == 0
     capsys.readouterr()
-    listed = answer(capsys, "cache", "list", "--cache-dir", "elsewhere")
-    assert "order 3" in listed
     count = len(list(Path("elsewhere").iterdir()))
     cleared = answer(capsys, "cache", "clear", "--cache-dir", "elsewhere")
     assert cleared.startswith(f"{count} file")

@@ -150,7 +150,7 @@ def test_the_module_and_its_json_work_as_a_process() -> None:
     assert done.stdout.startswith('{"rigid_modes": 2, "frequencies_hz": [202.2195')
 
 
-PRINTING = (["schema"], ["cache", "list", "--cache-dir", "."])  # as text, and as a table
+PRINTING = (["schema"], ["modes", str(TWO_LINK)])  # as text, and as a table
 
 
 @pytest.mark.parametrize("command", PRINTING, ids=lambda command: command[0])

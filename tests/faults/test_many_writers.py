@@ -54,13 +54,13 @@ def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
             cache = Cache(root / "cache")
             found = cache.load(KEY)
             assert found is None or (found["a"] == found["a"][0]).all()
-            cache.store(KEY, {"a": np.full(2000, 100.0 * number + turn)}, {})
+            cache.store(KEY, {"a": np.full(2000, 100.0 * number + turn)})
 
     assert not any(side_by_side(store))
     found = Cache(root / "cache").load(KEY)
     assert found is not None
     assert (found["a"] == found["a"][0]).all()
-    assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.h5"]
+    assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.arrays"]
 
 
 def test_sixteen_runs_of_one_case_leave_one_whole_run(root: Path) -> None:

@@ -57,7 +57,10 @@ def test_a_hit_equals_a_recomputation_bit_for_bit(text: str, tmp_path: Path) -> 
         np.testing.assert_array_equal(fresh[k].indices, known[k].indices)
 
 
-LARGE = (("samples: 152", "samples: 3"), ("order: 4", "order: 20"))  # about 0.5 s
+LARGE = (
+    *(("samples: 152", "samples: 3"), ("order: 4", "order: 20")),
+    ("modes: [1]", "modes: [1, 2, 3, 4, 5, 6]"),
+)  # 0.3 s
 
 
 @pytest.mark.parametrize(
@@ -76,7 +79,7 @@ def test_what_is_cached_follows_the_rule_and_the_size(
         monkeypatch.setenv("EIGASSIGN_CACHE", rule)
     for name, text, count in (("small", shipped(), small), ("large", shipped(*LARGE), large)):
         solve_case(case_of(tmp_path, text), Options(cache_dir=tmp_path / name, study="none"))
-        assert len(list((tmp_path / name).glob("*.h5"))) == count, name
+        assert len(list((tmp_path / name).glob("*.arrays"))) == count, name
 
 
 CHANGES = {
