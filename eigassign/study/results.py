@@ -566,7 +566,7 @@ class RobustTarget:
         Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
     ]
     worst: Annotated[Share, Fact("found by a search", "deviated", digits=positive_percent)]
-    drawn: Annotated[Share | None, Fact("of random deviations", "at random", absent="not drawn")]
+    drawn: Annotated[Share, Fact("of random deviations", "at random")]
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
@@ -576,7 +576,7 @@ class RobustTarget:
     @property
     def most(self) -> float:
         """The worst of all that were looked at."""
-        return max(self.worst, self.drawn or 0.0)
+        return max(self.worst, self.drawn)
 
 
 @dataclass(frozen=True, repr=False)
@@ -587,8 +587,7 @@ class RobustRow(Brief):
     """
 
     scenarios: Annotated[int, Fact("deviations in which the search holds what is asked")]
-    draws: Annotated[int, Fact("random deviations, at the samples of least room")]
-    error: Annotated[Share, Fact("of their frequencies")]
+    draws: Annotated[int, Fact("random deviations, at all samples")]
     nominal: Floats
     measured: Annotated[str, Fact("the objective")]
     objective_nominal: Annotated[float, Fact("without masses and prices, not deviating")]

@@ -180,8 +180,6 @@ def _deviated(
     for one in robust.targets:
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
             yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"
-    if robust.error > DEVIATED:
-        yield f"the frequencies of random deviations have an error of {_percent(robust.error)}"
 
 
 def _missed_between(

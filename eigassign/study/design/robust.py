@@ -4,14 +4,14 @@ The optimum of the problem alone is the first. Of each thing that is asked the w
 sought, from corners of the box of tolerances and from the design itself; where it is worse than all
 scenarios so far, it is one more (`assignment.exact.requirements`), and the design is sought anew.
 A scenario less leaves more designs, so that each objective is a bound of that of the robust design,
-as far as a search finds optima. At last random deviations are solved, where least room is left.
+as far as a search finds optima. At last random deviations are solved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from time import monotonic
 
 import numpy as np
@@ -26,7 +26,7 @@ from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found, find_optimum
-from eigassign.study.design.search.response import reduced_about
+from eigassign.study.design.search.response import DesignResponse, reduced_models
 from eigassign.study.design.search.variants import variant_of
 from eigassign.study.monotone import box_corners
 from eigassign.study.results import RobustRow, RobustTarget
@@ -41,9 +41,7 @@ LOST = (
     "no design was found of which all deviations within the tolerances have modes ({}): give "
     "smaller tolerances, or bounds that leave more room"
 )
-DRAWS = 10_000  # random deviations
-AT = 6  # samples at which they are solved
-AT_ONCE = 64  # of the draws, solved together; of followed modes so many are drawn
+DRAWS = 128  # random deviations, at all samples
 
 
 @dataclass(frozen=True)
@@ -98,16 +96,14 @@ def robust_optimum(
     if lost:
         raise AccuracyError(LOST.format(lost[0][1]))
     (nominal, first), found = seen[0], replace(found, exact_solves=solves)
-    alone, before = _Deviations(nominal, look.had), dict[str, float]()
-    for rows, one in zip(alone.edges, first, strict=bool(first)):  # none where some have no modes
-        name, missed = rows.of.name, alone.worst_at(rows, one.design)[0]
-        before[name] = max(before.get(name, 0.0), missed)
-    progress(f"robust: {look.draws} random deviations")
-    drawn, error = look.drawn(worst)
+    alone = _Deviations(nominal, look.had)
+    both = zip(alone.edges, first, strict=bool(first))  # none where some have no modes
+    before = _by_name((rows.of.name, alone.worst_at(rows, one.design)[0]) for rows, one in both)
+    progress(f"robust: {DRAWS} random deviations")
+    targets = tuple(look.rows(worst, before, look.drawn(), nominal.best.y))
     row = RobustRow(
         scenarios=len(found.task.scenarios),
-        draws=look.draws,
-        error=error,
+        draws=DRAWS,
         nominal=nominal.best.y,
         measured=scene.file.assignment.named_objective,
         objective_nominal=nominal.variant.problem.measure(nominal.best.seen.residual),
@@ -116,7 +112,7 @@ def robust_optimum(
         mass=scene.model.mass(found.best.y),
         price_nominal=cost(scene, nominal.best.y),
         price=cost(scene, found.best.y),
-        targets=tuple(look.rows(worst, before, drawn, nominal.best.y)),
+        targets=targets,
     )
     return found, row
 
@@ -139,7 +135,6 @@ class _Deviations:
         own = found.variant.problem.measure(found.best.seen.residual)
         self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
-        self.draws = AT_ONCE if self.task.followers else DRAWS
 
     def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
         """What is missed where rows have some values, and the slopes of that in these."""
@@ -150,9 +145,11 @@ class _Deviations:
         unit = 1.0 if rows.edge.any() else 1.0 / abs(self.had)
         return unit * (value - self.had), np.full_like(value, unit)
 
-    def worst_at(self, rows: EdgeRows, y: Floats) -> tuple[float, int, Floats]:
+    def worst_at(
+        self, rows: EdgeRows, y: Floats, response: DesignResponse | None = None
+    ) -> tuple[float, int, Floats]:
         """What is missed most at a design, the sample, and the slopes (n_y,) there."""
-        value, slopes = rows.at(y, self.response(y))
+        value, slopes = rows.at(y, (response or self.response)(y))
         missed, unit = self.missed(rows, value)
         k = int(missed.argmax())
         return float(missed[k]), rows.of.rows.start + k, unit[k] * slopes[k]
@@ -209,54 +206,17 @@ class _Deviations:
                 made.append(sigma)
                 yield sigma
 
-    def drawn(self, worst: Sequence[WorstDeviation]) -> tuple[dict[str, float], float]:
-        """The worst of random deviations by name, and the error of the frequencies, relative.
+    def drawn(self) -> dict[str, float]:
+        """The worst of random deviations by name; of large models by reduced ones that hold there.
 
-        At those samples where what is asked of frequencies has least room; of followed modes, which
-        are followed all along, at all samples. Where a reduced model names the worst, these are
-        solved exactly, which says how far it is off.
+        Raises EigassignError where one has no answer.
         """
-        scene, path, count = self.scene, self.scene.path, self.asked.modes
-        least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
-        at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
-        drawn = np.random.default_rng(0).uniform(self.lower, self.upper, (self.draws, len(self.y)))
-        exact = partial(scene.model.frequencies, count=count)
-
-        def solved(designs: Floats, answer: Callable[[Floats, Floats], Floats]) -> Floats:
-            """(n, n_t, count) in Hz; not a number elsewhere than at those samples."""
-            if self.task.followers:
-                return np.array([self.response(y).hz for y in designs])
-            q = np.array([(path.at(y)[0] if path.follows_design else path.q)[at] for y in designs])
-            few = answer(q.reshape(-1, q.shape[2]), np.repeat(designs, len(at), axis=0))
-            hz = np.full((len(designs), len(path.q), count), np.nan)
-            hz[:, at] = few.reshape(len(designs), len(at), count)
-            return hz
-
-        large = not scene.model.pencil.is_dense and not self.task.followers
-        answer = reduced_about(scene, self.y, count).frequencies if large else exact
-        found, designs = dict[str, float](), dict[str, Floats]()
-        for k in range(0, self.draws if len(at) else 0, AT_ONCE):
-            some = drawn[k : k + AT_ONCE]
-            for name, missed in self._missed_by(solved(some, answer)):
-                each = np.nanmax(missed, axis=1, initial=0.0)
-                if each.max() >= found.get(name, 0.0):
-                    found[name], designs[name] = float(each.max()), some[each.argmax()]
-        if not large or not designs:
-            return found, 0.0
-        few = np.array([*designs.values()])
-        true = solved(few, exact)
-        for name, missed in self._missed_by(true):
-            k = [*designs].index(name)
-            found[name] = float(np.nanmax(missed[k], initial=0.0))
-        return found, float(np.nanmax(np.abs(solved(few, answer) / true - 1.0)))
-
-    def _missed_by(self, hz: Floats) -> Iterator[tuple[str, Floats]]:
-        """Yield what designs miss of each edge, (n, rows), by frequencies hz (n, n_t, count)."""
-        for rows in self.edges:
-            of = rows.of
-            if of.mode_terms:
-                own = (c * hz[:, of.rows, m - 1 if m > 0 else m] for m, c in of.mode_terms)
-                yield of.name, self.missed(rows, rows.scale * (sum(own) - rows.edge))[0]
+        models = None if self.task.followers else reduced_models(self.scene)
+        response = replace(self.response, models=models)
+        rng = np.random.default_rng(0)
+        designs = rng.uniform(self.lower, self.upper, (DRAWS, len(self.y)))
+        missed = ((rows, self.worst_at(rows, y, response)) for y in designs for rows in self.edges)
+        return _by_name((rows.of.name, worst) for rows, (worst, *_) in missed)
 
     def rows(
         self,
@@ -266,7 +226,8 @@ class _Deviations:
         nominal: Floats,
     ) -> Iterator[RobustTarget]:
         """Yield what deviations do to each thing that is asked, where that is worst."""
-        after, first = _by_name(worst), self.response(nominal)
+        first = self.response(nominal)
+        after = _by_name((one.rows.of.name, one.missed) for one in worst)
         for name in after:
             one = max((w for w in worst if w.rows.of.name == name), key=lambda w: w.missed)
             of, k = one.rows.of, one.sample - one.rows.of.rows.start
@@ -282,14 +243,13 @@ class _Deviations:
                 robust=amounts[1],
                 nominal_worst=before.get(name),
                 worst=after[name],
-                drawn=drawn.get(name),
+                drawn=drawn[name],
             )
 
 
-def _by_name(worst: Sequence[WorstDeviation]) -> dict[str, float]:
+def _by_name(missed: Iterable[tuple[str, float]]) -> dict[str, float]:
     """The worst of each thing that is asked, 0 at least."""
     found: dict[str, float] = {}
-    for one in worst:
-        name = one.rows.of.name
-        found[name] = max(found.get(name, 0.0), one.missed)
+    for name, worst in missed:
+        found[name] = max(found.get(name, 0.0), worst)
     return found

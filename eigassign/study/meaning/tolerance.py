@@ -19,15 +19,15 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
 from eigassign.facts import positive_percent
 from eigassign.modal.adaptive_order import MARGIN
+from eigassign.modal.reduced import reduce
 from eigassign.study.design.followed import Follower, followers, solve_design
-from eigassign.study.design.search.response import reduced_about
 from eigassign.study.monotone import box_corners, corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want
-AT = 5  # samples at which a reduced model is compared with exact solves
+AT = 5  # samples about which a reduced model is made, and at which it is compared
 DOUBTFUL = 0.01  # error of it, relative, with which nothing can be said
 
 Ranges = Callable[[Floats], tuple[Solved, Solved]]  # of a design: between what each mode is
@@ -122,7 +122,10 @@ def reduced_ranges(scene: Scene, y: Floats, count: int, designs: Floats) -> Rang
     That is measured at some samples, of each mode where the model has its lowest and highest value;
     raises AccuracyError where it is over `DOUBTFUL`.
     """
-    reduced, n, few = reduced_about(scene, y, count), len(scene.path.q), scene.path.spread(AT)
+    n, few = len(scene.path.q), scene.path.spread(AT)
+    about = np.repeat(y[None], len(few), axis=0)
+    modes = tuple(range(1, count + 1))
+    reduced = reduce(scene.model.pencil, scene.path.at(y)[0][few], about, modes)
     q = np.array([scene.path.at(design)[0][few] for design in designs])
     hz = np.array([reduced.frequencies(*own) for own in zip(q, designs, strict=True)])
     worst = np.concatenate([hz.argmin(axis=0), hz.argmax(axis=0)])  # (2k, count) designs

@@ -231,7 +231,6 @@ def outlook_of(
 
 # --- Reduced models
 
-POINTS = 5  # poses along the trajectory about which deviations are looked at
 # Largest error of a frequency, relative, with which a model is used: with this the search of
 # `benchmarks/assignment_cost.py` comes within 5e-9 of the objective that exact solves end with
 TRUSTED = 1e-4
@@ -278,14 +277,6 @@ class ReducedModels:
             modes = tuple(range(1, count + 1))
             with suppress(AccuracyError):
                 yield reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
-
-
-def reduced_about(scene: Scene, y: Floats, count: int) -> ReducedModel:
-    """The reduced model of the lowest ``count`` modes about a design (n_y,)."""
-    q = scene.path.at(y)[0]
-    points = np.unique(np.linspace(0, len(q) - 1, POINTS).round().astype(int))
-    about = np.repeat(y[None], len(points), axis=0)
-    return reduce(scene.model.pencil, q[points], about, tuple(range(1, count + 1)))
 
 
 def reduced_models(scene: Scene) -> ReducedModels | None:
