@@ -29,10 +29,9 @@ __all__, __getattr__, __dir__ = face(
         "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
-        "requirements.band": "ForbiddenBand",
-        "requirements.frequency": "AssignedFrequency HighestFrequency",
-        "requirements.gap": "ModeGap",
-        "requirements.limit": "LowerLimit UpperLimit",
+        "requirements.kinds": (
+            "AssignedFrequency ForbiddenBand HighestFrequency LowerLimit ModeGap UpperLimit"
+        ),
         "requirements.named_modes": "followed_modes named_design named_pose",
         "requirements.quantity": "MassLimit",
         "requirements.requirement": "Frequencies Requirement Solved",

@@ -4,10 +4,7 @@ Reading order:
 
     crossing      two modes that meet: the matrix of both, smooth where each alone has a kink
     requirement   what all kinds have in common, its rows, and the frequencies that they are of
-    frequency     a mode has a frequency, or as high a one as can be
-    limit         a mode does not fall below a frequency, or does not exceed it
-    gap           two modes stay apart
-    band          no mode is in a band
+    kinds         what may be asked of modes: a frequency, limits, a gap, a band to keep out of
     quantity      the mass, or a weighted sum of design parameters, is within limits
     static_limit  a node gives way by no more than so much, under a force or the weight
     named_modes   modes that targets name by their shape

@@ -14,10 +14,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.requirements.band import ForbiddenBand
-from eigassign.assignment.requirements.frequency import AssignedFrequency, HighestFrequency
-from eigassign.assignment.requirements.gap import ModeGap
-from eigassign.assignment.requirements.limit import LowerLimit, UpperLimit
+from eigassign.assignment.requirements.kinds import (
+    AssignedFrequency,
+    ForbiddenBand,
+    HighestFrequency,
+    LowerLimit,
+    ModeGap,
+    UpperLimit,
+)
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.quantity import (
     DriveLimit,

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.requirements.band import ForbiddenBand
+from eigassign.assignment.requirements.kinds import ForbiddenBand
 from eigassign.assignment.requirements.quantity import DriveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit

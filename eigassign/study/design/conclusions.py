@@ -32,7 +32,7 @@ from eigassign.assignment.exact.design_problem import (
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
 from eigassign.assignment.feasibility import smallest
-from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.errors import EigassignError

@@ -24,8 +24,7 @@ from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.listed import every_combination, with_rows
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.requirements.band import Margin
-from eigassign.assignment.requirements.frequency import AssignedFrequency
+from eigassign.assignment.requirements.kinds import AssignedFrequency, Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import mode_above

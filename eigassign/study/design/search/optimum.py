@@ -32,7 +32,7 @@ from eigassign.assignment.exact.optima import Tally
 from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
 from eigassign.assignment.feasibility import can_be_kept
 from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
-from eigassign.assignment.requirements.band import Margin
+from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.targets import frozen

@@ -26,8 +26,7 @@ from eigassign.assignment.exact.design_problem import (
 from eigassign.assignment.exact.requirements import Appraise, Requirements, with_scenarios
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.requirements.band import ForbiddenBand, Margin
-from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeGap
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError

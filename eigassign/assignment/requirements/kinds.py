@@ -1,4 +1,4 @@
-"""No mode is in a band, or none of those named.
+"""What may be asked of modes: a frequency, as high a one as can be, limits, a gap, a band to keep out of.
 
 Along one trajectory a band is clear if and only if the number k of modes below both of its edges is
 the same everywhere. Whatever k is, that is two limits: mode k is at most the lower edge, and mode
@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.assignment.requirements.limit import LowerLimit, UpperLimit
 from eigassign.assignment.requirements.requirement import (
+    EdgeRows,
     Edges,
     Floats,
     Ints,
@@ -23,7 +23,133 @@ from eigassign.assignment.requirements.requirement import (
     Terms,
     in_hz,
 )
-from eigassign.case.schema.targets import Harmonic, KeepOutTarget
+from eigassign.assignment.targets import positive_hz
+from eigassign.case.schema.targets import (
+    AtLeastTarget,
+    AtMostTarget,
+    FrequencyTarget,
+    GapTarget,
+    Harmonic,
+    HighestTarget,
+    KeepOutTarget,
+)
+
+
+class AssignedFrequency(Requirement):
+    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign.
+
+    Raises UsageError for a frequency that is not finite and above 0.
+    """
+
+    form = FrequencyTarget
+    columns = ("target", "initial", "one shot", "predicted", "exact")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive_hz(self.lower)
+
+    @staticmethod
+    def asked(target: FrequencyTarget) -> str:
+        """The words for what is asked of the mode."""
+        return f"at {in_hz(target.frequency)}"
+
+    @staticmethod
+    def edges(target: FrequencyTarget, *hz: Floats) -> Edges:
+        """The frequency, twice."""
+        return hz[0], hz[0]
+
+    def errors(self, solved: Solved) -> Floats:
+        """The errors f / f_d − 1 (n,)."""
+        return np.asarray(self.curve(solved) / self.hz - 1.0)
+
+    def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
+        """Yield factor · (f / f_d − 1), of either sign: to miss it violates no limit."""
+        yield EdgeRows(self, "lower", self.hz, factor / self.hz)
+
+
+class HighestFrequency(Requirement):
+    """The frequency of a mode is as far above 0 Hz as can be: its row of the objective is −f.
+
+    As a limit, of 0 Hz, it is always met.
+    """
+
+    form = HighestTarget
+    columns = ("initial", "exact")
+    is_aim = True
+
+    @staticmethod
+    def asked(target: HighestTarget) -> str:
+        """The words for what is asked of the mode."""
+        return "as high as can be"
+
+    @staticmethod
+    def edges(target: HighestTarget, *hz: Floats) -> Edges:
+        """0 Hz, and no upper edge."""
+        return np.zeros(1), np.full(1, np.inf)
+
+    def stake(self, solved: Solved, raised: float) -> float:
+        """The share of its frequency that a model has raised it by at most."""
+        return raised / (1.0 + raised) if np.isfinite(raised) else 1.0
+
+    @property
+    def forbidden_hz(self) -> tuple[Floats | None, Floats | None]:
+        """None: every frequency is allowed."""
+        return None, None
+
+
+class LowerLimit(Requirement):
+    """The frequency of a mode is at least ``hz``."""
+
+    form = AtLeastTarget
+
+    @staticmethod
+    def asked(target: AtLeastTarget) -> str:
+        """The words for what is asked of the mode."""
+        return f"at least {in_hz(target.at_least)}"
+
+    @staticmethod
+    def edges(target: AtLeastTarget, *hz: Floats) -> Edges:
+        """The limit, and no upper edge."""
+        return hz[0], np.full_like(hz[0], np.inf)
+
+
+class UpperLimit(Requirement):
+    """The frequency of a mode is at most ``hz``; too stiff a model is on the safe side."""
+
+    form = AtMostTarget
+
+    @staticmethod
+    def asked(target: AtMostTarget) -> str:
+        """The words for what is asked of the mode."""
+        return f"at most {in_hz(target.at_most)}"
+
+    @staticmethod
+    def edges(target: AtMostTarget, *hz: Floats) -> Edges:
+        """No lower edge, and the limit."""
+        return np.full_like(hz[0], -np.inf), hz[0]
+
+
+class ModeGap(Requirement):
+    """The frequencies of two modes differ by at least ``hz``."""
+
+    form = GapTarget
+
+    @staticmethod
+    def asked(target: GapTarget) -> str:
+        """The words for what is asked of the modes."""
+        return f"at least {target.gap.at_least:g} Hz apart"
+
+    @staticmethod
+    def edges(target: GapTarget, *hz: Floats) -> Edges:
+        """The distance, and no upper edge."""
+        return hz[0], np.full_like(hz[0], np.inf)
+
+    @staticmethod
+    def terms_of(modes: tuple[int, ...]) -> Terms:
+        """The higher mode less the lower one."""
+        low, high = modes
+        return (high, 1.0), (low, -1.0)
+
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it
 
