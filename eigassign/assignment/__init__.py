@@ -2,8 +2,7 @@
 
 Reading order:
 
-    targets       wanted frequencies at the samples, weights in time, λ in Hz; checks of input
-    linear        what is linear in the design: λ along the trajectory, and limits
+    inputs        what the program is made of: targets, weights, λ in Hz, what is linear in the design; checks of input
     requirements  what a case asks for: one type from the case file to the report
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility   which limits contradict each other
@@ -26,7 +25,6 @@ __all__, __getattr__, __dir__ = face(
         "exact.optima": "Tally with_end",
         "exact.sequential": "End Optimum minimise",
         "exact.design_point": "first_order",
-        "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.kinds": (
@@ -37,6 +35,8 @@ __all__, __getattr__, __dir__ = face(
         "requirements.requirement": "Frequencies Requirement Solved",
         "requirements.sampling": "KINDS design_limits requirements_of time_weights",
         "solver": "Status solve_program solve_scaled",
-        "targets": "hz_from_lam lam_from_hz sample_target trapezoidal_weights",
+        "inputs": (
+            "LinearConstraint LinearModel hz_from_lam lam_from_hz sample_target trapezoidal_weights"
+        ),
     },
 )

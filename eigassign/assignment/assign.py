@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.inputs import Floats, LinearConstraint, finite, frozen
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
@@ -23,7 +23,6 @@ from eigassign.assignment.program import (
     build_program,
 )
 from eigassign.assignment.solver import solve_program
-from eigassign.assignment.targets import Floats, finite, frozen
 from eigassign.brief import Brief
 
 

@@ -8,9 +8,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.inputs import Floats, LinearConstraint
 from eigassign.assignment.program import Bounds, QuadraticProgram, ScaledProgram
-from eigassign.assignment.targets import Floats
 from eigassign.errors import InfeasibleError
 
 T = TypeVar("T")

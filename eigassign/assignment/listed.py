@@ -14,7 +14,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.targets import Floats, finite, same_length
+from eigassign.assignment.inputs import Floats, finite, same_length
 from eigassign.errors import UsageError
 
 Rows = tuple[int, ...]  # one row of every list: a combination

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigassign.assignment.inputs import Floats
 from eigassign.assignment.program import ProgramAnswer, QuadraticProgram
-from eigassign.assignment.targets import Floats
 from eigassign.errors import AccuracyError
 
 ACCEPT = 1e-8  # ten times the tolerance that OSQP is asked for

@@ -34,9 +34,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eigassign.assignment.linear import LinearConstraint, LinearModel
+from eigassign.assignment.inputs import (
+    Floats,
+    LinearConstraint,
+    LinearModel,
+    finite,
+    frozen,
+    limit,
+    positive,
+    same_length,
+)
 from eigassign.assignment.requirements.requirement import Requirement, time_shares
-from eigassign.assignment.targets import Floats, finite, frozen, limit, positive, same_length
 from eigassign.errors import UsageError
 
 Goals = Sequence[tuple[Requirement, LinearModel]]  # wanted frequencies, each with λ at its rows

@@ -33,6 +33,7 @@ from functools import cached_property
 import numpy as np
 
 from eigassign.assignment.feasibility import contradiction, feasible_point, refuse_impossible
+from eigassign.assignment.inputs import Floats
 from eigassign.assignment.program import (
     ProgramAnswer,
     QuadraticProgram,
@@ -40,7 +41,6 @@ from eigassign.assignment.program import (
     scaled_program,
     unscaled,
 )
-from eigassign.assignment.targets import Floats
 from eigassign.errors import UsageError
 
 

@@ -19,11 +19,10 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.inputs import Floats, LinearConstraint
 from eigassign.assignment.program import ScaledProgram
 from eigassign.assignment.requirements.crossing import NeighbourPairs
 from eigassign.assignment.solver import solve_scaled
-from eigassign.assignment.targets import Floats
 
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies

@@ -19,7 +19,7 @@ import numpy as np
 
 from eigassign.assignment.exact.design_problem import MET, DesignProblem, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, minimise, unseen, worth
-from eigassign.assignment.targets import Floats
+from eigassign.assignment.inputs import Floats
 from eigassign.errors import EigassignError
 
 SAME = 1e-4  # relative, in F: optima of the same worth

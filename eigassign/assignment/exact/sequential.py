@@ -29,8 +29,8 @@ from eigassign.assignment.exact.design_problem import (
     merit,
 )
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
+from eigassign.assignment.inputs import Floats, frozen
 from eigassign.assignment.program import SNAP
-from eigassign.assignment.targets import Floats, frozen
 from eigassign.errors import EigassignError
 
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds

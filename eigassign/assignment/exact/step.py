@@ -20,9 +20,9 @@ import numpy as np
 
 from eigassign.assignment.exact.design_point import DesignPoint, Expected, Rows
 from eigassign.assignment.exact.design_problem import MET, TINY, DesignProblem, UnitBox, merit
+from eigassign.assignment.inputs import Floats
 from eigassign.assignment.program import ScaledProgram
 from eigassign.assignment.solver import solve_scaled
-from eigassign.assignment.targets import Floats
 
 SMALLEST = 1e-10  # trust region, of the bounds
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eigassign.assignment.inputs import positive_hz
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,
@@ -23,7 +24,6 @@ from eigassign.assignment.requirements.requirement import (
     Terms,
     in_hz,
 )
-from eigassign.assignment.targets import positive_hz
 from eigassign.case.schema.targets import (
     AtLeastTarget,
     AtMostTarget,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.targets import frozen
+from eigassign.assignment.inputs import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.targets import FollowedMode

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.inputs import LinearConstraint
 from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,

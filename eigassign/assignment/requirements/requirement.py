@@ -22,9 +22,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.linear import LinearConstraint, LinearModel
+from eigassign.assignment.inputs import LinearConstraint, LinearModel, frozen, lam_from_hz
 from eigassign.assignment.requirements.crossing import NeighbourPairs
-from eigassign.assignment.targets import frozen, lam_from_hz
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import (
     AnyTarget,

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.assignment.inputs import sample_target, trapezoidal_weights
 from eigassign.assignment.requirements.kinds import (
     AssignedFrequency,
     ForbiddenBand,
@@ -31,7 +32,6 @@ from eigassign.assignment.requirements.quantity import (
 )
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.static_limit import Placed, static_limits
-from eigassign.assignment.targets import sample_target, trapezoidal_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted
 from eigassign.case.schema.targets import (

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.inputs import hz_from_lam
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of
-from eigassign.assignment.targets import hz_from_lam
 from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError

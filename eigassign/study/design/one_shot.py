@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment, solve_assignment
-from eigassign.assignment.linear import LinearModel
+from eigassign.assignment.inputs import LinearModel
 from eigassign.assignment.listed import ListedValues
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.requirement import Requirement

@@ -31,11 +31,11 @@ from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.optima import Tally
 from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
 from eigassign.assignment.feasibility import can_be_kept
+from eigassign.assignment.inputs import frozen
 from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
-from eigassign.assignment.targets import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import check_band, wanting
