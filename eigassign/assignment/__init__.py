@@ -7,7 +7,6 @@ Reading order:
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility   which limits contradict each other
     solver        solve: OSQP, then an active-set method that goes to round-off
-    optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
     exact         the optimum of the exact problem, and parameters from measurements
     listed        parameters that take listed values
     assign        build, solve, judge: from targets to the optimal design
@@ -18,14 +17,13 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "assign": "Assignment solve_assignment",
+        "assign": "Assignment Certificate best_candidate judge solve_assignment",
         "exact.design_problem": "Appraisal Cost DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Requirements Tolerances with_scenarios",
         "exact.optima": "Tally with_end",
         "exact.sequential": "End Optimum minimise",
         "exact.design_point": "first_order",
-        "optimality": "Certificate best_candidate judge",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.kinds": (
             "AssignedFrequency ForbiddenBand HighestFrequency LowerLimit ModeGap UpperLimit"
