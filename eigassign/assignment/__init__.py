@@ -21,8 +21,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.design_problem": "Appraisal Cost DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Requirements Tolerances with_scenarios",
-        "exact.optima": "Tally with_end",
-        "exact.sequential": "End Optimum minimise",
+        "exact.sequential": "End Optimum Tally minimise with_end",
         "exact.design_point": "first_order",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.kinds": (

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, DesignProblem
-from eigassign.assignment.exact.optima import NOTHING
-from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.exact.sequential import NOTHING, End
 from eigassign.errors import EigassignError
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.response import ENDLESS, Glances
@@ -30,7 +29,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 SHARE = 0.25  # of the search's exact solves: a count, so that the same case has the same words
-MOST = 7000  # designs solved along the whole trajectory, where all studies are asked for
+MOST_SOLVED = 7000  # designs solved along the whole trajectory, where all studies are asked for
 TOGETHER = 16  # boxes halved together: exact solves of many poses are quicker than one by one
 GAP, POINTS = 0.01, 5e-4  # of F, and of the rms or the worst error: a smaller gap is none
 SAID = 0.5  # of F: a wider gap says little
@@ -40,7 +39,7 @@ WIDE = 4.0  # times its lower end: a side so long is halved by ratio
 def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
     """What is proved of the optimum; None where nothing can be, or the search was ended.
 
-    It takes a quarter of the exact solves of the search, or if ``thorough`` up to `MOST` designs.
+    It takes a quarter of the exact solves of the search, or if ``thorough`` up to `MOST_SOLVED` designs.
     """
     best, problem, file = found.best, found.variant.problem, scene.file
     missed, lower, upper = best.seen.violation > MET, problem.lower, problem.upper
@@ -54,7 +53,7 @@ def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
         given = task.scenarios or task.bands or task.followers or scene.path.follows_design
         if given or not np.all((effects(file) != 0.0) | (lower == upper)):
             return None
-        most = MOST if thorough else int(SHARE * found.exact_solves / len(scene.path.q))
+        most = MOST_SOLVED if thorough else int(SHARE * found.exact_solves / len(scene.path.q))
         least = min(value, _bound(scene, found, least, enough, most))
     gap = (value - least) / (abs(value) + NOTHING)
     kind, words = "proved" if least >= enough else "bounded", _words(scene, found, least, gap)

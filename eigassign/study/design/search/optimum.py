@@ -28,8 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
-from eigassign.assignment.exact.optima import Tally
-from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
+from eigassign.assignment.exact.sequential import End, Optimum, Tally, minimise, worth
 from eigassign.assignment.feasibility import can_be_kept
 from eigassign.assignment.inputs import frozen
 from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows

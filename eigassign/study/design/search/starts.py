@@ -14,8 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
-from eigassign.assignment.exact.optima import FINISHED, NOTHING, Tally, with_end
-from eigassign.assignment.exact.sequential import PAYS, ROUND_OFF, End, Optimum, minimise, worth
+from eigassign.assignment.exact.sequential import (
+    FINISHED,
+    NOTHING,
+    PAYS,
+    ROUND_OFF,
+    End,
+    Optimum,
+    Tally,
+    minimise,
+    with_end,
+    worth,
+)
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.search.response import ReducedModels
