@@ -41,9 +41,9 @@ from eigassign.study.comparison import (
     validate_expansions,
 )
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
+from eigassign.study.design.conclusions import proof
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
-from eigassign.study.design.proof import proof
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.pictures.drawing import motions
 from eigassign.study.planning import expansion_needed, plan_expansion

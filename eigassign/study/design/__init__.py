@@ -7,7 +7,6 @@ Reading order:
     judgement    what a design does to the targets
     clearance    whether a band stays clear of modes all along a trajectory
     search       the design that meets the targets best, from several starts
-    proof        what no design within the bounds is below
     conclusions  what may be said of an optimum, and what an objective that is no error has come to
     robust       the same for every deviation within tolerances
     answer       the answer by either method
