@@ -2,7 +2,7 @@
 
 Reading order:
 
-    inputs        what the program is made of: targets, weights, λ in Hz, what is linear in the design; checks of input
+    inputs        targets and weights in time, λ in Hz, what is linear in the design
     requirements  what a case asks for: one type from the case file to the report
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility   which limits contradict each other
@@ -27,10 +27,9 @@ __all__, __getattr__, __dir__ = face(
         "requirements.kinds": (
             "AssignedFrequency ForbiddenBand HighestFrequency LowerLimit ModeGap UpperLimit"
         ),
-        "requirements.named_modes": "followed_modes named_design named_pose",
         "requirements.quantity": "MassLimit",
         "requirements.requirement": "Frequencies Requirement Solved",
-        "requirements.sampling": "KINDS design_limits requirements_of time_weights",
+        "requirements.sampling": "KINDS design_limits followed_modes requirements_of time_weights",
         "solver": "Status solve_program solve_scaled",
         "inputs": (
             "LinearConstraint LinearModel hz_from_lam lam_from_hz sample_target trapezoidal_weights"

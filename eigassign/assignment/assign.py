@@ -139,7 +139,7 @@ class Assignment(Brief):
 
     ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` one array for each goal, (its n_t,) in
     rad²/s², predicted by the linear models. J as in `program`: the mean square relative error in λ.
-    Residuals are recomputed and dimensionless (`optimality`), each at most 1e-8. ``undetermined``
+    Residuals are recomputed and dimensionless (`judge`), each at most 1e-8. ``undetermined``
     counts the directions of the free parameters that change no target: there the initial design is
     kept as nearly as the limits allow (`solver`).
     """

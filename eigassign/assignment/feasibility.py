@@ -14,7 +14,7 @@ from eigassign.errors import InfeasibleError
 
 T = TypeVar("T")
 MISSED = 1e-7  # of a constraint's terms: what programs leave of it
-TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `optimality` accepts
+TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `judge` accepts
 
 
 def refuse_impossible(program: QuadraticProgram) -> None:

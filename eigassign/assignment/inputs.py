@@ -1,4 +1,4 @@
-"""What the program is made of: targets and weights in time, linear models of λ, linear limits; refuses input of another shape, or not finite."""
+"""Targets and weights in time, linear models of λ, linear limits; checks of such input."""
 
 from __future__ import annotations
 

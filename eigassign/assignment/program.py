@@ -169,7 +169,7 @@ def _require_sizes(
 
 # --- Dimensionless units for a quadratic program, the program written in them, and the way back
 
-# Of a parameter's unit: this near to a bound is on it. A hundredth of what `optimality` accepts.
+# Of a parameter's unit: this near to a bound is on it. A hundredth of what `judge` accepts.
 SNAP = 1e-10
 
 

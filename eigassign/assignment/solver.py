@@ -4,7 +4,7 @@
 on failure x is 2143289344.0 and not NaN (x is read only when the status is 1); NaN in the data is
 not refused (refused here); a lower triangle is ignored (the upper one is given); an interrupt is
 swallowed (raised again); its own polishing may worsen the answer, and prints to stdout in spite of
-``verbose=False`` (off; the active-set method below polishes, and `optimality` judges both). With a
+``verbose=False`` (off; the active-set method below polishes, and `judge` judges both). With a
 positive semidefinite P and ordered limits nothing is printed, so stdout needs no redirection. Made
 without a name of its algebra it looks for others on the disk, 1 to 2 ms for each program (named).
 
@@ -46,7 +46,7 @@ from eigassign.errors import UsageError
 
 @dataclass(frozen=True)
 class Solution:
-    """Candidates for the optimum, the more exact first; `optimality` decides which of them holds.
+    """Candidates for the optimum, the more exact first; `judge` decides which of them holds.
 
     ``undetermined`` counts the directions of the free parameters that change no target.
     """

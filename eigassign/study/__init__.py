@@ -34,7 +34,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "design.answer": "Answer find_answer",
         "design.clearance": "BandMotion",
-        "design.followed": "followers require_one_shape solve_design",
+        "design.followed": "followers named_design named_pose require_one_shape solve_design",
         "design.judgement": "crossing_warnings",
         "design.search.optimum": "Found find_optimum",
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),

@@ -16,13 +16,12 @@ from eigassign.assignment import (
     Requirements,
     Solved,
     followed_modes,
-    named_design,
-    named_pose,
     requirements_of,
 )
 from eigassign.case import load
 from eigassign.errors import CaseError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
+from eigassign.study import named_design, named_pose
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"

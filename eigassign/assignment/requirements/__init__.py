@@ -7,6 +7,5 @@ Reading order:
     kinds         what may be asked of modes: a frequency, limits, a gap, a band to keep out of
     quantity      the mass, or a weighted sum of design parameters, is within limits
     static_limit  a node gives way by no more than so much, under a force or the weight
-    named_modes   modes that targets name by their shape
     sampling      what a case asks for, at the samples of its trajectories
 """

@@ -1,4 +1,4 @@
-"""What may be asked of modes: a frequency, as high a one as can be, limits, a gap, a band to keep out of.
+"""What may be asked of modes: a frequency, the highest there is, limits, a gap, a band.
 
 Along one trajectory a band is clear if and only if the number k of modes below both of its edges is
 the same everywhere. Whatever k is, that is two limits: mode k is at most the lower edge, and mode

@@ -23,7 +23,6 @@ from eigassign.assignment.requirements.kinds import (
     ModeGap,
     UpperLimit,
 )
-from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.quantity import (
     DriveLimit,
     LimitedQuantity,
@@ -72,6 +71,11 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
         if target.kind in KINDS
         for one in _of_target(file, place, target, path)
     )
+
+
+def followed_modes(file: CaseFile) -> tuple[FollowedMode, ...]:
+    """The modes that targets follow by their shape, each once, in the order of the file."""
+    return tuple(dict.fromkeys(mode for target in file.targets for mode in target.followed))
 
 
 def design_limits(

@@ -67,7 +67,7 @@ WIDE = 4.0  # times its lower end: a side so long is halved by ratio
 def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
     """What is proved of the optimum; None where nothing can be, or the search was ended.
 
-    It takes a quarter of the exact solves of the search, or if ``thorough`` up to `MOST_SOLVED` designs.
+    It takes a quarter of the exact solves of the search; if ``thorough`` up to `MOST_SOLVED`.
     """
     best, problem, file = found.best, found.variant.problem, scene.file
     missed, lower, upper = best.seen.violation > MET, problem.lower, problem.upper

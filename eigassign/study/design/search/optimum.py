@@ -33,8 +33,8 @@ from eigassign.assignment.feasibility import can_be_kept
 from eigassign.assignment.inputs import frozen
 from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
 from eigassign.assignment.requirements.kinds import Margin
-from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import check_band, wanting
