@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,9 @@ class Fact:
     ``words`` say what its name does not, ``heading`` heads its column, ``unit`` is that of its
     numbers. ``digits`` is a format, or makes the text of a cell, which ``says_unit`` or does not;
     ``absent`` is that of None. In files it has another ``name`` where one is given; there None is
-    left out of what is ``optional``, a number that is not finite is null where it ``may_lack``, and
-    what ``is_key`` is not said again below.
+    left out of what is ``optional``, a number that is not finite is null where it ``may_lack``,
+    rows are a mapping ``by`` one of their fields, what is ``flat`` stands among the facts of its
+    owner, and what is ``unwritten`` is left out: a key, or what is for figures and tables alone.
     """
 
     words: str = ""
@@ -42,7 +43,9 @@ class Fact:
     name: str = ""
     optional: bool = False
     may_lack: bool = False
-    is_key: bool = False
+    by: str = ""
+    flat: bool = False
+    unwritten: bool = False
 
     @property
     def column(self) -> str:
@@ -72,7 +75,7 @@ def written(row: Any) -> dict[str, Fact]:
     """The facts of a row that files have: its fields, and properties with a ``name`` for it."""
     told = {name: fact(row, name) for name in hints(row)}
     own = {field.name for field in fields(row)}
-    return {k: one for k, one in told.items() if (k in own or one.name) and not one.is_key}
+    return {k: one for k, one in told.items() if (k in own or one.name) and not one.unwritten}
 
 
 @cache
@@ -160,7 +163,9 @@ def positive_percent(fraction: float) -> str:
 
 # --- Kinds of facts, each with its unit and digits
 
-Key = Annotated[str, Fact(is_key=True)]
+T = TypeVar("T")
+Unwritten = Annotated[T, Fact(unwritten=True)]
+Key = Unwritten[str]
 Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
 Hertz = Annotated[float, Fact(unit="Hz", digits=number)]
 Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]

@@ -18,6 +18,7 @@ import scipy
 
 from eigassign._version import __version__
 from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
+from eigassign.study.results import CaseRow
 
 SCHEMA = 6  # of chart.json
 _BREAK_EVEN = "evaluations from which it beats exact solves"
@@ -237,10 +238,11 @@ class Asked:
     floor_hz: Annotated[Hertz, Fact("round-off of exact answers: no error below it counts")]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Chart:
     """Everything that one chart shows."""
 
+    schema: Annotated[int, Fact("raised when a field goes or means something else")] = SCHEMA
     title: str
     case_name: str
     case_sha256: str
@@ -259,9 +261,7 @@ class Chart:
     warnings: tuple[str, ...] = ()
     seconds: Annotated[Seconds, Fact("that the chart took")] = 0.0
 
-
-@dataclass(frozen=True, kw_only=True)
-class ChartDocument(Chart):
-    """A chart, and which form of it."""
-
-    schema: Annotated[int, Fact("raised when a field goes or means something else")] = SCHEMA
+    @property
+    def case(self) -> CaseRow:
+        """The case that was charted."""
+        return CaseRow(self.case_name, self.title, None, self.reference, self.case_sha256, {})

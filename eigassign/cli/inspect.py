@@ -161,9 +161,9 @@ def modes(
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:
-        from eigassign.output.documents import document
+        from eigassign.output.documents import results_document
 
-        print_json(document(answer))
+        print_json(results_document(answer))
     else:
         _show_modes(answer, folder)
     return 0

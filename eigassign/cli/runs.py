@@ -159,14 +159,14 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
         done = updating.update(case, _options(how, reporter))
         reporter.warn(done.results.warnings)
     if as_json:
-        from eigassign.output.reports.update import document
+        from eigassign.output.documents import results_document
 
-        print_json({"run_folder": str(done.folder), **document(done.results)})
+        print_json({"run_folder": str(done.folder), **results_document(done.results)})
     else:
         from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.reports.update import headline, update_tables
+        from eigassign.output.reports.update import update_tables
 
-        print_verdict(headline(done.results), done.results.verdict)
+        print_verdict(done.results.headline, done.results.verdict)
         print_tables(update_tables(done.results))
         show(_written(done.folder, sum(done.results.timing_s.values())))
     return 0 if done.results.verdict == "fitted" else 1

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.csv import TIME, TIP_COLUMNS
-from eigassign.output.documents import trajectory_names
 from eigassign.study.results import RunResults, TargetStudy, TrajectoryRow
 
 Floats = NDArray[np.float64]
@@ -62,7 +61,7 @@ def frequency_columns(results: RunResults) -> list[Column]:
 
 def _samples(results: RunResults) -> Iterator[Column]:
     if len(results.trajectories) > 1:
-        yield "trajectory", trajectory_names(results)
+        yield "trajectory", results.trajectory_names
     yield from _motion(results, slice(0, results.time_s.size))
 
 

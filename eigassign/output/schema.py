@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from eigassign.chart.results import ChartDocument
-from eigassign.facts import hints, written
+from eigassign.chart.results import Chart
+from eigassign.facts import Fact, hints, written
 from eigassign.output.batch.summary import SummaryDocument
-from eigassign.output.documents import RunDocument
-from eigassign.output.reports.update import UpdateDocument
+from eigassign.study.results import RunResults
+from eigassign.study.updating.fit import UpdateResults
 
 FILES = {  # by what leaves them
-    "run": RunDocument,
-    "update": UpdateDocument,
+    "run": RunResults,
+    "update": UpdateResults,
     "batch": SummaryDocument,
-    "chart": ChartDocument,
+    "chart": Chart,
 }
 _TYPES = {str: "string", bool: "boolean", int: "integer", float: "number", NoneType: "null"}
 NUMBERS = {"type": "array", "items": {"type": ["number", "null", "array"]}}
@@ -63,15 +63,27 @@ def _row(row: Any, may_lack: bool, found: dict[str, Any]) -> dict[str, Any]:
     name = f"{row.__name__.removesuffix('Document')}{'WithGaps' if may_lack else ''}"
     if name not in found:
         properties = found[name] = dict[str, Any](description=inspect.cleandoc(row.__doc__))
-        facts = written(row).items()
+        facts = list(_facts(row, may_lack))
         properties["type"] = "object"
         properties["properties"] = {
-            one.name or field: {
-                "description": one.words or (one.name or field).replace("_", " "),
+            name: {
+                "description": one.words or name.replace("_", " "),
                 **({"unit": one.unit} if one.unit else {}),
-                **_schema(hints(row)[field], may_lack or one.may_lack, found),
+                **_schema(kind, lacks, found),
             }
-            for field, one in facts
+            for name, one, kind, lacks in facts
         }
-        properties["required"] = [one.name or field for field, one in facts if not one.optional]
+        properties["required"] = [name for name, one, *_ in facts if not one.optional]
     return {"$ref": f"#/$defs/{name}"}
+
+
+def _facts(row: Any, may_lack: bool) -> Iterator[tuple[str, Fact, Any, bool]]:
+    """Name, words, type and whether numbers may lack of each fact of a row, of flat ones theirs."""
+    for field, one in written(row).items():
+        kind, lacks = hints(row)[field], may_lack or one.may_lack
+        if one.flat:
+            yield from _facts(get_args(kind)[0], lacks)
+            continue
+        if one.by:
+            kind = Mapping[str, get_args(get_args(kind)[0])[0]]  # type: ignore[misc]
+        yield one.name or field, one, kind, lacks

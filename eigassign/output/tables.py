@@ -202,8 +202,8 @@ def errors(results: RunResults) -> Table:
     wanted = [target for target in results.targets if target.asked.is_goal]
     summaries = [pair for target in wanted for pair in _of_target(target)]
     if 1 < len(results.trajectories) < len(wanted):
-        along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
-        summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
+        each = ((f"all along {row.name!r}", row.error) for row in results.trajectories)
+        summaries += [(label, error) for label, error in each if error is not None]
     if len(wanted) > 1 and results.error is not None:
         summaries.append(("all", results.error))
     rows = []

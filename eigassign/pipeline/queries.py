@@ -48,8 +48,8 @@ from eigassign.study.updating.measured import read_measurements
 Floats = NDArray[np.float64]
 
 
-Where = Annotated[tuple[tuple[str, float], ...], Fact(is_key=True)]
-Words = Annotated[tuple[str, ...], Fact(is_key=True)]
+Where = Annotated[tuple[tuple[str, float], ...], Fact(unwritten=True)]
+Words = Annotated[tuple[str, ...], Fact(unwritten=True)]
 TooHigh = Annotated[list[Share] | None, Fact("at most", optional=True, may_lack=True)]
 
 

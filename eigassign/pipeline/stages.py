@@ -135,9 +135,9 @@ def log_text(results: RunResults) -> str:
     """Lines of what was run, chosen and warned of, and how long it took."""
     lines = [
         f"eigassign {results.version}",
-        f"case      {results.case_name}: {results.title}",
-        f"sha256    {results.case_sha256}",
-        *(f"sha256    {digest} {name}" for name, digest in results.case_files.items()),
+        f"case      {results.case.name}: {results.case.title}",
+        f"sha256    {results.case.sha256}",
+        *(f"sha256    {digest} {name}" for name, digest in results.case.files.items()),
         *(f"note      {note}" for note in results.notes),
         *(f"warning   {warning}" for warning in results.warnings),
         *_outcome_lines(results),
@@ -161,8 +161,8 @@ def _outcome_lines(results: RunResults) -> Iterator[str]:
     if results.error is not None:
         yield from _distances(results.error, "")
     for own in results.trajectories if len(results.trajectories) > 1 else ():
-        along = results.error_along(own.name)
-        yield from _distances(along, f" along {own.name!r}") if along is not None else ()
+        if own.error is not None:
+            yield from _distances(own.error, f" along {own.name!r}")
     if results.assignment is not None:
         yield from _assignment_lines(results.assignment)
     found = results.assignment

@@ -15,7 +15,7 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.update import update_figures
 from eigassign.output.reports.chart import write_chart
 from eigassign.output.reports.notebook import Pictured, html
-from eigassign.output.reports.update import headline, update_tables, write_update
+from eigassign.output.reports.update import update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options, prepare
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
@@ -32,10 +32,10 @@ class Updated(Pictured):
     folder: Path | None = None
 
     def __repr__(self) -> str:
-        return cut(f"<Updated: {headline(self.results)}>")
+        return cut(f"<Updated: {self.results.headline}>")
 
     def _repr_html_(self) -> str:
-        return html([headline(self.results)], update_tables(self.results), self.plan())
+        return html([self.results.headline], update_tables(self.results), self.plan())
 
     def plans(self) -> dict[str, FigurePlan]:
         """The figures of the report: measurements, parameters."""

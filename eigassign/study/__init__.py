@@ -51,8 +51,8 @@ __all__, __getattr__, __dir__ = face(
             "truncation_share unseen with_middle_loads with_worse_designs"
         ),
         "results": (
-            "ActiveRow AimRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
-            "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
+            "ActiveRow AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
+            "Comparison DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "
             "TargetStudy ToleranceRows TrajectoryRow ValidationRow"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign._version import __version__
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks.accuracy import Accuracy
-from eigassign.study.checks.slow_motion import study_motion
+from eigassign.study.checks.slow_motion import MotionStudy, study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
@@ -33,6 +33,7 @@ from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
     AssignmentRow,
+    CaseRow,
     DrawnPoses,
     DriveLoad,
     DriveRow,
@@ -45,6 +46,8 @@ from eigassign.study.results import (
     StaticRow,
     TargetStudy,
     TrajectoryRow,
+    counted_of,
+    over_all,
 )
 from eigassign.study.scene import Scene
 
@@ -75,71 +78,67 @@ def collect_results(
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     along = [(s.over_time.worst_taylor, s.mode) for s in studies.rows if s.over_time is not None]
-    reach, n = reach_warnings(scene, along), len(file.coordinates)
-    results = RunResults(
-        title=file.title,
-        reference=file.reference,
-        author=file.author,
+    reach, n, weight = reach_warnings(scene, along), len(file.coordinates), accuracy.weight
+    warnings = [*scene.warnings, *reach, *weight.warnings]
+    notes = [*scene.notes, *studies.notes, *accuracy.notes]
+    answer, targets = dict[str, Any](), tuple[TargetStudy, ...]()
+    if assigned is not None:
+        solved, targets = assigned.solved, assigned.targets
+        judged = judged_modes(file, targets)
+        motion = study_motion(scene, assigned.answer.y, solved.exact.hz, judged)
+        answer = _answer(scene, assigned, accuracy, motion)
+        # the reach of expansions matters to an answer that they gave
+        reach = reach if assigned.answer.found is None else ()
+        warnings = [*scene.warnings, *_warnings(scene, assigned), *reach, *weight.warnings]
+        notes += [*solved.notes, *_notes(scene, assigned, answer["assignment"])]
+        if motion is not None:
+            warnings += filter(None, [motion.warning])
+            notes += filter(None, [motion.note])
+        notes += assigned.meaning.notes
+    return RunResults(
+        case=CaseRow.of(file),
         given=given(file, trajectory),
         in_degrees=file.in_degrees,
         reduced=scene.model.is_reduced,
-        case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
-        case_sha256=file.sha256,
-        case_files=file.files,
-        version=__version__,
         q_names=tuple(file.coordinates),
         q_units=file.coordinate_units,
         time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
         q=np.zeros((0, n)) if trajectory is None else trajectory.q[:, :n],
-        trajectories=_trajectories(file, trajectory),
+        trajectories=tuple(_trajectories(file, trajectory, targets)),
         poses=_poses(scene),
         studies=studies.rows,
-        warnings=(*scene.warnings, *reach, *accuracy.weight.warnings),
-        notes=(*scene.notes, *studies.notes, *accuracy.notes),
+        warnings=tuple(warnings),
+        notes=tuple(notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         discretisation=accuracy.mesh,
-        weight=accuracy.weight.row,
+        weight=weight.row,
         moving=moving,
+        **answer,
     )
-    return results if assigned is None else _with_answer(results, scene, assigned, reach, accuracy)
 
 
-def _with_answer(
-    results: RunResults,
-    scene: Scene,
-    assigned: VerifiedAssignment,
-    reach: tuple[str, ...],
-    accuracy: Accuracy,
-) -> RunResults:
-    """The results with those of the answer; ``reach`` matters to one that the expansion gave."""
+def _answer(
+    scene: Scene, assigned: VerifiedAssignment, accuracy: Accuracy, motion: MotionStudy | None
+) -> dict[str, Any]:
+    """The fields of results that an answer has."""
     answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
-    judged = judged_modes(scene.file, targets)
-    motion = study_motion(scene, answer.y, assigned.solved.exact.hz, judged)
     row = assignment_row(
         *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
-        *(results.discretisation, results.weight, motion, meaning.unreachable, assigned.bound),
+        *(accuracy.mesh, accuracy.weight.row, motion, meaning.unreachable, assigned.bound),
     )
-    reach = reach if answer.found is None else ()
-    slow, fast = ("", None) if motion is None else (motion.note, motion.warning)
-    weight = accuracy.weight.warnings
-    warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, *weight, fast)
-    notes = (*assigned.solved.notes, *_notes(scene, assigned, row), slow, *meaning.notes)
-    return replace(
-        results,
-        design=design_rows(scene, answer.y),
-        targets=targets,
-        others=_others(scene, assigned),
-        spectrum=_spectrum(assigned),
-        solver=None if answer.one_shot is None else solver_row(answer.one_shot),
-        assignment=row,
-        warnings=tuple(warning for warning in warnings if warning),
-        notes=(*results.notes, *(note for note in notes if note)),
-        meaning=meaning,
-        mass=_mass(scene, answer.y),
-        drives=_drives(scene, answer.y),
-        statics=tuple(_statics(scene, answer.y)),
-    )
+    return {
+        "design": design_rows(scene, answer.y),
+        "targets": targets,
+        "others": _others(scene, assigned),
+        "spectrum": _spectrum(assigned),
+        "solver": None if answer.one_shot is None else solver_row(answer.one_shot),
+        "assignment": row,
+        "meaning": meaning,
+        "mass": _mass(scene, answer.y),
+        "drives": _drives(scene, answer.y),
+        "statics": tuple(_statics(scene, answer.y)),
+    }
 
 
 def _mass(scene: Scene, y: Floats) -> MassRow:
@@ -201,20 +200,22 @@ def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tu
     return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed), *swaps)
 
 
-def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
-    if path is None:
-        return ()
-    return tuple(
-        TrajectoryRow(
+def _trajectories(
+    file: CaseFile, path: Trajectories | None, targets: tuple[TargetStudy, ...]
+) -> Iterator[TrajectoryRow]:
+    parts = () if path is None else zip(path.parts, path.rows, strict=True)
+    for k, (part, rows) in enumerate(parts):
+        along = [one for target in counted_of(targets) for one in target.along]
+        errors = [(one.error, 1.0) for one in along if one.name == part.name]
+        yield TrajectoryRow(
             name=part.name,
             rows=rows,
             duration_s=float(np.ptp(part.trajectory.time_s)),
             weight=part.weight,
             tip=part.trajectory.tip,
-            loads={path: load.along[k] for path, load in file.loads.items()},
+            loads={path: load.along[k] for path, load in file.loads.items()} or None,
+            error=over_all(errors) if errors else None,
         )
-        for k, (part, rows) in enumerate(zip(path.parts, path.rows, strict=True))
-    )
 
 
 def _poses(scene: Scene) -> DrawnPoses:

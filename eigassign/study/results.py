@@ -17,8 +17,10 @@ from typing import Annotated, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign._version import __version__
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
+from eigassign.case.case_file import CaseFile
 from eigassign.case.units import angle_unit, handy, handy_unit, is_bare, limit_unit
 from eigassign.facts import (
     OF_ROW,
@@ -28,7 +30,9 @@ from eigassign.facts import (
     InUnit,
     Key,
     Residual,
+    Seconds,
     Share,
+    Unwritten,
     about,
     number,
     percent,
@@ -39,6 +43,7 @@ from eigassign.modal.adaptive_order import MARGIN
 _DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+SCHEMA = 2  # of results.json: raised when a field goes or means something else
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 MET = 1e-8  # a violation below it is round-off
@@ -75,6 +80,11 @@ def _metres(along: Floats) -> str:
     return f"{', '.join(f'{value:.3g}' for value in shown)} {unit}"
 
 
+def _said(name: str, words: str = "", optional: bool = False) -> Fact:
+    """What is said of a property that files have by this name."""
+    return Fact(words, name=name, optional=optional)
+
+
 # --- How good an expansion is
 
 
@@ -106,6 +116,11 @@ class Comparison(Brief):
         """Largest magnitude of ``linearised_error``."""
         return _worst(self.linearised_error)
 
+    @property
+    def worst(self) -> dict[str, float]:
+        """Both by name."""
+        return {"taylor": self.worst_taylor, "linearised": self.worst_linearised}
+
 
 def _worst(errors: Floats) -> float:
     """The largest magnitude; infinite where a polynomial gave no frequency (NaN)."""
@@ -123,26 +138,42 @@ class DesignMap(Brief):
     values: Comparison  # (n_1,) or (n_1, n_2)
 
 
+_OF_EXPANSIONS = Fact(
+    "over_time, over_q, over_design, and with a margin everywhere; of each taylor and linearised",
+    name="max_relative",
+    may_lack=True,
+)
+
+
 @dataclass(frozen=True, repr=False)
 class ModeStudy(Brief):
-    """The accuracy of the expansion of one mode (the paper's Figure 3)."""
+    """The accuracy of the expansion of one mode at (q0, y0), against exact (Figure 3)."""
 
     mode: int
     order: int
     q0: Floats
     y0: Floats
-    over_time: Comparison | None  # (n_t,) along the trajectory, at the initial design
-    over_design: DesignMap | None  # at q0
-    over_q: DesignMap | None = None  # at y0, over the range the trajectory travels
-    everywhere: Comparison | None = None  # between the samples and all over the bounds
+    over_time: Unwritten[Comparison | None]  # (n_t,) along the trajectory, at the initial design
+    over_design: Unwritten[DesignMap | None]  # at q0
+    over_q: Unwritten[DesignMap | None] = None  # at y0, over the range the trajectory travels
+    everywhere: Unwritten[Comparison | None] = None  # between the samples, all over the bounds
 
     @property
     def stated(self) -> Mapping[str, float] | None:
         """The errors of both expansions that are stated: the worst ``everywhere``, with margin."""
         if (found := self.everywhere) is None:
             return None
-        worst = {"taylor": found.worst_taylor, "linearised": found.worst_linearised}
-        return {name: MARGIN * error for name, error in worst.items()}
+        return {name: MARGIN * error for name, error in found.worst.items()}
+
+    @property
+    def max_relative(
+        self,
+    ) -> Annotated[Mapping[str, Mapping[str, Share] | None], _OF_EXPANSIONS]:
+        """The largest errors of both expansions by where they were looked for."""
+        maps = {"over_q": self.over_q, "over_design": self.over_design}
+        found = {"over_time": self.over_time, **{k: m and m.values for k, m in maps.items()}}
+        worst = {where: one.worst if one else None for where, one in found.items()}
+        return {**worst, "everywhere": self.stated}
 
 
 @dataclass(frozen=True)
@@ -182,7 +213,7 @@ class DesignRow:
     choice: Annotated[str | None, Fact("name or value chosen of its catalogue")] = None
     price: Annotated[float | None, Fact("of one SI unit")] = None
     choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
-    in_degrees: Annotated[bool, Fact(is_key=True)] = False  # people read angles so
+    in_degrees: Unwritten[bool] = False  # people read angles so
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
@@ -325,6 +356,45 @@ class OtherModes(Brief):
     initial_hz: Floats
     optimal_hz: Floats
 
+    @property
+    def rows(self) -> list[ModeRow]:
+        """Mode by mode."""
+        columns = zip(self.modes, self.initial_hz.T, self.optimal_hz.T, strict=True)
+        return [ModeRow(*column) for column in columns]
+
+
+@dataclass(frozen=True, repr=False)
+class ModeRow(Brief):
+    """Exact frequencies of a mode before and after."""
+
+    mode: int
+    initial_hz: Curve
+    optimal_hz: Curve
+
+
+OfSamples = Annotated[Sequence[str] | None, Fact("of each sample, of several", optional=True)]
+
+
+@dataclass(frozen=True, repr=False)
+class Curves(Brief):
+    """A target over its samples."""
+
+    time_s: Annotated[Floats, Fact("from the start of its trajectory", unit="s")]
+    trajectory: OfSamples
+    target_hz: Annotated[Curve, Fact("wanted, or the limit, of a band the lower edge")]
+    initial_hz: Annotated[Curve, Fact("exact, at the initial design")]
+    one_shot_hz: Annotated[Curve | None, Fact("exact, at the paper's design")]
+    predicted_hz: Annotated[Curve | None, Fact("by the last program", may_lack=True)]
+    exact_hz: Annotated[Curve, Fact("exact, at the answer")]
+
+
+@dataclass(frozen=True, repr=False)
+class LimitCurves(Curves):
+    """A limit or band over its samples."""
+
+    lower_hz: Annotated[Curve | None, Fact("lower edge")]
+    upper_hz: Annotated[Curve | None, Fact("upper edge")]
+
 
 @dataclass(frozen=True, repr=False)
 class TargetStudy(Brief):
@@ -336,22 +406,73 @@ class TargetStudy(Brief):
     time that it stands for, weighted. ``near`` are the modes about a band; None of other kinds.
     """
 
-    asked: Requirement
-    initial_hz: Floats
-    exact_hz: Floats
-    predicted_hz: Floats | None
-    one_shot_hz: Floats | None
+    asked: Unwritten[Requirement]
+    time_s: Unwritten[Floats]
+    initial_hz: Unwritten[Floats]
+    exact_hz: Unwritten[Floats]
+    predicted_hz: Unwritten[Floats | None]
+    one_shot_hz: Unwritten[Floats | None]
     error: ErrorSummary
     satisfied: bool
-    weight_s: float
-    along: tuple[TargetAlong, ...]
-    followed: tuple[FollowedRow, ...] = ()
-    near: OtherModes | None = None
+    weight_s: Unwritten[float]
+    along: Unwritten[tuple[TargetAlong, ...]]
+    followed: Unwritten[tuple[FollowedRow, ...]] = ()
+    near: Unwritten[OtherModes | None] = None
 
     @property
-    def label(self) -> str:
+    def kind(self) -> Annotated[str, _said("kind", "the key of the case file: frequency, …")]:
+        """Its key in the case file."""
+        return self.asked.kind
+
+    @property
+    def label(self) -> Annotated[str, _said("label", "what is asked, in words")]:
         """The words for what is asked: "mode 2 at least 320 Hz"."""
         return self.asked.label
+
+    @property
+    def mode(self) -> Annotated[int | None, _said("mode", "the lowest; null of a followed one")]:
+        """The lowest of its modes; None of one that is followed by its shape."""
+        return None if self.followed else self.asked.mode
+
+    @property
+    def modes(self) -> Annotated[tuple[int, ...], _said("modes")]:
+        """All that it names."""
+        return self.asked.modes
+
+    @property
+    def shape(self) -> Annotated[FollowedRow | None, _said("followed", "by its shape", True)]:
+        """The first that is followed by its shape."""
+        return next(iter(self.followed), None)
+
+    @property
+    def worst(self) -> Annotated[Share, _said("worst", "error or violation of the answer")]:
+        """The largest error or violation of the answer."""
+        return self.error.exact.max_relative
+
+    @property
+    def trajectory(self) -> Annotated[str | None, _said("trajectory", "the only one", True)]:
+        """The only one on which it holds, where there are others."""
+        return self.asked.trajectory
+
+    @property
+    def frequencies(self) -> Annotated[Curves | LimitCurves, _said("frequencies")]:
+        """Its curves with what is asked."""
+        asked, names = self.asked, None
+        if asked.trajectory is not None or len(self.along) > 1:
+            names = [one.name for one in self.along for _ in self.time_s[one.rows]]
+        own = self.initial_hz, self.one_shot_hz, self.predicted_hz, self.exact_hz
+        curves = self.time_s, names, asked.hz, *own
+        if asked.is_goal:
+            return Curves(*curves)
+        edges = (hz if np.isfinite(hz).all() else None for hz in (asked.lower, asked.upper))
+        return LimitCurves(*curves, *edges)
+
+    @property
+    def about(
+        self,
+    ) -> Annotated[Sequence[ModeRow] | None, _said("near", "modes about a band", True)]:
+        """The modes about a band, row by row."""
+        return None if self.near is None else self.near.rows
 
     @property
     def target_hz(self) -> Floats:
@@ -677,6 +798,14 @@ class SensitivityRow:
 
 
 @dataclass(frozen=True)
+class SensitivityRows:
+    """Changes of the targets with one parameter."""
+
+    unit: str
+    targets: Sequence[SensitivityRow]
+
+
+@dataclass(frozen=True)
 class PartRow:
     """The share of a mode's energies that a part has, by its key path: means over the samples.
 
@@ -781,13 +910,24 @@ class ToleranceRows:
 class Meaning(Brief):
     """The meaning of the answer: what it hangs on, what holds it back, how sure it is."""
 
-    sensitivity: tuple[SensitivityRow, ...] = ()
-    relaxed: tuple[RelaxedRow, ...] = ()
-    reach: tuple[RangeRow, ...] = ()  # over all designs within the bounds; the least error
-    tolerance: ToleranceRows | None = None
-    unreachable: tuple[str, ...] = ()  # in words, with numbers
-    anatomies: tuple[ModeAnatomy, ...] = ()  # of the modes of targets that are missed
-    notes: tuple[str, ...] = ()
+    sensitivity: Unwritten[tuple[SensitivityRow, ...]] = ()
+    relaxed: Annotated[tuple[RelaxedRow, ...], Fact("what more room at limits gains")] = ()
+    reach: Annotated[tuple[RangeRow, ...], Fact("over all designs within the bounds")] = ()
+    tolerance: Annotated[ToleranceRows | None, Fact("what deviations do to the targets")] = None
+    unreachable: Annotated[tuple[str, ...], Fact("what is out of reach, in words")] = ()
+    anatomies: Annotated[tuple[ModeAnatomy, ...], Fact("modes that are missed: what they are")] = ()
+    notes: Unwritten[tuple[str, ...]] = ()
+
+    @property
+    def by_parameter(
+        self,
+    ) -> Annotated[Mapping[str, SensitivityRows], _said("sensitivity", "by parameter")]:
+        """The changes of all targets with each parameter."""
+        named = dict.fromkeys((row.parameter, row.unit) for row in self.sensitivity)
+        return {
+            name: SensitivityRows(unit, [r for r in self.sensitivity if r.parameter == name])
+            for name, unit in named
+        }
 
 
 # --- What there is to draw of a mechanism
@@ -883,14 +1023,43 @@ class Motion(Brief):
 
 @dataclass(frozen=True, repr=False)
 class TrajectoryRow(Brief):
-    """One trajectory: the ``rows`` of all samples that are its own, and what it counts."""
+    """One trajectory: the ``rows`` of all samples that are its own, and what it counts.
+
+    ``tip`` (n, 2 or 3) is in m, where the case gives a path of the tip; ``loads`` are the
+    properties that it sets, None where these are none.
+    """
 
     name: str
-    rows: slice
-    duration_s: float
+    rows: Unwritten[slice]
+    duration_s: Seconds
     weight: float
-    tip: Floats | None  # (n, 2 or 3) in m, where the case gives a path of the tip
-    loads: Mapping[str, float] = field(default_factory=dict)  # properties that it sets, SI
+    tip: Unwritten[Floats | None]
+    loads: Annotated[
+        Mapping[str, float] | None, Fact("properties that it sets, SI", name="set", optional=True)
+    ] = None
+    error: ErrorSummary | None = None
+
+    @property
+    def samples(self) -> Annotated[int, _said("samples")]:
+        """How many it has."""
+        return int(self.rows.stop - self.rows.start)
+
+
+@dataclass(frozen=True)
+class CoordinateRow:
+    """A coordinate at all samples."""
+
+    unit: str
+    values: Annotated[Floats, Fact(unit=OF_ROW)]
+
+
+@dataclass(frozen=True)
+class MotionRow:
+    """The samples, of several trajectories one after the other."""
+
+    time_s: Annotated[Floats, Fact("from the start of its trajectory", unit="s")]
+    trajectory: OfSamples
+    coordinates: Mapping[str, CoordinateRow]
 
 
 @dataclass(frozen=True)
@@ -941,46 +1110,101 @@ class WeightRow:
     ] = None
 
 
-@dataclass(frozen=True, repr=False)
-class RunResults(Brief):
-    """Everything a run folder shows."""
+@dataclass(frozen=True)
+class CaseRow:
+    """The case that the numbers are of."""
 
+    name: Annotated[str, Fact("of the case file, without its ending")]
     title: str
-    reference: str | None
-    case_name: str
-    case_sha256: str
-    version: str
-    q_names: tuple[str, ...]
-    q_units: tuple[str, ...]
-    time_s: Floats  # of each trajectory from its own start
-    q: Floats  # (n_t, n_q), of several trajectories one after the other
-    trajectories: tuple[TrajectoryRow, ...]
-    poses: DrawnPoses
-    studies: tuple[ModeStudy, ...]
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]  # what was chosen and why, one line each
-    timing_s: Mapping[str, float]
-    author: str | None = None
-    reduced: bool = False  # links are
-    in_degrees: bool = False  # people read angles so
-    given: tuple[str, ...] = ()  # links, drives, what it carries where: a line each
-    # of an answer:
-    design: tuple[DesignRow, ...] = ()
-    targets: tuple[TargetStudy, ...] = ()
-    others: OtherModes | None = None
-    solver: SolverRow | None = None
-    assignment: AssignmentRow | None = None
-    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
-    tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
+    author: str | None
+    reference: Annotated[str | None, Fact("source of the case")]
+    sha256: Annotated[str, Fact("of the case file")]
+    files: Annotated[Mapping[str, str], Fact("SHA-256 of each file that it names")]
+
+    @classmethod
+    def of(cls, file: CaseFile) -> CaseRow:
+        """That of a case file."""
+        name = file.path.stem.encode("utf-8", "replace").decode("utf-8")
+        return cls(name, file.title, file.author, file.reference, file.sha256, file.files)
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Origin(Brief):
+    """The beginning of results.json."""
+
+    schema: Annotated[int, Fact("raised when a field goes or means something else")] = SCHEMA
+    version: Annotated[str, Fact(name="eigassign_version")] = __version__
+    case: CaseRow
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class RunResults(Origin):
+    """A run; what it did not ask for is null or empty."""
+
+    design: Annotated[
+        tuple[DesignRow, ...], Fact("by parameter, in the order of the case", by="name")
+    ] = ()
     mass: MassRow | None = None
-    discretisation: MeshError | None = None
-    weight: WeightRow | None = None  # None where gravity is left out on purpose
-    only: str | None = None  # of several trajectories the one that these are results of
-    meaning: Meaning = field(default_factory=Meaning)
-    spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for
-    moving: tuple[Motion, ...] = ()  # of every trajectory, where a report shows it
-    drives: tuple[DriveRow, ...] = ()  # of every coordinate, where anything loads them
-    statics: tuple[StaticRow, ...] = ()  # of every static target
+    drives: Annotated[tuple[DriveRow, ...], Fact("what each exerts, by coordinate", by="name")] = ()
+    statics: Annotated[
+        tuple[StaticRow, ...], Fact("of static targets, by what they ask", by="name")
+    ] = ()
+    targets: Annotated[tuple[TargetStudy, ...], Fact("in the order of the case")] = ()
+    assignment: Annotated[
+        AssignmentRow | None, Fact("the verdict, and how the answer was found")
+    ] = None
+    meaning: Annotated[Meaning, Fact(flat=True)] = field(default_factory=Meaning)
+    discretisation: Annotated[MeshError | None, Fact("how much too high the mesh is")] = None
+    weight: Annotated[WeightRow | None, Fact("what gravity changes that is not computed")] = None
+    studies: Annotated[
+        tuple[ModeStudy, ...], Fact("of the expansion, mode by mode", name="approximation")
+    ]
+    trajectories: Annotated[tuple[TrajectoryRow, ...], Fact("in the order of the case")]
+    solver: Annotated[SolverRow | None, Fact("the certificate of the one shot's program")] = None
+    warnings: tuple[str, ...]
+    notes: Annotated[tuple[str, ...], Fact("what was chosen and why")]
+    timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
+    # for figures, tables and CSV files
+    q_names: Unwritten[tuple[str, ...]]
+    q_units: Unwritten[tuple[str, ...]]
+    time_s: Unwritten[Floats]  # of each trajectory from its own start
+    q: Unwritten[Floats]  # (n_t, n_q), of several trajectories one after the other
+    poses: Unwritten[DrawnPoses]
+    reduced: Unwritten[bool] = False  # links are
+    in_degrees: Unwritten[bool] = False  # people read angles so
+    given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
+    others: Unwritten[OtherModes | None] = None
+    spectrum: Unwritten[OtherModes | None] = None  # up to the mode above the highest asked for
+    tolerance: Unwritten[float] = 0.02  # the largest error of the expansion that is accepted
+    only: Unwritten[str | None] = None  # of several trajectories the one that these are of
+    moving: Unwritten[tuple[Motion, ...]] = ()  # of every trajectory, where a report shows it
+
+    @property
+    def frequencies(
+        self,
+    ) -> Annotated[Curves | LimitCurves | None, _said("frequencies", "of the first target")]:
+        """The curves of the first target."""
+        return self.targets[0].frequencies if self.targets else None
+
+    @property
+    def other_modes(
+        self,
+    ) -> Annotated[Sequence[ModeRow], _said("other_modes", "some modes without a target")]:
+        """The modes that are shown beside those of targets."""
+        return () if self.others is None else self.others.rows
+
+    @property
+    def trajectory_names(self) -> list[str]:
+        """The name of each sample's trajectory."""
+        return [row.name for row in self.trajectories for _ in range(row.samples)]
+
+    @property
+    def motion(self) -> Annotated[MotionRow, _said("trajectory", "all samples")]:
+        """All samples."""
+        names = self.trajectory_names if len(self.trajectories) > 1 else None
+        each = zip(self.q_names, self.q_units, self.q.T, strict=True)
+        own = {name: CoordinateRow(unit, values) for name, unit, values in each}
+        return MotionRow(self.time_s, names, own)
 
     @property
     def along(self) -> str:
@@ -1014,7 +1238,11 @@ class RunResults(Brief):
         return None if self.assignment is None else self.assignment.shortcoming
 
     @property
-    def error(self) -> ErrorSummary | None:
+    def error(
+        self,
+    ) -> Annotated[
+        ErrorSummary | None, _said("error", "of all wanted frequencies, else of all limits")
+    ]:
         """Over all wanted frequencies: the largest maximum and the root of the mean square.
 
         Where none is wanted, over the violations of all limits; None without either.
@@ -1024,12 +1252,16 @@ class RunResults(Brief):
         return over_all([(target.error, target.weight_s) for target in self.counted])
 
     @property
-    def violation(self) -> ViolationRow | None:
+    def violation(
+        self,
+    ) -> Annotated[
+        ViolationRow | None, _said("violation", "the largest of any limit, and which has it")
+    ]:
         """The largest violation of any limit; None where nothing is limited."""
         return worst_violation(self.targets, self.assignment.limits if self.assignment else ())
 
     @property
-    def price(self) -> float | None:
+    def price(self) -> Annotated[float | None, _said("price", "of the change of the design")]:
         """The cost of the choices and of the change; None where nothing has a price."""
         priced = [row.cost for row in self.design if row.is_priced]
         if self.mass is not None and self.mass.price is not None:
@@ -1039,13 +1271,13 @@ class RunResults(Brief):
     @property
     def counted(self) -> tuple[TargetStudy, ...]:
         """The targets that ``error`` is of: wanted frequencies, or else all that may be missed."""
-        wanted = tuple(target for target in self.targets if target.asked.is_goal)
-        return wanted or tuple(target for target in self.targets if not target.asked.is_aim)
+        return counted_of(self.targets)
 
-    def error_along(self, name: str) -> ErrorSummary | None:
-        """The same along one trajectory; None where no target holds on it."""
-        along = [one.error for target in self.counted for one in target.along if one.name == name]
-        return over_all([(error, 1.0) for error in along]) if along else None
+
+def counted_of(targets: tuple[TargetStudy, ...]) -> tuple[TargetStudy, ...]:
+    """The targets of wanted frequencies, or else all that may be missed."""
+    wanted = tuple(target for target in targets if target.asked.is_goal)
+    return wanted or tuple(target for target in targets if not target.asked.is_aim)
 
 
 def worst_violation(

@@ -12,6 +12,7 @@ from eigassign.assignment import KINDS
 from eigassign.study import (
     ActiveRow,
     AssignmentRow,
+    CaseRow,
     Comparison,
     DesignMap,
     DesignRow,
@@ -62,10 +63,14 @@ def make_results(
     parts = (n_t,) if parts is None else parts
     targets = tuple(_target(i + 1, time, scale_hz, parts) for i in range(n_targets if n_t else 0))
     return RunResults(
-        title=title,
-        reference="Belotti et al., Appl. Sci. 11 (2021) 11558",
-        case_name="two_link",
-        case_sha256="0123456789abcdef" * 4,
+        case=CaseRow(
+            "two_link",
+            title,
+            None,
+            "Belotti et al., Appl. Sci. 11 (2021) 11558",
+            "0123456789abcdef" * 4,
+            {},
+        ),
         version="0.1.0",
         q_names=names,
         q_units=tuple("m" if i % 4 == 3 else "rad" for i in range(n_q)),
@@ -223,6 +228,7 @@ def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> Ta
     )
     return TargetStudy(
         asked=asked,
+        time_s=time,
         **{f"{name}_hz": hz for name, hz in curves.items()},
         error=errors(whole),
         satisfied=True,

@@ -81,7 +81,7 @@ def test_a_run_compares_with_its_own_results_and_a_folder_of_runs_with_each(tmp_
     results = make_results(n_targets=2)
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "results.json").write_bytes(to_json(results))
-    now = Known(results.case_name, frequency_ranges(results))
+    now = Known(results.case.name, frequency_ranges(results))
     for place in (tmp_path, tmp_path / "arm", tmp_path / "arm" / "results.json"):
         found = compared(place, now, 0.0)
         assert found.moves == []
@@ -93,14 +93,14 @@ def test_an_update_in_a_folder_of_runs_has_no_answer_to_compare(tmp_path):
     for name, data in (("arm", to_json(results)), ("arm_update", UPDATED)):
         (tmp_path / name).mkdir()
         (tmp_path / name / "results.json").write_bytes(data)
-    found = compared(tmp_path, Known(results.case_name, frequency_ranges(results)))
+    found = compared(tmp_path, Known(results.case.name, frequency_ranges(results)))
     assert found.moves == []
     with pytest.raises(UsageError, match="has no frequencies"):
         EarlierResult(tmp_path / "arm_update", "answers", 0.01)
 
 
 def validated(results, hz):
-    common = {"case": results.case_name, "mode": 1, "order": 4, "points": hz.size, "limit": 0.02}
+    common = {"case": results.case.name, "mode": 1, "order": 4, "points": hz.size, "limit": 0.02}
     errors = dict.fromkeys(
         ("worst_taylor", "worst_linearised", "rms_taylor", "rms_linearised"), 1e-4
     )
@@ -115,12 +115,12 @@ def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own
     run.write_bytes(to_json(results))
     own.write_text(json.dumps([vars(row), {"case": "broken", "error": "CaseError"}]))
     for path in (run, own):
-        same = compared(path, Known.of_validation(results.case_name, [row]), 1e-9, "validations")
+        same = compared(path, Known.of_validation(results.case.name, [row]), 1e-9, "validations")
         assert same.moves == []
         assert "compared: 1, new ones: 0" in same.table().caption
         off = [replace(row, highest_hz=row.highest_hz + 0.1)]
         assert len(
-            compared(path, Known.of_validation(results.case_name, off), 0.05, "validations").moves
+            compared(path, Known.of_validation(results.case.name, off), 0.05, "validations").moves
         )
 
 

@@ -62,7 +62,7 @@ def made(results, full=False, size=0, more="") -> tuple[str, Page, dict[str, byt
     """The page with pictures of at least ``size`` bytes, and ``more`` text in its document."""
     plans = run_figures(results)
     images = {f"{p.name}.png": f"PNG of {p.name}".encode().ljust(size) for p in plans}
-    data = ("results.json", json.dumps({"title": results.title + more}).encode())
+    data = ("results.json", json.dumps({"title": results.case.title + more}).encode())
     shown = run_tables(results)
     html = page(results, shown, plans, images, full=full, document=data).decode()
     parsed = Page(html)
@@ -118,7 +118,7 @@ def test_a_full_report_plots_every_description_and_lists_its_numbers():
     before = next(c for c in initial if c["name"] == "mode 1, initial design")
     assert before["y"][0] == pytest.approx(target.initial_hz[0], rel=1e-6)
     assert before["hovertemplate"].endswith("Hz")
-    assert island(html, "results") == {"title": results.title}
+    assert island(html, "results") == {"title": results.case.title}
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,8 @@ def test_the_promised_fields_are_there():
     found = read(results)
     target = results.targets[0]
     assert found["eigassign_version"] == "0.1.0"
-    assert found["case"]["title"] == results.title
-    assert found["case"]["sha256"] == results.case_sha256
+    assert found["case"]["title"] == results.case.title
+    assert found["case"]["sha256"] == results.case.sha256
     assert list(found["design"]) == ["m1", "m2"]
     limits = {k: found["design"]["m1"][k] for k in ("initial", "optimal", "lower", "upper")}
     assert limits == {"initial": 0.0, "optimal": 0.2287, "lower": 0.0, "upper": 0.25}

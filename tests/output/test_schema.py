@@ -133,4 +133,4 @@ def test_what_is_not_as_a_schema_says_is_found() -> None:
     found["more"] = 1
     said = mistakes(json.dumps(found), "run")
     assert len(said) == 3
-    assert "dear" in said[0]
+    assert any("dear" in one for one in said)

@@ -314,7 +314,7 @@ def draw_poses(results: RunResults) -> Figure:
     """Links as lines, coloured by the time of the pose."""
     shown, held = results.poses, extent(results.poses)
     spatial, colours = held.view.spatial, _colours(len(shown.lines))
-    title = f"{short(results.title, 70)}: poses along the trajectory"
+    title = f"{short(results.case.title, 70)}: poses along the trajectory"
     figure = style.new_figure(title, 4.0, layout=None)
     key = figure.legend(handles=_entries(shown, colours), loc="upper left")
     left, foot = (0.2, 0.8) if spatial else (0.75, 0.5)  # inches

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from eigassign.chart.results import Chart, ChartDocument
+from eigassign.chart.results import Chart
 from eigassign.facts import capital
-from eigassign.output.documents import document, dumps
+from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
@@ -79,7 +79,7 @@ def write_chart(
 
     Every point in chart.json can be computed again from its parameters.
     """
-    data = f"{dumps(document(ChartDocument(**vars(chart)), may_lack=True))}\n".encode()
+    data = f"{dumps(results_document(chart, may_lack=True))}\n".encode()
     tone = "good" if any(a.key for a in chart.advice[:1]) else "fair"
     report.write_page(
         chart, chart_tables(chart), chart_figures(chart), folder, formats, kind,

@@ -79,6 +79,7 @@ def page(
     return page_of(
         "report.html.j2",
         f=f,
+        case=f.case,
         verdict=None if run is None else verdict_of(run),
         headline=line,
         tone=tone,

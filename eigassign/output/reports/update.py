@@ -1,62 +1,20 @@
-"""What an update leaves: its tables, for console and report; results.json; the report."""
+"""What an update leaves: its tables, for console and report; results.json, and the report."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from eigassign.assignment.exact.identification import POOR
-from eigassign.facts import Fact
-from eigassign.output import documents
-from eigassign.output.documents import OriginDocument, dumps
+from eigassign.output.documents import to_json
 from eigassign.output.figures.update import update_figures
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
-from eigassign.study.updating.fit import (
-    ExplainedMeasurement,
-    ExplainingMinimum,
-    FitRow,
-    UnidentifiedDirection,
-    UpdatedParameter,
-    UpdateResults,
-)
-
-Floats = NDArray[np.float64]
+from eigassign.study.updating.fit import UpdateResults
 
 SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 
-# --- The verdict and the tables
-
-
-def headline(results: UpdateResults) -> str:
-    """The verdict in a sentence: what the parameters are, and whether that explains anything."""
-    found = []
-    for row in results.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
-        unit, size = row.handy
-        value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
-        found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
-    of = results.fit
-    chance = "" if of.p_value is None else f", p = {of.p_value:.2g}"
-    fit = f"χ² = {of.chi_squared:.3g} with {of.degrees} degrees of freedom{chance}"
-    verdict = {
-        "fitted": f"Explained: the model fits the measurements ({fit})",
-        "poor_fit": f"NOT EXPLAINED: the measurements are farther off than their standard "
-        f"deviations allow ({fit}, below {POOR:g}), and the intervals do not hold",
-        "not_identified": f"NOT IDENTIFIED: {'; '.join(_why_not(results))} ({fit})",
-        "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
-    }[results.verdict]
-    return f"{verdict}. {', '.join(found)}."
-
-
-def _why_not(results: UpdateResults) -> Iterator[str]:
-    yield from (direction.words for direction in results.unidentified)
-    if len(results.minima) > 1:
-        yield f"{len(results.minima)} distinct sets of values explain the measurements"
+# --- The tables
 
 
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
@@ -129,42 +87,8 @@ def write_update(
     results: UpdateResults, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
 ) -> None:
     """Into ``folder``, which must exist: results.json, a report of this kind, figures."""
-    data, plans = f"{dumps(document(results))}\n".encode(), update_figures(results)
     report.write_page(
-        results, update_tables(results, None), plans, folder, formats, kind,
-        ("results.json", data), line=headline(results), headings=SECTIONS,
+        results, update_tables(results, None), update_figures(results), folder, formats, kind,
+        ("results.json", to_json(results)), line=results.headline, headings=SECTIONS,
         tone="good" if results.verdict == "fitted" else "bad",
     )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class UpdateDocument(OriginDocument):
-    """An update as its file of results has it."""
-
-    verdict: Annotated[str, Fact("fitted, poor_fit, not_identified or unfinished")]
-    headline: Annotated[str, Fact("the verdict in words")]
-    parameters: Mapping[str, UpdatedParameter]
-    covariance: Annotated[Floats, Fact("of the parameters, SI", may_lack=True)]
-    correlation: Annotated[Floats, Fact("of the parameters", may_lack=True)]
-    not_identified: Sequence[UnidentifiedDirection]
-    minima: Annotated[
-        Sequence[ExplainingMinimum], Fact("distinct ones that explain the measurements")
-    ]
-    fit: FitRow
-    measurements: Sequence[ExplainedMeasurement]
-    warnings: Sequence[str]
-    notes: Sequence[str]
-    timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
-
-
-def document(results: UpdateResults) -> dict[str, Any]:
-    """Plain values in a fixed order; what is not identified has no deviation (null)."""
-    made = documents.filled(
-        UpdateDocument,
-        documents.beginning(results),
-        results,
-        headline=headline(results),
-        parameters={row.name: row for row in results.parameters},
-        not_identified=results.unidentified,
-    )
-    return dict(documents.document(made))

@@ -59,7 +59,7 @@ def study_targets(
     """
     weights = time_weights(path)
     return tuple(
-        _studied(one, solved, curve, one.time_weights(weights), max_error)
+        _studied(one, solved, curve, one.time_weights(weights), max_error, path.time_s[one.rows])
         for one, curve in zip(wanted, predicted, strict=True)
     )
 
@@ -70,6 +70,7 @@ def _studied(
     predicted: Floats | None,
     weights: Floats,
     max_error: float,
+    time_s: Floats,
 ) -> TargetStudy:
     before, after, one_shot = solved.initial, solved.exact, solved.one_shot
     errors = {
@@ -81,6 +82,7 @@ def _studied(
     summary = _summary(errors, weights)
     return TargetStudy(
         asked=asked,
+        time_s=time_s,
         initial_hz=asked.curve(before),
         exact_hz=asked.curve(after),
         predicted_hz=predicted,

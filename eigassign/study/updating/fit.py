@@ -10,21 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from operator import itemgetter
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign._version import __version__
 from eigassign.assignment.exact.identification import (
+    POOR,
     Identified,
     MeasuredFrequencies,
     identify,
 )
 from eigassign.assignment.exact.sequential import PAYS, unseen
-from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy_unit
 from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
@@ -35,6 +33,7 @@ from eigassign.study.checks.accuracy import judged_poses
 from eigassign.study.checks.weight import study_weight
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.search.variants import spread_designs
+from eigassign.study.results import CaseRow, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
@@ -43,6 +42,7 @@ OUTLIER = 3.0  # standard deviations
 
 # --- Results
 
+Correlation = Annotated[Floats, Fact("of the parameters", name="correlation", may_lack=True)]
 Residual = Annotated[float, Fact("in standard deviations", digits="+.2f", name="residual")]
 Outlier = Annotated[
     bool,
@@ -137,29 +137,44 @@ class FitRow:
     ended: Annotated[str, Fact("how the steps did")]
 
 
-@dataclass(frozen=True, repr=False)
-class UpdateResults(Brief):
-    """The answer of updating a case."""
+@dataclass(frozen=True, repr=False, kw_only=True)
+class UpdateResults(Origin):
+    """An update; what is not identified has no deviation, and a covariance that is no number."""
 
-    title: str
-    author: str | None
-    reference: str | None
-    case_name: str
-    case_sha256: str
-    case_files: Mapping[str, str]
-    version: str
-    q_names: tuple[str, ...]
-    q_units: tuple[str, ...]
-    parameters: tuple[UpdatedParameter, ...]
-    covariance: Floats  # (n_y, n_y) in SI units; inf and NaN where not identified
-    measurements: tuple[ExplainedMeasurement, ...]
-    unidentified: tuple[UnidentifiedDirection, ...]
-    minima: tuple[ExplainingMinimum, ...]
+    verdict: Annotated[str, Fact("fitted, poor_fit, not_identified or unfinished")]
+    parameters: Annotated[tuple[UpdatedParameter, ...], Fact(by="name")]
+    covariance: Annotated[Floats, Fact("of the parameters, SI", may_lack=True)]  # (n_y, n_y)
+    unidentified: Annotated[tuple[UnidentifiedDirection, ...], Fact(name="not_identified")]
+    minima: Annotated[
+        tuple[ExplainingMinimum, ...], Fact("distinct ones that explain the measurements")
+    ]
     fit: FitRow
-    verdict: str  # fitted, poor_fit, not_identified, unfinished
-    notes: tuple[str, ...]
+    measurements: tuple[ExplainedMeasurement, ...]
     warnings: tuple[str, ...]
-    timing_s: Mapping[str, float]
+    notes: tuple[str, ...]
+    timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
+
+    @property
+    def headline(self) -> Annotated[str, Fact("the verdict in words", name="headline")]:
+        """The verdict in a sentence: the parameters, and whether they explain anything."""
+        found = []
+        for row in self.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
+            unit, size = row.handy
+            value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
+            found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
+        of, why = self.fit, [direction.words for direction in self.unidentified]
+        if len(self.minima) > 1:
+            why.append(f"{len(self.minima)} distinct sets of values explain the measurements")
+        chance = "" if of.p_value is None else f", p = {of.p_value:.2g}"
+        fit = f"χ² = {of.chi_squared:.3g} with {of.degrees} degrees of freedom{chance}"
+        verdict = {
+            "fitted": f"Explained: the model fits the measurements ({fit})",
+            "poor_fit": f"NOT EXPLAINED: the measurements are farther off than their standard "
+            f"deviations allow ({fit}, below {POOR:g}), and the intervals do not hold",
+            "not_identified": f"NOT IDENTIFIED: {'; '.join(why)} ({fit})",
+            "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
+        }[self.verdict]
+        return f"{verdict}. {', '.join(found)}."
 
     @property
     def design(self) -> dict[str, float]:
@@ -171,8 +186,8 @@ class UpdateResults(Brief):
         """Their 95 % intervals."""
         return {row.name: (row.low, row.high) for row in self.parameters}
 
-    @cached_property
-    def correlation(self) -> Floats:
+    @property
+    def correlation(self) -> Correlation:
         """(n_y, n_y); NaN of parameters that are held or not identified."""
         deviation = np.array([row.deviation or np.nan for row in self.parameters])
         return np.asarray(self.covariance / np.outer(deviation, deviation))
@@ -264,15 +279,7 @@ def collect_update(
     q, modes = judged_poses(problem.model, problem.q), {each.mode for each in problem.measured}
     weight = study_weight(case.file, problem.model, sorted(modes), q, found.y, "updated")
     return UpdateResults(
-        title=case.file.title,
-        author=case.file.author,
-        reference=case.file.reference,
-        case_name=case.file.path.stem.encode("utf-8", "replace").decode("utf-8"),
-        case_sha256=case.file.sha256,
-        case_files=case.file.files,
-        version=__version__,
-        q_names=problem.model.q_names,
-        q_units=case.file.q_units,
+        case=CaseRow.of(case.file),
         parameters=tuple(_parameters(problem, found, directions)),
         covariance=found.covariance,
         measurements=tuple(

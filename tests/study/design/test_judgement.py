@@ -18,7 +18,7 @@ def missed(kind: str, initial: ErrorRow, exact: ErrorRow) -> TargetStudy:
         rows=slice(0, 3), lower=hz, upper=hz, along=(("1", slice(0, 3)),),
     )  # fmt: skip
     return TargetStudy(
-        asked=asked, initial_hz=hz, exact_hz=hz, predicted_hz=None, one_shot_hz=None,
+        asked=asked, time_s=hz, initial_hz=hz, exact_hz=hz, predicted_hz=None, one_shot_hz=None,
         error=ErrorSummary(initial, exact), satisfied=False, weight_s=1.0, along=(),
     )  # fmt: skip
 
