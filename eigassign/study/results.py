@@ -440,7 +440,7 @@ class TargetStudy(Brief):
         return self.asked.modes
 
     @property
-    def shape(self) -> Annotated[FollowedRow | None, _said("followed", "by its shape", True)]:
+    def by_shape(self) -> Annotated[FollowedRow | None, _said("followed", "by its shape", True)]:
         """The first that is followed by its shape."""
         return next(iter(self.followed), None)
 
