@@ -147,7 +147,7 @@ def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
             told = {"refused": str(error)}
         else:
             q = np.vstack([choice.q0, *choice.more_q])
-            told = {"order": choice.order, "cluster_gap": choice.cluster_gap, "accuracy": accuracy}
+            told = {"order": choice.order, "accuracy": accuracy}
             told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
             name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
         build, key = partial(_expanded, bench, told, False), f"order: auto, accuracy: {accuracy:g}"
@@ -159,7 +159,7 @@ def _expanded(bench: Bench, told: Mapping[str, Any], inverse: bool) -> Built:
     if why := told.get("refused"):
         raise AccuracyError(why)
     pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
-    how = {key: told[key] for key in ("order", "linear_in_y", "cluster_gap") if key in told}
+    how = {key: told[key] for key in ("order", "linear_in_y") if key in told}
     points = zip(np.atleast_2d(told["q0"]), np.atleast_2d(told["y0"]), strict=True)
     parts = tuple(expand(pencil, q0, y0, modes, **how) for q0, y0 in points)
     return _answering(parts[0].inverse if inverse else NearestExpansion(parts), len(parts))

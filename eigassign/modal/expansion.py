@@ -291,36 +291,6 @@ def _frozen(a: Floats) -> Floats:
     return a
 
 
-# --- How far the series reaches: its radius of convergence, seen from the coefficients
-
-
-def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
-    """|w|/R (n_samples, n_clusters): below 1 the series converges at that sample.
-
-    At a displacement w the terms of one degree k sum up to t_k(w) ~ (|w|/R)^k, so that over two
-    degrees
-
-        |w| / R ≈ ( (|t_p| + |t_{p−1}|) / (|t_{p−2}| + |t_{p−3}|) )^{1/2} ;
-
-    pairs of degrees, for in a symmetric pose every other one vanishes. Above 1 more order only
-    harms. NaN below order 4, where nothing can be said.
-    """
-    w = expansion.local(q, y)
-    p, starts = expansion.order, expansion.space.degree_starts
-    if p < 4:
-        return np.full((len(w), len(expansion.clusters)), np.nan)
-    powers = monomials(expansion.space, w)
-    shares = []
-    for cluster in expansion.clusters:
-        size = []  # ‖t_k(w)‖ of the cluster's matrix for k = p, p − 1, p − 2, p − 3
-        for here in (slice(starts[k], starts[k + 1]) for k in range(p, p - 4, -1)):
-            size.append(_sizes(cluster, powers[:, here], here))
-        late, early = size[0] + size[1], size[2] + size[3]
-        tiny = np.finfo(float).eps * np.abs(cluster.coefficients[:, :, 0]).max()
-        shares.append(np.sqrt(np.maximum(late - tiny, 0.0) / np.maximum(early, tiny)))
-    return np.column_stack(shares)
-
-
 def _sizes(cluster: Cluster, powers: Floats, here: slice) -> Floats:
     """‖Σ Λ_γ w^γ‖ (n,) of some members γ of the set, from their w^γ (n, N)."""
     term = np.tensordot(powers, cluster.coefficients[:, :, here], axes=(1, 2))

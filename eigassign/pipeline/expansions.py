@@ -95,7 +95,6 @@ def _made(
     full, linear = (
         expand(
             *(model.pencil, plan.q0, plan.y0, plan.modes, order, linear_in_y),
-            cluster_gap=plan.cluster_gap,
             known=None if stored is None else stored_series(stored, k),
         )
         for k, (order, linear_in_y) in enumerate([(full_order, False), (plan.order, True)])
@@ -110,7 +109,7 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     all that does its arithmetic: where any of them differs, so may the last bit.
     """
     pencil = replace(model.pencil, rails=None, limits=None)  # which refuse, and change no number
-    point = (plan.q0, plan.y0, tuple(plan.modes), full_order, plan.order, plan.cluster_gap)
+    point = (plan.q0, plan.y0, tuple(plan.modes), full_order, plan.order)
     versions = (__version__, np.__version__, scipy.__version__)
     return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
 

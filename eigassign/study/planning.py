@@ -33,7 +33,6 @@ from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive_order import raise_order
 from eigassign.modal.arguments import spread
-from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.vectors import local_space
@@ -58,7 +57,6 @@ class Plan:
     modes: tuple[int, ...]
     notes: tuple[str, ...]
     more_q: tuple[tuple[float, ...], ...] = ()  # further expansion points along the trajectory
-    cluster_gap: float = CLUSTER_GAP  # modes closer than this (relative in λ) go together
 
 
 def plan_expansion(
@@ -345,7 +343,7 @@ def choose_order(
     modes: tuple[int, ...],
     needed: bool = True,
 ) -> Plan:
-    """Order and expansion points that meet the series' share, and which modes go together.
+    """Order and expansion points that meet the series' share.
 
     By exact solves between the samples and all over the bounds of the design. Raises AccuracyError,
     naming the pose, where no order and number of points will do; where they are not ``needed``, the
@@ -355,8 +353,7 @@ def choose_order(
         at = unseen(file, model, trajectory, q0[None], y0)
         require_little_truncation(file, model, at.x)
         found = raise_order(
-            *(model.pencil, at.x, series_share(file), modes),
-            start=np.concatenate([q0, y0]),
+            *(model.pencil, at.x, np.concatenate([q0, y0]), series_share(file), modes),
             place=at.place,
             most=np.inf if needed else GIVEN_UP,
         )
@@ -366,7 +363,7 @@ def choose_order(
         why = f"there is no expansion, and so no one-shot design: {error}"
         return Plan(q0, y0, 0, modes, (why,))
     more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
-    return Plan(q0, y0, found.order, modes, found.reasons, more_q, found.cluster_gap)
+    return Plan(q0, y0, found.order, modes, found.reasons, more_q)
 
 
 # --- Poses of the trajectory at designs all over their bounds

@@ -15,6 +15,6 @@ def test_the_order_is_at_least_one() -> None:
     case = BuiltCase(parse(TEXT.encode(), "case.yaml"))
     model = case.model()
     x = model.x(case.trajectory.q, case.initial_design)
-    chosen = raise_order(model.pencil, x, 1e-3)
+    chosen = raise_order(model.pencil, x, x[0], 1e-3)
     assert not model.pencil.active.any()
     assert chosen.order == 1
