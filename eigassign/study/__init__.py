@@ -46,9 +46,9 @@ __all__, __getattr__, __dir__ = face(
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",
         "planning": (
-            "Plan at_corners at_random automatic_elements central_sample corners joint_map "
-            "farthest mesh_share plan_expansion scattered series_share "
-            "truncation_share unseen with_middle_loads with_worse_designs"
+            "Plan at_corners automatic_elements central_sample corners joint_map "
+            "farthest plan_expansion scattered "
+            "unseen with_middle_loads"
         ),
         "results": (
             "ActiveRow AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "

@@ -1,9 +1,7 @@
 """What is expanded and about which points: the case's choices, with every ``auto`` settled.
 
-The accuracy asked for (``expansion.accuracy``) is shared between what is left to ``auto``. Elements
-left to auto get half of it, the series the rest. Where the elements are given, nothing can be done
-about the mesh: the series then gets all, against exact solves of this very mesh. Reduced links may
-use a quarter, out of the mesh's half if it has one. Everything is decided from error estimates, at
+The accuracy asked for (``expansion.accuracy``) is shared: the series may use half of it, reduced
+links a quarter, elements left to auto the rest. Everything is decided by finer computations, at
 poses of the trajectory and designs all over their bounds; the reasons are kept as lines of text.
 """
 
@@ -21,7 +19,6 @@ from scipy.linalg import hadamard
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import angle_unit, handy_unit
 from eigassign.errors import (
-    AccuracyError,
     CaseError,
     EigassignError,
     MechanismError,
@@ -32,7 +29,6 @@ from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive_order import raise_order
-from eigassign.modal.arguments import spread
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.vectors import local_space
@@ -234,11 +230,8 @@ ModesAt: TypeAlias = Callable[[Model, Floats], tuple[int, ...]]  # that matter a
 # --- The accuracy asked for, shared between mesh, reduced links and series
 
 ACCURACY = 1e-3  # where the case asks for auto and names none
-MESH = 0.5  # where a number of elements is left to auto
-TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
-# Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
-# these where they are large half a second
-POSES, FEW_POSES = 6, 2
+SERIES = 0.5
+TRUNCATION = 0.25  # where links are reduced; elements left to auto get the rest
 
 
 def asked_accuracy(file: CaseFile) -> float:
@@ -282,45 +275,10 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
 STANDS = 0.8  # of the load that buckles: nearer no mesh is fine enough
 
 
-def mesh_share(file: CaseFile) -> float:
-    """The part of the accuracy asked for that the mesh may use; 0 where it is given."""
-    return MESH * asked_accuracy(file) if None in automatic_elements(file).values() else 0.0
-
-
-def series_share(file: CaseFile) -> float:
-    """The part of the accuracy asked for that is left to the series."""
-    return asked_accuracy(file) - max(mesh_share(file), truncation_share(file))
-
-
-def automatic_reduction(file: CaseFile) -> tuple[str, ...]:
-    """The links with ``reduce_to: auto``."""
-    return tuple(n for n, f in _reduced_to(file).items() if isinstance(f, str))
-
-
-def _reduced_to(file: CaseFile) -> dict[str, float | str]:
+def reduced_to(file: CaseFile) -> dict[str, float | str]:
+    """What links are reduced to, of those that are: a frequency in Hz, or ``auto``."""
     wanted = {n: getattr(link, "reduce_to", None) for n, link in file.mechanism.links.items()}
     return {name: f for name, f in wanted.items() if f is not None}
-
-
-def truncation_share(file: CaseFile) -> float:
-    """The part of the accuracy asked for that reduced links may use; 0 without any."""
-    return TRUNCATION * asked_accuracy(file) if _reduced_to(file) else 0.0
-
-
-def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
-    """Raise AccuracyError where reduced links use more of the accuracy than their share."""
-    share, modes = truncation_share(file), wanted_modes(file)
-    if not model.is_reduced:
-        return
-    few = spread(x, POSES if model.whole.is_dense else FEW_POSES)
-    n_q = len(model.q_names)
-    worst = model.truncation_error(few[:, :n_q], few[:, n_q:], modes).max()
-    if worst > share:
-        stated = f"of {worst:.1e}" if np.isfinite(worst) else "that is not known"
-        raise AccuracyError(
-            f"the reduced links have an error {stated}, and may have {share:.1e} of the accuracy "
-            f"{asked_accuracy(file):.1e}: raise reduce_to, or write reduce_to: auto"
-        )
 
 
 # --- Order and expansion points left to auto
@@ -343,7 +301,7 @@ def choose_order(
     modes: tuple[int, ...],
     needed: bool = True,
 ) -> Plan:
-    """Order and expansion points that meet the series' share.
+    """Order and expansion points that meet the series' share of the accuracy.
 
     By exact solves between the samples and all over the bounds of the design. Raises AccuracyError,
     naming the pose, where no order and number of points will do; where they are not ``needed``, the
@@ -351,9 +309,8 @@ def choose_order(
     """
     try:
         at = unseen(file, model, trajectory, q0[None], y0)
-        require_little_truncation(file, model, at.x)
         found = raise_order(
-            *(model.pencil, at.x, np.concatenate([q0, y0]), series_share(file), modes),
+            *(model.pencil, at.x, np.concatenate([q0, y0]), SERIES * asked_accuracy(file), modes),
             place=at.place,
             most=np.inf if needed else GIVEN_UP,
         )
@@ -372,8 +329,6 @@ ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their
 SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
 SCATTERED = 128  # points between the samples and all over the bounds
 MOST_CORNERS = 64  # of the bounds, with so many poses in all
-SEED = 20211
-CLIMBERS = 8  # poses and designs from which worse designs are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -497,45 +452,6 @@ def scattered(
     end = start - start % n + np.minimum(start % n + 1, ends[start % n])
     between = q[start] + share[:, None] * (q[end] - q[start])
     return DesignSamples(np.hstack([between, y]), start % n + share * (end - start), trajectory)
-
-
-def at_random(
-    file: CaseFile, trajectory: Trajectories | None, q0: Floats, y0: Floats, count: int
-) -> DesignSamples:
-    """Random samples, half with designs anywhere within the bounds, half at corners."""
-    lower, upper = _bounds(file)
-    random = np.random.default_rng(SEED)
-    share = random.random((count, len(y0)))
-    share[count // 2 :] = share[count // 2 :] > 0.5
-    q = q0[None] if trajectory is None else travelled(file, trajectory)
-    rows = random.integers(0, len(q), count)
-    x = np.hstack([q[rows], lower + share * (upper - lower)])
-    at = rows % (1 if trajectory is None else len(trajectory.q))
-    return DesignSamples(x, at.astype(np.float64), trajectory)
-
-
-def with_worse_designs(
-    seen: DesignSamples, error: Callable[[Floats], Floats], file: CaseFile
-) -> tuple[DesignSamples, Floats]:
-    """``seen`` with designs that are worse than its worst, and the ``error`` at all, (n,).
-
-    From the `CLIMBERS` largest errors one parameter after the other goes to the bound at which the
-    error is larger, if it is.
-    """
-    errors = error(seen.x)
-    top = np.argsort(-errors, kind="stable")[:CLIMBERS]
-    x, most = seen.x[top], errors[top]
-    for column, ends in enumerate(
-        zip(*_bounds(file), strict=True), x.shape[1] - len(file.design.parameters)
-    ):
-        for end in ends:
-            moved = x.copy()
-            moved[:, column] = end
-            higher = error(moved)
-            better = higher > most
-            x[better], most[better] = moved[better], higher[better]
-    worse = replace(seen, x=x, samples=seen.samples[top])
-    return seen.joined(worse), np.append(errors, most)
 
 
 def travelled(file: CaseFile, trajectory: Trajectories) -> Floats:

@@ -32,26 +32,27 @@ from eigassign.modal.finer_meshes import standing_frequencies
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories
 from eigassign.study.planning import (
-    FEW_POSES,
-    POSES,
+    SERIES,
+    TRUNCATION,
     ModesAt,
+    asked_accuracy,
     at_corners,
-    at_random,
     automatic_elements,
-    automatic_reduction,
     corners,
     far_from_buckling,
-    mesh_share,
     modes_that_matter,
+    reduced_to,
+    scattered,
     standing,
-    truncation_share,
     with_middle_loads,
-    with_worse_designs,
 )
 
 Floats = NDArray[np.float64]
 
 
+# Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
+# these where they are large half a second
+POSES, FEW_POSES = 6, 2
 FEWEST, MAX_ELEMENTS = 2, 256  # of a link; with more round-off, which grows as n⁴, is larger
 LOOKS = 20, 60  # poses and designs that a mesh is chosen at, and confirmed at
 # Times the highest frequency that matters: where elements are chosen imported parts with
@@ -106,10 +107,10 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
 
     At poses of the initial design and corners of the bounds, then at more and at random designs.
     """
-    elements, parts = automatic_elements(file), automatic_reduction(file)
+    elements = automatic_elements(file)
     if None not in elements.values():
         return None
-    parts = tuple(name for name in parts if is_imported(file, name))
+    parts = [name for name in _left_to_auto(file) if is_imported(file, name)]
 
     def meshed(count: int, to_hz: float = LOWEST) -> Model:
         meshed = with_elements(file, {name: n or count for name, n in elements.items()})
@@ -127,9 +128,10 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
     seen, every = (
         at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends)))) for poses in LOOKS
     )
-    every = every.joined(at_random(file, path, q0, y, LOOKS[0])) if len(y) else every
+    every = every.joined(scattered(file, path, q0, LOOKS[0]))
     seen, every = standing(seen, trial), standing(every, trial)
-    accuracy, reasons, count = mesh_share(file) - truncation_share(file), list[str](), FEWEST
+    share = 1.0 - SERIES - TRUNCATION * bool(reduced_to(file))
+    accuracy, reasons, count = share * asked_accuracy(file), list[str](), FEWEST
     while True:
         model = meshed(count, beyond)
         lost = rounding_error(model.pencil, seen.x[0], max(modes_at(model, seen.x)))
@@ -141,7 +143,7 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
         judge = partial(_mesh_error, model, modes_at)
         errors = judge(seen.x)
         if errors.max() <= accuracy:
-            errors = with_worse_designs(every, judge, file)[1]
+            errors = judge(every.x)
         worst = float(errors.max())
         said = f"about {100.0 * worst:.2g} % too high" if worst < np.inf else "not resolved"
         reasons.append(f"{count} elements: {said}, at {len(errors)} poses and designs")
@@ -165,7 +167,7 @@ def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
     """Higher and higher frequencies to reduce to, until the error against whole links fits."""
-    names = automatic_reduction(file)
+    names = _left_to_auto(file)
     if not names:
         return None
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
@@ -192,10 +194,15 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
         hz = standing_frequencies(model.pencil, x, max(modes))
         worst = float(np.abs(hz / exact - 1.0)[:, pick].max())
         reasons.append(f"{tried}, {100 * worst:.2g} % too high")
-        if worst <= truncation_share(file):
+        if worst <= TRUNCATION * asked_accuracy(file):
             return ReductionChoice(to_hz, worst, tuple(reasons))
     reasons.append(f"not reduced, because it saves too little: {', '.join(names)}")
     return ReductionChoice(dict.fromkeys(names), 0.0, tuple(reasons))
+
+
+def _left_to_auto(file: CaseFile) -> list[str]:
+    """The links with ``reduce_to: auto``."""
+    return [name for name, frequency in reduced_to(file).items() if frequency == "auto"]
 
 
 def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
