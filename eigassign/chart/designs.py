@@ -19,14 +19,13 @@ from scipy.optimize import Bounds, LinearConstraint, differential_evolution, min
 from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.requirements.sampling import requirements_of
-from eigassign.chart.question import Effort, measure
+from eigassign.chart.question import SEED, Effort, measure
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.search.optimum import find_optimum
 from eigassign.study.design.search.variants import Task, variant_of
-from eigassign.study.planning import SEED
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]

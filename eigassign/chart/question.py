@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from eigassign.chart.results import Asked, Timing
 from eigassign.errors import CaseError
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.study.planning import SEED, at_corners, corners, joint_map, scattered
+from eigassign.study.planning import at_corners, corners, joint_map, scattered
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+SEED = 20211
 Ints = NDArray[np.intp]
 T = TypeVar("T")
 

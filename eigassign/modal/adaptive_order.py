@@ -1,8 +1,8 @@
 """Order and expansion points of the Taylor polynomial, doubled until they are accurate enough.
 
 Its errors are measured at samples that are given, which are solved exactly once. The order doubles
-as long as that lessens the largest error; then points of the same design are added where the best
-order errs most. A pose is answered by the nearest point.
+where that lessens the largest error, and else the points, all of the same design: each is joined by
+the pose that it answers worst. A pose is answered by the nearest point.
 """
 
 from __future__ import annotations
@@ -90,18 +90,20 @@ def raise_order(
         reasons.append(_line(found, place))
         return replace(found, reasons=tuple(reasons))
 
-    best = measured(orders[0], q0[None])
-    for order in orders[1:]:
-        if best.stated <= accuracy or (found := measured(order, q0[None])).stated >= best.stated:
-            break
-        best = found
-    found = best
-    while best.stated > accuracy and found.size <= most and len(found.parts) < MAX_POINTS:
+    best = found = measured(orders[0], q0[None])
+    while best.stated > accuracy and found.size <= most:
+        poses = [part.q0 for part in found.parts]
+        if higher := [p for p in orders if p > found.order]:
+            raised = measured(higher[0], poses)
+            best = min(best, raised, key=lambda one: one.stated)
+            if raised.stated < found.stated:
+                found = raised
+                continue
         owner, off = found.owner(q), found.error.max(axis=1)
-        each = [np.where(owner == k, off, -1.0).argmax() for k in range(len(found.parts))]
-        known = {part.q0.tobytes() for part in found.parts}
+        each = [np.where(owner == k, off, -1.0).argmax() for k in range(len(poses))]
+        known = {pose.tobytes() for pose in poses}
         further = [pose for pose in np.unique(q[each], axis=0) if pose.tobytes() not in known]
-        if not further:
+        if not further or len(poses) >= MAX_POINTS:
             break
         found = measured(found.order, further, found.parts)
         best = min(best, found, key=lambda one: one.stated)

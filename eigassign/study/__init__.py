@@ -29,7 +29,7 @@ __all__, __getattr__, __dir__ = face(
         "built_case": "BuiltCase load_case",
         "checks.expansions": "compare stated_error study_expansions unseen_points",
         "comparison": (
-            "BETWEEN COARSE DESIGN_BOX RANDOM_BOX TRAJECTORY box_points grid_over q_grid random_q "
+            "BETWEEN COARSE DESIGN_BOX TRAJECTORY grid_over q_grid "
             "reach_warnings study_modes validate_expansions"
         ),
         "design.answer": "Answer find_answer",

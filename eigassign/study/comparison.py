@@ -8,14 +8,10 @@ together they are what an assignment relies on:
 trajectory
     every sample of the trajectory, or of each of several, at the initial design;
 box of y at q0
-    all designs within their bounds at the expansion point: a grid with its corners for up to three
-    parameters, corners and seeded random designs beyond;
+    corners of the bounds, and designs all over them, at the expansion point;
 between samples
     corners of the bounds, and points between the samples of the trajectory and all over the bounds
-    (`checks.expansions`): the worst there is stated with its margin;
-box of q and y
-    with ``validation.q_span`` instead, seeded random points (``validation.samples`` of them): q0 ±
-    the span in the coordinates of the case, whatever poses that gives, and the bounds of y.
+    (`checks.expansions`): the worst there is stated with its margin.
 
 Errors are in frequency (Hz), relative; a point where a polynomial gives λ < 0 counts as infinitely
 wrong. Where the full set was too large for the order asked for, only the linearised error counts.
@@ -25,12 +21,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.model import Model
@@ -40,7 +35,15 @@ from eigassign.study.checks.expansions import (
     study_expansions,
     unseen_points,
 )
-from eigassign.study.planning import joint_map, travelled
+from eigassign.study.planning import (
+    MOST_CORNERS,
+    SCATTERED,
+    at_corners,
+    corners,
+    joint_map,
+    scattered,
+    travelled,
+)
 from eigassign.study.results import (
     Comparison,
     DesignMap,
@@ -216,11 +219,8 @@ def q_grid(scene: Scene) -> Grid | None:
 
 # --- Validation: is the expansion good enough
 
-TRAJECTORY, DESIGN_BOX, RANDOM_BOX = "trajectory", "box of y at q0", "box of q and y"
+TRAJECTORY, DESIGN_BOX = "trajectory", "box of y at q0"
 BETWEEN = "between samples, all over the bounds"
-SEED = 20211204  # any: the same points every time
-_GRID = {1: 61, 2: 13, 3: 7}  # points along each axis by the number of parameters
-_CORNERS = 256  # at most, of a box with many parameters
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ class Validation:
 def validate_expansions(scene: Scene) -> tuple[ValidationRow, ...]:
     """One row for each place and expanded mode.
 
-    Raises CaseError where there is nothing to look at: no trajectory, no design, no ``q_span``.
+    Raises CaseError where there is nothing to look at: no trajectory, no design.
     """
     rows = [
         _row(scene, k, where, comparison)
@@ -249,63 +249,25 @@ def validate_expansions(scene: Scene) -> tuple[ValidationRow, ...]:
         for k, comparison in enumerate(compare(scene.model, scene.expansions, x))
     ]
     if not rows:
-        message = "nothing to validate: give a trajectory, a design, or validation.q_span"
+        message = "nothing to validate: give a trajectory or a design"
         raise CaseError((scene.file.problem("validation", message),))
     return tuple(rows)
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     """The places of a validation, each with its points x (n, n_x)."""
-    model, random = scene.model, np.random.default_rng(SEED)
+    model, file = scene.model, scene.file
     if scene.trajectory is not None:
         for part in scene.trajectory.parts:
             where = f"{TRAJECTORY} {part.name!r}" if scene.trajectory.several else TRAJECTORY
             yield where, model.x(part.trajectory.q, scene.initial)
     lower, upper = scene.bounds
     if np.any(upper > lower):
-        y = box_points(lower, upper, scene.file.validation.samples, random)
-        yield DESIGN_BOX, model.x(scene.q0, y)
-    if scene.file.validation.q_span is not None:
-        q = random_q(scene, random)
-        yield RANDOM_BOX, model.x(q, random.uniform(lower, upper, (len(q), len(lower))))
-    elif scene.trajectory is not None:
+        ends = corners(len(lower), MOST_CORNERS)
+        outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)
+        yield DESIGN_BOX, outer.joined(scattered(file, None, scene.q0, SCATTERED)).x
+    if scene.trajectory is not None:
         yield BETWEEN, unseen_points(scene)
-
-
-def box_points(lower: Floats, upper: Floats, samples: int, random: np.random.Generator) -> Floats:
-    """Points (n, d) of a box that include its corners: a grid, or from four axes on at random."""
-    d = len(lower)
-    if d in _GRID:
-        unit = np.array(list(product(np.linspace(0.0, 1.0, _GRID[d]), repeat=d)))
-    else:
-        unit = np.vstack([_corners(d, random), random.random((samples, d))])
-    return np.asarray((1.0 - unit) * lower + unit * upper)
-
-
-def _corners(d: int, random: np.random.Generator) -> Floats:
-    """The corners of the unit box: all if they are few, else a random choice."""
-    if 2**d <= _CORNERS:
-        return np.array(list(product((0.0, 1.0), repeat=d)))
-    chosen = random.integers(0, 2, (_CORNERS, d)).astype(np.float64)
-    chosen[:2] = [[0.0], [1.0]]
-    return chosen
-
-
-def random_q(scene: Scene, random: np.random.Generator) -> Floats:
-    """Random poses (n, n_q) within ``validation.q_span`` of q0."""
-    n, q0 = scene.file.validation.samples, scene.q0
-    return np.asarray(q0 + random.uniform(-1.0, 1.0, (n, len(q0))) * _spans(scene.file))
-
-
-def _spans(file: CaseFile) -> Floats:
-    """Half-widths (n_q,) of the box in q; of a load half the range of its values."""
-    span = np.atleast_1d(np.array(file.validation.q_span, dtype=np.float64))
-    n = len(file.coordinates)
-    if len(span) not in (1, n):
-        message = f"{len(span)} values for {n} coordinates; give one, or one for each"
-        raise CaseError((file.problem("validation.q_span", message),))
-    of_loads = [0.5 * float(np.ptp(load.range)) for load in file.loads.values()]
-    return np.append(np.broadcast_to(span, (n,)), of_loads)
 
 
 def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:

@@ -39,7 +39,6 @@ VARIANTS = {
     "kept angle": edited(MOTION, MOTION + "  angle: 30 deg\n"),
     "angles": edited(MOTION, MOTION + "  angle: [30 deg, 1]\n"),
     "profile": edited("190 Hz", "{time: [0, 0.1, 1], frequency: [150, 160, 1 kHz]}"),
-    "span": edited("max_error: 2 %", "max_error: 0.1, q_span: [1 deg, 0]"),
     "point": edited("order: 4", "order: 7, q: [1, 2 deg], y: [3 g, 0.03]"),
     "position": edited("base: ground,", "base: ground, position: [1, -2 mm],"),
     "strange title": edited("title: Arm", r'title: "no: \"#{[ \\ ä 😀 1e3"'),

@@ -72,7 +72,7 @@ def test_where_one_point_cannot_do_several_share_the_trajectory(tmp_path: Path) 
 
 
 def test_python_is_handed_all_of_several_points(tmp_path: Path) -> None:
-    """The first point alone is right near it only, nearly 3 % off far from it."""
+    """The first point alone is right near it only, and farther off elsewhere than is asked."""
     text = (CASE.parent / "stress" / "wide_motion.yaml").read_text(encoding="utf-8")
     path = tmp_path / "several.yaml"
     path.write_text(
@@ -90,7 +90,7 @@ def test_python_is_handed_all_of_several_points(tmp_path: Path) -> None:
     np.testing.assert_allclose(result.expansion.frequencies(q, y)[:, 0], study.taylor_hz)
     np.testing.assert_allclose(result.linearised.frequencies(q, y)[:, 0], study.linearised_hz)
     first = result.expansion.parts[0].frequencies(q, y)[:, 0]
-    assert np.abs(first / study.exact_hz - 1.0).max() > 0.025
+    assert np.abs(first / study.exact_hz - 1.0).max() > 0.01
 
 
 def test_an_accuracy_out_of_reach_is_refused_with_the_reason(tmp_path: Path) -> None:

@@ -11,10 +11,7 @@ from eigassign.errors import CaseError
 from eigassign.study import (
     BETWEEN,
     DESIGN_BOX,
-    RANDOM_BOX,
     TRAJECTORY,
-    box_points,
-    random_q,
     reach_warnings,
     study_modes,
     unseen_points,
@@ -22,10 +19,6 @@ from eigassign.study import (
 )
 
 MODE_ONLY_AT_A_POINT = HEAD + "expansion: {q: [1.8, 5.2]}\n"
-
-
-def random() -> np.random.Generator:
-    return np.random.default_rng(7)
 
 
 def test_the_trajectory_row_is_the_exact_comparison_at_the_initial_design(tmp_path: Path) -> None:
@@ -69,33 +62,6 @@ def test_it_is_judged_at_corners_and_between_samples_all_over_the_bounds(tmp_pat
     assert others.max() <= scene.path.q.max()
 
 
-def test_a_span_is_a_box_around_the_expansion_point(tmp_path: Path) -> None:
-    text = changed(("max_error: 2 %", "max_error: 2 %\n  q_span: [0.1, 0.3]\n  samples: 300"))
-    q = random_q(scene_of(tmp_path, text), random())
-    assert q is not None
-    low, high = q.min(axis=0), q.max(axis=0)
-    assert q.shape == (300, 2)
-    np.testing.assert_allclose([low, high], [[1.717, 5.012], [1.917, 5.612]], atol=0.005)
-
-
-@pytest.mark.parametrize(("d", "points"), [(1, 61), (2, 169), (3, 343), (4, 216), (10, 456)])
-def test_a_box_holds_its_corners(d: int, points: int) -> None:
-    lower, upper = np.arange(d) - 5.0, np.arange(d) + 1.0
-    found = box_points(lower, upper, 200, random())
-    assert found.shape == (points, d)
-    assert np.all((found >= lower) & (found <= upper))
-    rows = {tuple(row) for row in found}
-    assert tuple(lower) in rows
-    assert tuple(upper) in rows
-    if d <= 4:
-        corners = {
-            row
-            for row in rows
-            if all(v in (a, b) for v, a, b in zip(row, lower, upper, strict=True))
-        }
-        assert len(corners) == 2**d
-
-
 def test_the_same_points_are_looked_at_every_time(tmp_path: Path) -> None:
     first, second = (validate_expansions(scene_of(tmp_path, SHIPPED)) for _ in range(2))
     assert first == second
@@ -109,14 +75,6 @@ def test_a_tolerance_that_is_not_met_fails_only_its_rows(tmp_path: Path) -> None
         DESIGN_BOX: True,
         BETWEEN: True,
     }
-
-
-def test_a_negative_eigenvalue_is_infinitely_wrong(tmp_path: Path) -> None:
-    text = changed(("max_error: 2 %", "max_error: 2 %\n  q_span: 1.5"))
-    row = validate_expansions(scene_of(tmp_path, text))[2]
-    assert (row.worst_taylor, row.worst_linearised) == (np.inf, np.inf)
-    assert (row.rms_taylor, row.rms_linearised) == (np.inf, np.inf)
-    assert not row.passed
 
 
 def test_every_expanded_mode_has_its_rows(tmp_path: Path) -> None:
@@ -156,14 +114,6 @@ design: {m: {parameter: bodies.tip.mass, min: 0, max: 0.1}}
 def test_where_there_is_nothing_to_look_at_that_is_said(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="validation: nothing to validate"):
         validate_expansions(scene_of(tmp_path, MODE_ONLY_AT_A_POINT))
-    spanned = MODE_ONLY_AT_A_POINT + "validation: {q_span: 0.1}\n"
-    assert [row.where for row in validate_expansions(scene_of(tmp_path, spanned))] == [RANDOM_BOX]
-
-
-def test_a_span_for_other_coordinates_is_refused(tmp_path: Path) -> None:
-    text = changed(("max_error: 2 %", "max_error: 2 %\n  q_span: [0.1, 0.3, 0.2]"))
-    with pytest.raises(CaseError, match="q_span"):
-        validate_expansions(scene_of(tmp_path, text))
 
 
 def test_auto_is_within_tolerance_as_the_papers_point_is(tmp_path: Path) -> None:

@@ -152,8 +152,7 @@ def coordinate_quantities(tree: Tree) -> list[Quantity]:
 
 def coordinate_lists(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
     """Key path and content of whatever has an entry for each coordinate, if it is a list."""
-    for place in (("expansion", "q"), ("validation", "q_span")):
-        yield place, at(tree, *place)
+    yield ("expansion", "q"), at(tree, "expansion", "q")
     for path, body in trajectories(tree):
         for key in ("q", "points"):
             yield from (((*path, key, k), row) for k, row in enumerate(entries(body, key)))

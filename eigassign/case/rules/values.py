@@ -140,10 +140,6 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
         yield from _of_deviation(at(body, "deviation"), ("measurements", k, "deviation"))
     path = ("measurements", "deviation")
     yield from _of_deviation(at(tree, *path), path)
-    span = at(tree, "validation", "q_span")
-    alike = len({kind.dimension for kind in kinds}) <= 1
-    common = (kinds[0] if kinds else ANY) if alike else None
-    yield ("validation", "q_span"), span, common
     yield from _of_assembly(tree)
     for name, body in items(tree, "coordinates"):
         for key in DRIVEN:

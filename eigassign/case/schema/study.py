@@ -11,13 +11,11 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from pydantic import Field, model_validator
 
 from eigassign.case.schema.design import Tolerance, YValue
-from eigassign.case.schema.mechanism import Q_VALUE
 from eigassign.case.schema.parts import (
     File,
     NumberOr,
     OneOrList,
     Part,
-    Quantity,
     ValueOr,
     quantity,
     wrong,
@@ -25,7 +23,6 @@ from eigassign.case.schema.parts import (
 from eigassign.case.schema.targets import Frequency, HighestTarget, Mode, Modes
 from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
 
-QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
 Auto: TypeAlias = Literal["auto"]
 Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
 MOST_MEASUREMENTS = 10_000  # of one case
@@ -127,15 +124,9 @@ class ValidationKeys(Part):
 
     Keys:
         max_error: how far an expansion may be from exact, relative in Hz
-        q_span: half-width of the box of q about the expansion point that is sampled at random; one
-            for all coordinates, or one for each. All over the bounds, between the samples, unless
-            given
-        samples: random points in that box
     """
 
     max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
-    q_span: OneOrList[QSpan, tuple[QSpan, ...]] | None = None
-    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 200
 
 
 class Measurement(Part):

@@ -155,10 +155,8 @@ STUDY = [
     Wrong("profile that ends early", "frequency: 190 Hz", "frequency: {¦time: [0, 0.5], frequency: [1, 2]}", "targets[0].frequency.time", "covers 0 … 0.5 s only; the trajectory lasts from 0 to 1 s"),
     Wrong("weightless target", "frequency: 190 Hz", "frequency: 190 Hz, ¦weight: 0", "targets[0].weight", "must be > 0"),
     Wrong("no tolerance", "max_error: 2 %", "¦max_error: 0 %", "validation.max_error", "must be > 0"),
-    Wrong("span of another length", "max_error: 2 %", "max_error: 2 %, ¦q_span: [1]", "validation.q_span", "needs 2 entries"),
     Wrong("measurement of no mode", "validation:", "measurements:\n  - ¦{time: 0, frequency: 1, deviation: 1}\nvalidation:", "measurements[0].mode", "required key is missing"),
     Wrong("range of a sweep without an end", "validation:", "sweep: {parameters: {¦title: {min: 1, count: 2}}}\nvalidation:", "sweep.parameters.title.max", "required key is missing"),
-    Wrong("negative span", "max_error: 2 %", "max_error: 2 %, ¦q_span: -1 deg", "validation.q_span", "must be >= 0"),
 ]
 MOTION = """\
   tip: hand.end

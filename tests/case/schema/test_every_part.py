@@ -49,7 +49,6 @@ def test_coordinates_that_slide_are_read_in_metres(tmp_path: Path) -> None:
     assert case.coordinates["place"].drive.inertia == 0.2
     assert case.trajectory.q == ((math.radians(10), 0.3), (math.radians(20), 0.4))
     assert case.expansion.q == (math.radians(15), 0.35)
-    assert case.validation.q_span == (math.radians(5), 0.05)
     assert [(p.min, p.max) for p in case.design.parameters.values()] == [
         (50.0, 200.0),
         (1.0, 3.0),
