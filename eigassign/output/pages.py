@@ -10,6 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eigassign.facts import number
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -51,7 +53,7 @@ def _environment() -> Environment:
         """Text with what stands between backticks as code, and no markup of its own."""
         return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
-    environment.filters["words"] = words
+    environment.filters |= {"words": words, "number": number}
     return environment
 
 

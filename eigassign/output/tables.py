@@ -39,6 +39,7 @@ from eigassign.study.results import (
 Floats = NDArray[np.float64]
 MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
+_RANGES = "label lowest_hz highest_hz error"
 STAGES = {  # of a run, as they are named in results.json
     "model": "assembly of K and M",
     "trajectory": "trajectory",
@@ -106,9 +107,9 @@ def _value(row: Any, name: str, one: Fact) -> Any:
 def run_tables(results: RunResults) -> tuple[Table, ...]:
     """What there is something to show of, section by section of `SECTIONS`."""
     made = (
-        replace(kind(results), section=section)
+        replace(table, section=section)
         for section, kinds in _KINDS.items()
-        for kind in kinds
+        for table in kinds(results)
     )
     return tuple(table for table in made if table.rows)
 
@@ -137,65 +138,49 @@ def headline(results: RunResults) -> str | None:
     return " ".join(said) or None
 
 
-def design(results: RunResults) -> Table:
+def _design(results: RunResults) -> Iterator[Table]:
     """Parameters before and after, what each lies on, was chosen or costs; the mass."""
-    active = results.assignment.active if results.assignment else ()
-    on = {limit.name: limit.side for limit in active if limit.kind == "bound"}
-    chosen = any(row.chosen for row in results.design)
-    columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
-    priced = results.price is not None
-    listed = any(row.choice_price is not None for row in results.design)
-    cost = "costs" if listed else "change costs"
-    more = [name for name, shown in (("lies on", on), ("choice", chosen), (cost, priced)) if shown]
-    rows = []
-    for row in results.design:
-        unit, size = row.handy
-        values = (row.initial, row.optimal, row.lower, row.upper)
-        rows.append(
-            (row.name, row.parameter, unit, *(number(value / size) for value in values),
-             *((on.get(row.name, ""),) if on else ()), *((row.chosen,) if chosen else ()),
-             *((number(row.cost),) if priced else ()))
-        )  # fmt: skip
-    if (mass := results.mass) is not None:
-        edges = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
-        both = (number(mass.initial), number(mass.optimal))
-        cells = ["" for _ in more]
-        if mass.price is not None:
-            cells[-1] = number(mass.cost)
-        own = "total mass" if any(row.name == "mass" for row in results.design) else "mass"
-        rows.append((own, "of all links and bodies", "kg", *both, *edges, *cells))
-    constraints = [limit.name for limit in active if limit.kind == "constraint"]
-    caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
-    if results.price is not None:
+    row, listed = results.assignment, any(r.choice_price is not None for r in results.design)
+    cost, price, caption = "costs" if listed else "change costs", results.price, ""
+    constraints = [one.name for one in row.active if one.kind == "constraint"] if row else []
+    if constraints:
+        caption = f"The constraint {', '.join(constraints)} is active."
+    if price is not None:
         what = "It" if listed else "The change"
-        caption = f"{what} costs {number(results.price)} in all. {caption}".strip()
-    return Table("Design", (*columns, *more), tuple(rows), caption)
+        caption = f"{what} costs {number(price)} in all. {caption}".strip()
+    names = "name parameter handy initial optimal lower upper lies_on chosen"
+    priced = " cost" * (price is not None)
+    made = facts_table("Design", results.design, names + priced, caption, cost=cost)
+    if results.design and (mass := results.mass) is not None:
+        named = any(each.name == "mass" for each in results.design)
+        own = {
+            "name": "total mass" if named else "mass",
+            "parameter": "of all links and bodies",
+            "unit": "kg",
+            "initial": number(mass.initial),
+            "optimal": number(mass.optimal),
+            "lower": "" if mass.lower is None else number(mass.lower),
+            "upper": "" if mass.upper is None else number(mass.upper),
+            cost: "" if mass.price is None else number(mass.cost),
+        }
+        made = replace(made, rows=(*made.rows, tuple(own.get(c, "") for c in made.columns)))
+    yield made
+    yield _combinations(results)
 
 
-def objective(results: RunResults) -> Table:
-    """What is to be light, high or wide, before and after."""
+def _requirements(results: RunResults) -> Iterator[Table]:
+    """What is to be light, high or wide; distances to wanted frequencies; limits and bands."""
     row = results.assignment
     caption = f"Along {results.along}, also between samples that are far apart."
     if row is not None and row.robust is not None and row.objective != "lightest":
         caption += " The least of all deviations that were searched."
-    rows = () if row is None or row.aim is None else (row.aim,)
-    return facts_table("Objective", rows, "label before after", caption)
+    aims = () if row is None or row.aim is None else (row.aim,)
+    yield facts_table("Objective", aims, "label before after", caption)
+    yield _errors(results)
+    yield _required(results)
 
 
-def _by_name(results: RunResults, y: Floats) -> Iterator[str]:
-    """The values of a design in these units."""
-    for row, value in zip(results.design, y, strict=True):
-        yield number(float(value) / row.handy[1])
-
-
-def _named(results: RunResults) -> Iterator[str]:
-    """The parameters with these units: ``wall [mm]``."""
-    for row in results.design:
-        unit = row.handy[0]
-        yield f"{row.name} [{unit}]" if unit else row.name
-
-
-def errors(results: RunResults) -> Table:
+def _errors(results: RunResults) -> Table:
     """Distance to the wanted frequencies before, as predicted, and exact, side by side."""
     kinds = _stages(results)
     columns = ("target", "error", *kinds)
@@ -219,7 +204,7 @@ def errors(results: RunResults) -> Table:
     return Table("Distance to the target", columns, tuple(rows), caption)
 
 
-def required(results: RunResults) -> Table:
+def _required(results: RunResults) -> Table:
     """Limits and bands: met, or violated by how much at worst, before and after; amounts."""
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
@@ -236,41 +221,6 @@ def required(results: RunResults) -> Table:
     return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
 
 
-def drives(results: RunResults) -> Table:
-    """What every drive exerts: its peak, where that is, and rms, before and after."""
-    rows = results.drives
-    of = rows[0].of if rows else ""
-    caption = f"Of {of}, along {results.along}, by rigid links; springs carry nothing."
-    names = "name handy initial.peak initial.rms optimal.peak optimal.at optimal.rms"
-    headings = {
-        f"{design}.{fact}": f"{fact} {when}"
-        for design, when in (("initial", "before"), ("optimal", "after"))
-        for fact in ("peak", "rms")
-    }
-    return facts_table(
-        "What the drives carry", rows, f"{names} limit", caption, name="coordinate", **headings
-    )
-
-
-def anatomy(results: RunResults) -> Table:
-    """The parts that modes of missed targets have their energies in."""
-    each = (row for one in results.meaning.anatomies for row in one.parts)
-    rows = [row for row in each if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
-    names = "mode part strain strain_largest kinetic kinetic_largest"
-    caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
-    caption += "the largest. The weight has a negative share of strain where it softens."
-    return facts_table("What the missed modes are", rows, names, caption)
-
-
-def helps(results: RunResults) -> Table:
-    """What properties that are no parameters do to the modes of missed targets."""
-    rows = [row for one in results.meaning.anatomies for row in one.properties[:MOST_HELPS]]
-    names = "mode property percent_per_percent percent_per_percent_largest"
-    caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
-    caption += "the coordinates unchanged. The most effective ones, by exact slopes."
-    return facts_table("What would help", rows, names, caption)
-
-
 def _met(satisfied: bool) -> str:
     return "met" if satisfied else "VIOLATED"
 
@@ -280,17 +230,7 @@ def violated(worst: float) -> str:
     return f"violated by {percent(worst)}" if worst > MET else "met"
 
 
-def clearances(results: RunResults) -> Table:
-    """Bands to keep out of: how many modes are below each, and whether that was checked."""
-    rows = results.assignment.clearances if results.assignment else ()
-    caption = (
-        "All modes, at every sample and between samples. Room is the distance to the nearest "
-        "edge, relative to the edge, after the error of the model is subtracted."
-    )
-    return facts_table("Clearance", rows, "label below room raised clear", caption)
-
-
-def combinations(results: RunResults) -> Table:
+def _combinations(results: RunResults) -> Table:
     """The best combinations of the catalogues, solved exactly."""
     row = results.assignment
     if row is None or row.catalogue is None:
@@ -324,23 +264,6 @@ def _choice(row: DesignRow | None, choice: str) -> str:
     return f"{number(float(choice) / size)} {unit}".rstrip()
 
 
-def optima(results: RunResults) -> Table:
-    """The distinct local optima, the best first; none of a single one."""
-    row = results.assignment
-    columns = ("optimum", "objective", "violation", *_named(results))
-    if row is None or row.catalogue is not None or len(row.local_optima) < 2:
-        return Table("Local optima", columns, ())
-    rows = tuple(
-        (str(k), number(each.objective), positive_percent(each.violation),
-         *_by_name(results, each.design))
-        for k, each in enumerate(row.local_optima, 1)
-    )  # fmt: skip
-    caption = f"Found from {row.starts} starts; the first is the answer."
-    if results.price is not None and row.objective != "lightest":
-        caption += " Objectives include prices."
-    return Table("Local optima", columns, rows, caption)
-
-
 def _stages(results: RunResults) -> tuple[str, ...]:
     """The designs whose distance is shown; the one shot where it is not the answer itself."""
     row = results.assignment
@@ -356,7 +279,29 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
     yield target.label, target.error
 
 
-def sensitivity(results: RunResults) -> Table:
+def _depends(results: RunResults) -> Iterator[Table]:
+    """Slopes; what more room gains; what missed modes are and would help; what can be reached."""
+    found = results.meaning
+    yield _sensitivity(results)
+    yield facts_table("Limits", found.relaxed, "words")
+    every = (row for one in found.anatomies for row in one.parts)
+    parts = [row for row in every if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
+    names = "mode part strain strain_largest kinetic kinetic_largest"
+    caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
+    caption += "the largest. The weight has a negative share of strain where it softens."
+    yield facts_table("What the missed modes are", parts, names, caption)
+    helps = [row for one in found.anatomies for row in one.properties[:MOST_HELPS]]
+    names = "mode property percent_per_percent percent_per_percent_largest"
+    caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
+    caption += "the coordinates unchanged. The most effective ones, by exact slopes."
+    yield facts_table("What would help", helps, names, caption)
+    caption = "All designs within the bounds, at any sample (proved)."
+    if any(row.how == "bounded" for row in found.reach):
+        caption += " Distances of two modes lie in between, but may not reach the ends."
+    yield facts_table("Reach", found.reach, _RANGES, caption, error="least error")
+
+
+def _sensitivity(results: RunResults) -> Table:
     """Slopes of the targeted frequencies at the answer."""
     columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
     units = {row.name: row.handy for row in results.design}
@@ -375,44 +320,79 @@ def sensitivity(results: RunResults) -> Table:
     return Table("Sensitivity", columns, tuple(rows), caption)
 
 
-def limits(results: RunResults) -> Table:
-    """Gains from a little more room at each limit that the answer lies on, to first order."""
-    return facts_table("Limits", results.meaning.relaxed, "words")
-
-
-def reach(results: RunResults) -> Table:
-    """The range of each target's curve within the bounds, over all samples."""
-    caption = "All designs within the bounds, at any sample (proved)."
-    if any(row.how == "bounded" for row in results.meaning.reach):
-        caption += " Distances of two modes lie in between, but may not reach the ends."
-    rows, names = results.meaning.reach, "label lowest_hz highest_hz error"
-    return facts_table("Reach", rows, names, caption, error="least error")
-
-
-def tolerance(results: RunResults) -> Table:
-    """The range of each target's curve while parameters deviate within their tolerances."""
-    found = results.meaning.tolerance
-    rows, names = () if found is None else found.targets, "label lowest_hz highest_hz error"
-    caption = "" if found is None else f"{capital(found.words)}."
-    return facts_table("Tolerance", rows, names, caption, error="worst error")
-
-
-def robust(results: RunResults) -> Table:
-    """What deviations do to the robust design and to the optimum without them; the cost."""
-    row = None if results.assignment is None else results.assignment.robust
-    if row is None:
-        return Table("Robust", (), ())
+def _robustness(results: RunResults) -> Iterator[Table]:
+    """Bands, with the modes below each; deviations of parameters; sag under the stated weight."""
+    row, found, weight = results.assignment, results.meaning.tolerance, results.weight
     caption = (
-        f"Missed at the worst deviation that a search found within the tolerances, and at the "
-        f"worst of {row.draws} random ones; of what is as high or wide as can be, what it is short "
-        "of the robust design's. Alone: the optimum without deviations. From alone to "
-        f"robust: {row.words}."
+        "All modes, at every sample and between samples. Room is the distance to the nearest "
+        "edge, relative to the edge, after the error of the model is subtracted."
     )
-    names = "label handy nominal robust nominal_worst worst drawn"
-    return facts_table("Robust", row.targets, names, caption)
+    bands = () if row is None else row.clearances
+    yield facts_table("Clearance", bands, "label below room raised clear", caption)
+    if found is not None:
+        caption = f"{capital(found.words)}."
+        yield facts_table("Tolerance", found.targets, _RANGES, caption, error="worst error")
+    if row is not None and (robust := row.robust) is not None:
+        caption = (
+            "Missed at the worst deviation that a search found within the tolerances, and at the "
+            f"worst of {robust.draws} random ones; of what is as high or wide as can be, what it "
+            "is short of the robust design's. Alone: the optimum without deviations. From alone "
+            f"to robust: {robust.words}."
+        )
+        names = "label handy nominal robust nominal_worst worst drawn"
+        yield facts_table("Robust", robust.targets, names, caption)
+    if weight is not None:
+        where = f"over {weight.poses} poses of the {weight.design} design"
+        caption = f"The largest sag of each, {where}"
+        if weight.buckling is not None:
+            caption += f"; the weight is at most {percent(weight.buckling)} of the buckling load"
+        far = [node for node in weight.sag if node.most][:SAGGING]
+        yield facts_table("Sag under the weight", far, "node sag most", f"{caption}.")
 
 
-def approximation(results: RunResults) -> Table:
+def _motion(results: RunResults) -> Iterator[Table]:
+    """What every drive exerts: its peak, where that is, and rms, before and after."""
+    rows = results.drives
+    of = rows[0].of if rows else ""
+    caption = f"Of {of}, along {results.along}, by rigid links; springs carry nothing."
+    names = "name handy initial.peak initial.rms optimal.peak optimal.at optimal.rms limit"
+    headings = {
+        f"{design}.{fact}": f"{fact} {when}"
+        for design, when in (("initial", "before"), ("optimal", "after"))
+        for fact in ("peak", "rms")
+    }
+    headings["name"] = "coordinate"
+    yield facts_table("What the drives carry", rows, names, caption, **headings)
+
+
+def _appendix(results: RunResults) -> Iterator[Table]:
+    """Distinct optima, the best first; expansions; the one shot's certificate; time by stage."""
+    row = results.assignment
+    if row is not None and row.catalogue is None and len(row.local_optima) > 1:
+        named = [(one.name, *one.handy) for one in results.design]
+        optima = tuple(
+            (
+                *(str(k), number(one.objective), positive_percent(one.violation)),
+                *(number(x / size) for x, (*_, size) in zip(one.design, named, strict=True)),
+            )
+            for k, one in enumerate(row.local_optima, 1)
+        )
+        columns = [f"{name} [{unit}]" if unit else name for name, unit, _ in named]
+        caption = f"Found from {row.starts} starts; the first is the answer."
+        if results.price is not None and row.objective != "lightest":
+            caption += " Objectives include prices."
+        columns = ["optimum", "objective", "violation", *columns]
+        yield Table("Local optima", tuple(columns), optima, caption)
+    yield _approximation(results)
+    solver = () if results.solver is None else (results.solver,)
+    names = "status iterations primal_residual dual_residual gap"
+    caption = "Residuals, computed again from the data of the scaled program."
+    yield facts_table("Solver", solver, names, caption)
+    spent = tuple((STAGES.get(k, k), seconds(value)) for k, value in results.timing_s.items())
+    yield Table("Timing", ("stage", "time"), spent)
+
+
+def _approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and over maps."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error of the frequency, against exact solves."
@@ -434,33 +414,6 @@ def approximation(results: RunResults) -> Table:
     return Table("Approximation", columns, tuple(rows), caption)
 
 
-def solver(results: RunResults) -> Table:
-    """The solver's status, and the residuals of its answer, recomputed from the data."""
-    rows = () if results.solver is None else (results.solver,)
-    names = "status iterations primal_residual dual_residual gap"
-    caption = "Residuals, computed again from the data of the scaled program."
-    return facts_table("Solver", rows, names, caption)
-
-
-def timing(results: RunResults) -> Table:
-    """Time by stage."""
-    rows = tuple((STAGES.get(k, k), seconds(value)) for k, value in results.timing_s.items())
-    return Table("Timing", ("stage", "time"), rows)
-
-
-def weight(results: RunResults) -> Table:
-    """The nodes that the stated weight moves most, and how near it is to buckling."""
-    found = results.weight
-    if found is None or not found.sag:
-        return Table("Weight", (), ())
-    rows = [row for row in found.sag if row.most][:SAGGING]
-    where = f"over {found.poses} poses of the {found.design} design"
-    caption = f"The largest sag of each, {where}"
-    if found.buckling is not None:
-        caption += f"; the weight is at most {percent(found.buckling)} of the buckling load"
-    return facts_table("Sag under the weight", rows, "node sag most", f"{caption}.")
-
-
 SECTIONS = {  # of a page, with their headings; what is in none is in the appendix
     "requirements": "Requirements",
     "design": "Design",
@@ -468,13 +421,13 @@ SECTIONS = {  # of a page, with their headings; what is in none is in the append
     "robustness": "Robustness",
     "motion": "Motion",
 }
-_KINDS: dict[str, tuple[Callable[[RunResults], Table], ...]] = {
-    "design": (design, combinations),
-    "requirements": (objective, errors, required),
-    "depends": (sensitivity, limits, anatomy, helps, reach),
-    "robustness": (clearances, tolerance, robust, weight),
-    "motion": (drives,),
-    "appendix": (optima, approximation, solver, timing),
+_KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
+    "design": _design,
+    "requirements": _requirements,
+    "depends": _depends,
+    "robustness": _robustness,
+    "motion": _motion,
+    "appendix": _appendix,
 }
 
 

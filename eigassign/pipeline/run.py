@@ -98,9 +98,11 @@ class Result(Pictured):
         return f"<Result: {design}. {tables.headline(self.results)}>"
 
     def _repr_html_(self) -> str:
-        shown = (tables.design, tables.errors, tables.required)
-        lines = [tables.headline(self.results) or ""]
-        return html(lines, [made(self.results) for made in shown], self.plan())
+        lines, made = [tables.headline(self.results) or ""], tables.run_tables(self.results)
+        shown = [table for table in made if table.section == "requirements"]
+        return html(
+            lines, [table for table in made if table.title == "Design"] + shown, self.plan()
+        )
 
     def plans(self) -> dict[str, FigurePlan]:
         """The figures of the report; that of the first target along the trajectory is the first."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -127,8 +127,10 @@ def _answer(
         *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
         *(accuracy.mesh, accuracy.weight.row, motion, meaning.unreachable, assigned.bound),
     )
+    rows = design_rows(scene, answer.y)
+    on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}
     return {
-        "design": design_rows(scene, answer.y),
+        "design": tuple(replace(one, lies_on=on.get(one.name, "")) for one in rows),
         "targets": targets,
         "others": _others(scene, assigned),
         "spectrum": _spectrum(assigned),

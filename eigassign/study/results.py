@@ -214,6 +214,7 @@ class DesignRow:
     price: Annotated[float | None, Fact("of one SI unit")] = None
     choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
     in_degrees: Unwritten[bool] = False  # people read angles so
+    lies_on: Unwritten[str] = ""  # which of its bounds
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
@@ -222,13 +223,18 @@ class DesignRow:
             return angle_unit(self.unit, self.in_degrees)
         return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 
+    def place(self, value: float) -> float:
+        """Where a value is between its bounds, in % of the way from lower to upper."""
+        way = (value - self.lower) / (self.upper - self.lower or 1.0)
+        return round(100.0 * min(max(way, 0.0), 1.0), 2)
+
     @property
-    def chosen(self) -> str:
+    def chosen(self) -> Annotated[str, Fact(heading="choice")]:
         """The name of what was chosen; empty for a value, which stands for itself."""
         return "" if self.choice is None or is_bare(self.choice) else self.choice
 
     @property
-    def cost(self) -> float:
+    def cost(self) -> Annotated[float, Fact(digits=number)]:
         """Price of the change, or of the choice; 0 without a price."""
         change = (self.price or 0.0) * (self.optimal - self.initial)
         return change + (self.choice_price or 0.0)

@@ -19,19 +19,6 @@ TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 
 
 @dataclass(frozen=True)
-class Bar:
-    """A parameter between its bounds; places are shares of the way from lower to upper."""
-
-    name: str
-    before: str
-    after: str
-    unit: str
-    ends: tuple[str, str]
-    start: float
-    end: float
-
-
-@dataclass(frozen=True)
 class Finding:
     """One target before and after, in words, in a tone, and what else there is to say of it."""
 
@@ -51,7 +38,6 @@ class FirstScreen:
     sentence: str  # what follows the word in the headline
     helps: tuple[str, ...]  # where a target is missed
     findings: tuple[Finding, ...]
-    bars: tuple[Bar, ...]
     cost: tuple[str, ...]
     trust: tuple[str, ...]
 
@@ -74,7 +60,6 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
         sentence=sentence,
         helps=tuple(_helps(results)),
         findings=tuple(findings[:MOST]),
-        bars=tuple(_bars(results)),
         cost=tuple(_cost(results)),
         trust=tuple(_trust(results)),
     )
@@ -166,24 +151,6 @@ def _trust(results: RunResults) -> Iterator[str]:
     found = results.meaning.tolerance
     if found is not None:
         yield f"{capital(found.words)}."
-
-
-def _bars(results: RunResults) -> Iterator[Bar]:
-    for row in results.design:
-        width = row.upper - row.lower or 1.0
-        unit, size = row.handy
-        start, end = (
-            min(max((value - row.lower) / width, 0.0), 1.0) for value in (row.initial, row.optimal)
-        )
-        yield Bar(
-            row.name,
-            number(row.initial / size),
-            number(row.optimal / size),
-            f"{unit} ({row.chosen})" if row.chosen else unit,
-            (number(row.lower / size), number(row.upper / size)),
-            round(100.0 * start, 2),
-            round(100.0 * end, 2),
-        )
 
 
 def _cost(results: RunResults) -> Iterator[str]:
