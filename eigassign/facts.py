@@ -167,6 +167,7 @@ T = TypeVar("T")
 Unwritten = Annotated[T, Fact(unwritten=True)]
 Key = Unwritten[str]
 Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
+Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 Hertz = Annotated[float, Fact(unit="Hz", digits=number)]
 Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]
 Residual = Annotated[float, Fact(digits=lambda left: f"{left:.1e}" if left else "0")]

@@ -17,11 +17,11 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "assign": "Assignment Certificate best_candidate judge solve_assignment",
+        "assign": "ActiveLimit Assignment Certificate best_candidate judge solve_assignment",
         "exact.design_problem": "Appraisal Cost DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Requirements Tolerances with_scenarios",
-        "exact.sequential": "End Optimum Tally minimise with_end",
+        "exact.sequential": "End Optimum StepRecord Tally minimise with_end",
         "exact.design_point": "first_order",
         "program": "Bounds ProgramAnswer build_program scaled_program unscaled",
         "requirements.kinds": (

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,7 @@ from eigassign.assignment.program import (
 from eigassign.assignment.solver import solve_program
 from eigassign.brief import Brief
 from eigassign.errors import AccuracyError
+from eigassign.facts import Fact
 
 ACCEPT = 1e-8  # ten times the tolerance that OSQP is asked for
 ROUNDING = 4.0 * np.finfo(np.float64).eps  # of sums: a few units in the last place
@@ -128,9 +130,9 @@ class ActiveLimit:
     """
 
     name: str
-    kind: str  # "bound" | "constraint"
-    side: str  # "lower" | "upper"
-    multiplier: float
+    kind: Annotated[str, Fact("bound, constraint or target")]
+    side: Annotated[str, Fact("lower or upper")]
+    multiplier: Annotated[float, Fact("fall of the objective for each SI unit of relaxation")]
 
 
 @dataclass(frozen=True, repr=False)

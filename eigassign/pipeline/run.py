@@ -32,7 +32,7 @@ from eigassign.pipeline.expansions import coefficient_files, expand_plan
 from eigassign.pipeline.stages import Stages, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks.accuracy import study_accuracy, truncation_notes, weight_at
-from eigassign.study.collect import VerifiedAssignment, collect_results
+from eigassign.study.collect import collect_results
 from eigassign.study.comparison import (
     TRAJECTORY,
     Validation,
@@ -40,6 +40,7 @@ from eigassign.study.comparison import (
     study_modes,
     validate_expansions,
 )
+from eigassign.study.design.account import VerifiedAssignment
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.conclusions import proof
 from eigassign.study.design.followed import followers, solve_design

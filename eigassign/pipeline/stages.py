@@ -176,7 +176,7 @@ def _assignment_lines(row: AssignmentRow) -> Iterator[str]:
     yield f"verdict   {row.verdict}: {row.reason}"
     yield f"method    {row.method}, {row.objective}: {row.optimality.words}"
     for k, step in enumerate(row.steps, 1):
-        design = ", ".join(f"{value:.9g}" for value in step.design)
+        design = ", ".join(f"{value:.9g}" for value in step.y)
         kept = "taken" if step.taken else "given up"
         yield (
             f"step      {k}: objective {step.objective:.9g}, violation {step.violation:.3g}, "

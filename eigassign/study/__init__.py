@@ -51,10 +51,10 @@ __all__, __getattr__, __dir__ = face(
             "unseen with_middle_loads"
         ),
         "results": (
-            "ActiveRow AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
+            "AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
             "Comparison DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
-            "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "
+            "OtherModes RangeRow RunResults SensitivityRow SolverRow TargetAlong "
             "TargetStudy ToleranceRows TrajectoryRow ValidationRow"
         ),
         "scene": "Scene",

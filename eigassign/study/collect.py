@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import TrajectoryError
@@ -17,10 +16,8 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks.accuracy import Accuracy
 from eigassign.study.checks.slow_motion import MotionStudy, study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
-from eigassign.study.design.account import assignment_row, limit_notes
-from eigassign.study.design.answer import Answer
+from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
 from eigassign.study.design.judgement import (
-    SolvedDesigns,
     crossing_warnings,
     far_off,
     judged_modes,
@@ -38,9 +35,7 @@ from eigassign.study.results import (
     DriveLoad,
     DriveRow,
     MassRow,
-    Meaning,
     Motion,
-    OptimalityRow,
     OtherModes,
     RunResults,
     StaticRow,
@@ -53,18 +48,6 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13  # of the weight, or of the largest load: what a level direction leaves of it
-
-
-@dataclass(frozen=True)
-class VerifiedAssignment:
-    """An answer with exact frequencies before and after."""
-
-    answer: Answer
-    wanted: tuple[Requirement, ...]
-    targets: tuple[TargetStudy, ...]
-    solved: SolvedDesigns
-    meaning: Meaning
-    bound: OptimalityRow | None = None
 
 
 def collect_results(
@@ -123,10 +106,7 @@ def _answer(
 ) -> dict[str, Any]:
     """The fields of results that an answer has."""
     answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
-    row = assignment_row(
-        *(scene, answer, assigned.wanted, targets, assigned.solved.exact),
-        *(accuracy.mesh, accuracy.weight.row, motion, meaning.unreachable, assigned.bound),
-    )
+    row = assignment_row(scene, assigned, accuracy, motion)
     rows = design_rows(scene, answer.y)
     on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}
     return {

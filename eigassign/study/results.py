@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
+from eigassign.assignment.assign import ActiveLimit
+from eigassign.assignment.exact.sequential import StepRecord
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
@@ -33,6 +35,7 @@ from eigassign.facts import (
     Seconds,
     Share,
     Unwritten,
+    Violation,
     about,
     number,
     percent,
@@ -54,7 +57,6 @@ EnergyShare = Annotated[
     float, Fact(unit="fraction", digits=lambda s: f"{round(100 * s, 1) + 0.0:g} %", says_unit=True)
 ]
 PerCent = Annotated[float, Fact(unit="% per %", digits=".3g")]
-Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
 
 def frozen(array: Floats) -> Floats:
@@ -526,33 +528,12 @@ class OptimalityRow:
 
 
 @dataclass(frozen=True)
-class StepRow:
-    """One step of the sequential method: design (n_y,), objective, violation, and whether taken."""
-
-    design: Floats
-    objective: float
-    violation: Violation
-    radius: Annotated[float, Fact("of the trust region", unit="widths of the bounds")]
-    taken: bool
-
-
-@dataclass(frozen=True)
 class LocalOptimum:
     """One of the distinct local optima found; objective as `AssignmentRow.objective` is."""
 
     design: Floats
     objective: float
     violation: Violation
-
-
-@dataclass(frozen=True)
-class ActiveRow:
-    """A limit that the answer lies on, and what relaxing it gains."""
-
-    name: str
-    kind: Annotated[str, Fact("bound, constraint or target")]
-    side: Annotated[str, Fact("lower or upper")]
-    multiplier: Annotated[float, Fact("fall of the objective for each SI unit of relaxation")]
 
 
 @dataclass(frozen=True)
@@ -747,7 +728,7 @@ class RobustRow(Brief):
         return ", ".join(" → ".join(pair) for pair in pairs)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, kw_only=True)
 class AssignmentRow(Brief):
     """How the answer was found and what it is worth.
 
@@ -763,17 +744,17 @@ class AssignmentRow(Brief):
     optimality: OptimalityRow
     verdict: Annotated[str, Fact("reached, improved, unreachable, infeasible or do_not_use")]
     reason: Annotated[str, Fact("the verdict in a sentence")]
-    steps: Annotated[tuple[StepRow, ...], Fact("every design tried from the best start")]
-    starts: Annotated[int, Fact("how many designs a search began at")]
-    local_optima: Annotated[tuple[LocalOptimum, ...], Fact("distinct ones, the best first")]
-    exact_solves: int
-    ended: Annotated[str, Fact("how the search did")]
-    finished: bool
-    active: Annotated[tuple[ActiveRow, ...], Fact("limits that the answer lies on")]
+    steps: Annotated[tuple[StepRecord, ...], Fact("every design tried from the best start")] = ()
+    starts: Annotated[int, Fact("how many designs a search began at")] = 0
+    local_optima: Annotated[tuple[LocalOptimum, ...], Fact("distinct ones, the best first")] = ()
+    exact_solves: int = 0
+    ended: Annotated[str, Fact("how the search did")] = "one program"
+    finished: bool = True
+    active: Annotated[tuple[ActiveLimit, ...], Fact("limits that the answer lies on")]
     one_shot: Annotated[Floats | None, Fact("the paper's design")]
     max_error: Annotated[Share, Fact("the largest error that is accepted")]
     max_error_given: Annotated[bool, Fact("the case says so")]
-    clearances: Annotated[tuple[ClearanceRow, ...], Fact("of bands to keep out of")]
+    clearances: Annotated[tuple[ClearanceRow, ...], Fact("of bands to keep out of")] = ()
     model_error: Annotated[Share | None, Fact("how much too high mesh and reduced links are")]
     conflict: Annotated[tuple[str, ...], Fact("limits that contradict each other")] = ()
     catalogue: CatalogueRow | None = None

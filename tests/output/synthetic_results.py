@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import KINDS
+from eigassign.assignment import KINDS, ActiveLimit, StepRecord
 from eigassign.study import (
-    ActiveRow,
     AssignmentRow,
     CaseRow,
     Comparison,
@@ -31,7 +30,6 @@ from eigassign.study import (
     RunResults,
     SensitivityRow,
     SolverRow,
-    StepRow,
     TargetAlong,
     TargetStudy,
     ToleranceRows,
@@ -285,7 +283,7 @@ def _assignment(n_y: int, prefix: str) -> AssignmentRow:
     designs = [np.full(n_y, at) for at in (0.1, 0.2, 0.21)]
     values = (4e-3, 1e-4, 9e-5)
     steps = tuple(
-        StepRow(y, value, 0.0, 0.3, taken)
+        StepRecord(y, value, 0.0, 0.3, 0.0, taken)
         for y, value, taken in zip(designs, values, (True, False, True), strict=True)
     )
     return AssignmentRow(
@@ -305,7 +303,7 @@ def _assignment(n_y: int, prefix: str) -> AssignmentRow:
         exact_solves=608,
         ended="first-order optimal",
         finished=True,
-        active=(ActiveRow(f"{prefix}m2", "bound", "lower", 0.01),) if n_y > 1 else (),
+        active=(ActiveLimit(f"{prefix}m2", "bound", "lower", 0.01),) if n_y > 1 else (),
         one_shot=np.full(n_y, 0.2),
         max_error=0.02,
         max_error_given=False,

@@ -25,6 +25,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from time import monotonic
+from typing import Annotated
 
 import numpy as np
 
@@ -42,6 +43,7 @@ from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion,
 from eigassign.assignment.inputs import Floats, frozen
 from eigassign.assignment.program import SNAP
 from eigassign.errors import EigassignError
+from eigassign.facts import Fact, Unwritten, Violation
 
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds
 TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doubled
@@ -68,11 +70,11 @@ class End(StrEnum):
 class StepRecord:
     """One program: the design it led to, what that is worth, and whether it was taken."""
 
-    y: Floats
+    y: Annotated[Floats, Fact(name="design")]
     objective: float
-    violation: float
-    radius: float  # of the bounds
-    promised: float  # fall of the merit
+    violation: Violation
+    radius: Annotated[float, Fact("of the trust region", unit="widths of the bounds")]
+    promised: Unwritten[float]  # fall of the merit
     taken: bool
 
 
@@ -195,7 +197,7 @@ class _Run:
         at, radius = place if reached is None else reached, self.region.radius
         length = float(np.abs(move.d).max(initial=0.0))
         y = frozen(self.box.y(at.z))
-        step = StepRecord(y, at.value, at.seen.violation, radius, move.promised, taken)
+        step = StepRecord(y, at.value, at.seen.violation, radius, move.promised, bool(taken))
         self.steps.append(step)
         if reached is None or not taken:
             radius = 0.25 * min(length, radius)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.listed import KEEP
@@ -15,30 +16,28 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
+from eigassign.study.checks.accuracy import Accuracy
 from eigassign.study.checks.mesh import finer, model_errors, raised_by
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.checks.weight import weight_doubt
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
-from eigassign.study.design.conclusions import aim_row, extreme, is_proved
-from eigassign.study.design.judgement import judged_modes
+from eigassign.study.design.conclusions import Conflict, aim_row, extreme, is_proved
+from eigassign.study.design.judgement import SolvedDesigns, judged_modes
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found, Outcome
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
-    ActiveRow,
     AssignmentRow,
     CatalogueRow,
     CombinationRow,
     LimitRow,
     LocalOptimum,
-    MeshError,
+    Meaning,
     OptimalityRow,
     RobustRow,
-    StepRow,
     TargetStudy,
     ViolationRow,
-    WeightRow,
     worst_violation,
 )
 from eigassign.study.scene import Scene
@@ -50,80 +49,48 @@ CROSSED = 0.9  # of a gap, missed where both modes go through each other
 UNTRUSTED = "the error of the expansion is above validation.max_error"
 
 
-def assignment_row(
-    scene: Scene,
-    answer: Answer,
-    wanted: Sequence[Requirement],
-    targets: Sequence[TargetStudy],
-    exact: Solved,
-    mesh: MeshError | None,
-    weight: WeightRow | None,
-    motion: MotionStudy | None,
-    unreachable: Sequence[str] = (),
-    bound: OptimalityRow | None = None,
-) -> AssignmentRow:
-    """How the answer was found and what it is worth, as plain numbers.
+@dataclass(frozen=True)
+class VerifiedAssignment:
+    """An answer with exact frequencies before and after, and what it means."""
 
-    ``exact`` are its frequencies, ``mesh`` is the mesh's error there and ``weight`` what gravity
-    changes that is not in them; ``unreachable`` says in words which targets are out of reach within
-    the bounds, ``bound`` what is proved of the optimum.
-    """
-    keys, found = scene.file.assignment, answer.found
-    accepted = scene.file.validation.max_error
-    # The exact optimum rests on exact frequencies, the one shot on its prediction.
-    trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
-    clearances = () if found is None else found.clearances
-    limits = tuple(_limits(scene, answer.y))
+    answer: Answer
+    wanted: tuple[Requirement, ...]
+    targets: tuple[TargetStudy, ...]
+    solved: SolvedDesigns
+    meaning: Meaning
+    bound: OptimalityRow | None = None  # what is proved of the optimum
+
+
+def assignment_row(
+    scene: Scene, own: VerifiedAssignment, accuracy: Accuracy, motion: MotionStudy | None
+) -> AssignmentRow:
+    """How the answer was found and what it is worth, as plain numbers."""
+    keys, answer, targets = scene.file.assignment, own.answer, own.targets
+    found, limits = answer.found, tuple(_limits(scene, answer.y))
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
-    deviated = (
-        () if answer.robust is None else tuple(_deviated(answer.robust, targets, limits, largest))
-    )
-    met = all(t.satisfied for t in targets) and all(row.satisfied for row in limits)
     worst = worst_violation(targets, limits)
-    initial, optimal = _merits(answer, targets, worst)
-    if met and not deviated:
-        # what only round-off misses contradicts nothing
-        answer = replace(answer, conflict=None)
-    if answer.conflict is not None:
-        open_ = {one.name for one in scene.limits if not one.is_decided}
-        if open_.intersection(answer.conflict.names):
-            answer = replace(answer, conflict=None)
-    optimality = _optimality(scene, answer, bound)
-    conflicting = () if answer.conflict is None else answer.conflict.names
-    unproved = () if found is None else tuple(_why_unproved(scene, found))
-    of_model = model_errors(scene, mesh, answer.y, {m for t in targets for m in t.numbers})
+    merits = _merits(answer, targets, worst)
+    of_model = model_errors(scene, accuracy.mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
-    aim = None if found is None else aim_row(scene, found, wanted, of_model, worst)
-    undecided = dict(_undecided(scene, targets, exact, of_model, largest))
-    beyond = [why for why in unreachable if not why.startswith(tuple(f"{n} is" for n in undecided))]
-    doubts = [] if trusted else [UNTRUSTED]
-    judged = judged_modes(scene.file, targets)
-    doubts += weight_doubt(scene.file, weight, judged, largest)
-    doubts += motion_doubt(motion, judged, largest)
-    if undecided and (len(beyond) < len(unreachable) or set(conflicting) & set(undecided)):
-        doubts += undecided.values() if not beyond else ()
+    aim = None if found is None else aim_row(scene, found, own.wanted, of_model, worst)
+    deviated = tuple(_deviated(answer.robust, targets, limits, largest))
+    met = all(one.satisfied for one in targets) and all(row.satisfied for row in limits)
+    conflict = None if met and not deviated else _decided(scene, answer)
+    optimality = _optimality(scene, answer, conflict, own.bound)
+    conflicting = () if conflict is None else conflict.names
+    doubts, beyond = _doubts(scene, own, accuracy, motion, of_model, largest, conflicting)
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
-    designs = [answer.y] if found is None else found.task.designs(answer.y)
     said = verdict(
         Facts(
             targets=targets,
-            merits=(initial, optimal),
+            merits=merits,
             limits=limits,
             deviated=deviated,
             robust=answer.robust is not None,
             doubts=doubts,
-            unproved=(
-                *_too_coarse(scene, targets, exact, of_model, largest, answer.robust is not None),
-                *_missed_between(scene, designs, targets, largest),
-                *(
-                    f"{each}: {finer(scene.model)}"
-                    for y in designs
-                    for each in _too_stiff(scene, y)
-                ),
-                *((f"not clear, as far as is checked: {'; '.join(unproved)}",) * bool(unproved)),
-            ),
+            unproved=tuple(_unproved(scene, own, of_model, largest)),
             unreachable=beyond,
-            conflict=_in_words(scene, answer, optimality.kind == "proved"),
+            conflict=_in_words(scene, answer, conflict, optimality.kind == "proved"),
             of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
             unfinished="" if found is None or found.best.end not in ended else found.best.end.value,
             max_error=keys.max_error,
@@ -131,32 +98,18 @@ def assignment_row(
             is_optimal=found is None or aim is None or _is_first_order(found),
         )
     )
-    return AssignmentRow(
+    row = AssignmentRow(
         method=keys.method,
         objective=keys.named_objective,
-        objective_initial=initial[1],
-        objective_optimal=optimal[1],
+        objective_initial=merits[0][1],
+        objective_optimal=merits[1][1],
         optimality=optimality,
         verdict=said.word,
         reason=said.reason,
-        steps=()
-        if found is None
-        else tuple(
-            StepRow(step.y, step.objective, step.violation, step.radius, bool(step.taken))
-            for step in found.best.steps
-        ),
-        starts=0 if found is None else found.starts,
-        local_optima=()
-        if found is None
-        else tuple(LocalOptimum(o.y, o.objective, o.seen.violation) for o in found.optima),
-        exact_solves=0 if found is None else found.exact_solves,
-        ended="one program" if found is None else found.best.end.value,
-        finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
         active=tuple(active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=largest,
         max_error_given=keys.max_error is not None,
-        clearances=clearances,
         model_error=raised if np.isfinite(raised) else None,
         conflict=conflicting,
         catalogue=_catalogue(scene, found),
@@ -165,6 +118,65 @@ def assignment_row(
         aim=aim,
         robust=answer.robust,
     )
+    if found is None:
+        return row
+    optima = (LocalOptimum(one.y, one.objective, one.seen.violation) for one in found.optima)
+    return replace(
+        row,
+        steps=found.best.steps,
+        starts=found.starts,
+        local_optima=tuple(optima),
+        exact_solves=found.exact_solves,
+        ended=found.best.end.value,
+        finished=found.best.end in (End.OPTIMAL, End.STALLED),
+        clearances=found.clearances,
+    )
+
+
+def _decided(scene: Scene, answer: Answer) -> Conflict | None:
+    """The limits that contradict, unless one of them is not decided for all designs."""
+    open_ = {one.name for one in scene.limits if not one.is_decided}
+    found = answer.conflict
+    return None if found is None or open_.intersection(found.names) else found
+
+
+def _doubts(
+    scene: Scene,
+    own: VerifiedAssignment,
+    accuracy: Accuracy,
+    motion: MotionStudy | None,
+    of_model: Mapping[int, float],
+    largest: float,
+    conflicting: Sequence[str],
+) -> tuple[list[str], list[str]]:
+    """Why numbers cannot be vouched for, and which targets are out of reach for all that."""
+    judged, accepted = judged_modes(scene.file, own.targets), scene.file.validation.max_error
+    # the exact optimum rests on exact frequencies, the one shot on its prediction
+    trusted = all(target.approximation_error <= accepted for target in own.targets)
+    doubts = [] if trusted or own.answer.found is not None else [UNTRUSTED]
+    doubts += weight_doubt(scene.file, accuracy.weight.row, judged, largest)
+    doubts += motion_doubt(motion, judged, largest)
+    undecided = dict(_undecided(scene, own.targets, own.solved.exact, of_model, largest))
+    names, far = tuple(f"{name} is" for name in undecided), own.meaning.unreachable
+    beyond = [why for why in far if not why.startswith(names)]
+    if not beyond and (far or undecided.keys() & conflicting):
+        doubts += undecided.values()
+    return doubts, beyond
+
+
+def _unproved(
+    scene: Scene, own: VerifiedAssignment, of_model: Mapping[int, float], largest: float
+) -> Iterator[str]:
+    """Say what cannot be said to be met though it seems so."""
+    answer, found, targets = own.answer, own.answer.found, own.targets
+    designs = [answer.y] if found is None else found.task.designs(answer.y)
+    robust = answer.robust is not None
+    yield from _too_coarse(scene, targets, own.solved.exact, of_model, largest, robust)
+    yield from _missed_between(scene, designs, targets, largest)
+    for y in designs:
+        yield from (f"{each}: {finer(scene.model)}" for each in _too_stiff(scene, y))
+    if found is not None and (bands := "; ".join(_why_unproved(scene, found))):
+        yield f"not clear, as far as is checked: {bands}"
 
 
 def _is_first_order(found: Found) -> bool:
@@ -173,9 +185,14 @@ def _is_first_order(found: Found) -> bool:
 
 
 def _deviated(
-    robust: RobustRow, targets: Sequence[TargetStudy], limits: Sequence[LimitRow], largest: float
+    robust: RobustRow | None,
+    targets: Sequence[TargetStudy],
+    limits: Sequence[LimitRow],
+    largest: float,
 ) -> Iterator[str]:
     """Say what the design itself meets, and some deviation within the tolerances does not."""
+    if robust is None:
+        return
     met = {one.label for one in targets if one.satisfied} | {r.words for r in limits if r.satisfied}
     for one in robust.targets:
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
@@ -246,9 +263,9 @@ def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
         )
 
 
-def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
+def _in_words(scene: Scene, answer: Answer, contradiction: Conflict | None, proved: bool) -> str:
     """Name the limits that contradict, with their lines in the case file; empty where none do."""
-    contradiction, found = answer.conflict, answer.found
+    found = answer.found
     if contradiction is None or found is None:
         return ""
     limits = {one.name: one for one in (*scene.limits, *found.variant.requirements.limits)}
@@ -386,7 +403,9 @@ def _merits(
     return (missed[0], before), (missed[1], after)
 
 
-def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> OptimalityRow:
+def _optimality(
+    scene: Scene, answer: Answer, conflict: Conflict | None, bound: OptimalityRow | None
+) -> OptimalityRow:
     """How good the optimum is known to be."""
     found = answer.found
     if found is None:
@@ -395,7 +414,7 @@ def _optimality(scene: Scene, answer: Answer, bound: OptimalityRow | None) -> Op
     if not found.are_listed and is_proved(scene, found):
         met = best.seen.violation <= MET
         words = "no design " + ("is better" if met else "misses the limits by less")
-        if answer.conflict is not None:
+        if conflict is not None:
             words = "no design meets all limits, or misses them by less"
         words = f"the problem is convex: {words}"
         return OptimalityRow("proved", best.stationarity, None, words)
@@ -452,29 +471,27 @@ def _is_settled(found: Found) -> bool:
     return found.is_discrete and not found.untried and not found.lost
 
 
-def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
+def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveLimit]:
     """The limits that the answer lies on; of the one shot with the multipliers of its program."""
     found = answer.found
     if found is None:
-        for one in () if answer.one_shot is None else answer.one_shot.active:
-            yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
+        yield from () if answer.one_shot is None else answer.one_shot.active
         return
-    names = tuple(scene.file.design.parameters)
-    constraints = found.variant.problem.constraints
-    for limit in found.best.limits:
-        side = "upper" if limit.upper else "lower"
-        if limit.kind == "bound":
-            yield ActiveRow(names[limit.index], "bound", side, limit.multiplier)
-        elif limit.kind == "constraint":
-            yield ActiveRow(constraints[limit.index].name, "constraint", side, limit.multiplier)
-    asked = found.variant.requirements
+    constraints, asked = found.variant.problem.constraints, found.variant.requirements
+    named = {
+        "bound": tuple(scene.file.design.parameters),
+        "constraint": tuple(one.name for one in constraints),
+    }
     shares: dict[tuple[str, str], float] = {}
     for limit in found.best.limits:
-        if limit.kind == "excess":
+        if limit.kind in named:
+            side = "upper" if limit.upper else "lower"
+            yield ActiveLimit(named[limit.kind][limit.index], limit.kind, side, limit.multiplier)
+        elif limit.kind == "excess":
             own = asked.owner(limit.index)
             shares[own] = shares.get(own, 0.0) + limit.multiplier
     for (name, side), multiplier in shares.items():
-        yield ActiveRow(name, "target", side, multiplier)
+        yield ActiveLimit(name, "target", side, multiplier)
 
 
 def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
@@ -26,7 +27,6 @@ from eigassign.modal.model import Model
 from eigassign.study.build import build_model
 from eigassign.study.design.search.variants import PosedProblem
 from eigassign.study.results import (
-    ActiveRow,
     EffectRow,
     ModeAnatomy,
     PartRow,
@@ -85,7 +85,7 @@ def as_error(kind: str, F: float) -> float:
 
 
 def relaxed_limits(
-    file: CaseFile, variant: PosedProblem, F: float, active: Sequence[ActiveRow]
+    file: CaseFile, variant: PosedProblem, F: float, active: Sequence[ActiveLimit]
 ) -> Iterator[RelaxedRow]:
     """The gain of a little more room at each active limit, if there is any."""
     problem, kind = variant.problem, error_kind(variant.problem, variant.requirements)
@@ -105,7 +105,7 @@ def relaxed_limits(
         )  # fmt: skip
 
 
-def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> bool:
+def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> bool:
     """True if nature sets the bound: no mass, inertia or stiffness is below zero."""
     if row.kind != "bound" or row.side != "lower":
         return False
@@ -113,7 +113,7 @@ def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> bool:
     return problem.lower[k] == 0.0 and file.design_units[k].startswith(("kg", "N"))
 
 
-def _amount(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> tuple[float, str]:
+def _amount(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> tuple[float, str]:
     if row.kind == "bound":
         k = list(file.design.parameters).index(row.name)
         return _rounded(STEP * float(problem.upper[k] - problem.lower[k])), file.design_units[k]
@@ -130,7 +130,7 @@ def _rounded(value: float) -> float:
     return float(f"{value:.0e}") if value > 0.0 else 1.0
 
 
-def _room(variant: PosedProblem, row: ActiveRow, amount: float, unit: str) -> str:
+def _room(variant: PosedProblem, row: ActiveLimit, amount: float, unit: str) -> str:
     if row.kind == "target":
         return variant.requirements.named(row.name).relaxed(row.side, amount)
     more = "more" if row.side == "upper" else "less"
