@@ -43,8 +43,7 @@ __all__, __getattr__, __dir__ = face(
         "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
         "meaning.sensitivity": "anatomies",
         "meaning.overall": "Studies study_meaning",
-        "meaning.reach": "proved_ranges unreachable",
-        "meaning.tolerance": "reduced_ranges study_tolerance",
+        "meaning.reach": "proved_ranges reduced_ranges study_tolerance unreachable",
         "planning": (
             "Plan at_corners automatic_elements central_sample corners joint_map "
             "farthest plan_expansion scattered "

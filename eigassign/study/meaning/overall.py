@@ -20,9 +20,14 @@ from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.variants import Task, variant_of
-from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
+from eigassign.study.meaning.reach import (
+    misses,
+    proved_ranges,
+    reach_rows,
+    study_tolerance,
+    unreachable,
+)
 from eigassign.study.meaning.sensitivity import FEW, anatomies, relaxed_limits, sensitivities
-from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.results import Meaning, ModeAnatomy, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
 
