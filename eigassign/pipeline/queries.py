@@ -39,7 +39,7 @@ from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_line
 from eigassign.study.checks.weight import GIVEN, study_weight
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
-from eigassign.study.meaning.sensitivity import anatomies
+from eigassign.study.meaning.overall import anatomies
 from eigassign.study.pictures import drawing
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import ModeAnatomy, WeightRow

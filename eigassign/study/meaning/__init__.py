@@ -2,7 +2,6 @@
 
 Reading order:
 
-    sensitivity  slopes of the targeted frequencies; where a missed mode has its energy
-    reach        what each target can reach within the bounds; what deviations of the parameters do
-    overall      all of it, as far as the user asks for it
+    reach    what each target can reach within the bounds; what deviations of the parameters do
+    overall  all of it, as far as the user asks for it; slopes of what is wanted, modes that miss it
 """
