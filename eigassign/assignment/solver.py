@@ -32,12 +32,14 @@ from functools import cached_property
 
 import numpy as np
 
-from eigassign.assignment.feasibility import contradiction, feasible_point, refuse_impossible
 from eigassign.assignment.inputs import Floats
 from eigassign.assignment.program import (
     ProgramAnswer,
     QuadraticProgram,
     ScaledProgram,
+    contradiction,
+    feasible_point,
+    refuse_impossible,
     scaled_program,
     unscaled,
 )

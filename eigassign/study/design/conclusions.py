@@ -40,7 +40,7 @@ from eigassign.assignment.exact.design_problem import (
 )
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import NOTHING, OPTIMAL, End, Optimum, minimise
-from eigassign.assignment.feasibility import smallest
+from eigassign.assignment.program import smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement

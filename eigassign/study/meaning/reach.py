@@ -28,9 +28,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.listed import every_combination, with_rows
-from eigassign.assignment.program import Bounds
+from eigassign.assignment.program import Bounds, constraints_agree
 from eigassign.assignment.requirements.kinds import AssignedFrequency, Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError, EigassignError

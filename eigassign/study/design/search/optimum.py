@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, Tally, minimise, worth
-from eigassign.assignment.feasibility import can_be_kept
 from eigassign.assignment.inputs import frozen
 from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
+from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes

@@ -24,8 +24,7 @@ from eigassign.assignment.exact.design_problem import (
     best_first,
 )
 from eigassign.assignment.exact.requirements import Appraise, Requirements, with_scenarios
-from eigassign.assignment.feasibility import constraints_agree
-from eigassign.assignment.program import Bounds
+from eigassign.assignment.program import Bounds, constraints_agree
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeGap
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
