@@ -4,7 +4,7 @@ Reading order:
 
     inputs        targets and weights in time, λ in Hz, what is linear in the design
     requirements  what a case asks for: one type from the case file to the report
-    program       build: the quadratic program of eqs. (13)–(14), its dimensionless units; limits that contradict
+    program       build: the program of eqs. (13)–(14), in its units; limits that contradict
     solver        solve: OSQP, then an active-set method that goes to round-off
     exact         the optimum of the exact problem, and parameters from measurements
     listed        parameters that take listed values

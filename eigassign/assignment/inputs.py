@@ -33,11 +33,11 @@ def finite(what: str, values: ArrayLike, ndim: int) -> Floats:
     return array
 
 
-def positive(what: str, values: ArrayLike) -> Floats:
+def positive(what: str, values: ArrayLike, unit: str = "") -> Floats:
     """A frozen copy (n,) of ``values``, at least one, all finite and above 0, or UsageError."""
     array = finite(what, values, 1)
     if not array.size or np.any(array <= 0.0):
-        given = f"{array.min()}" if array.size else "none"
+        given = f"{array.min()} {unit}".rstrip() if array.size else "none"
         raise UsageError(f"{what}: {given} given; must be above 0")
     return array
 
@@ -110,11 +110,7 @@ def sample_target(
 
 def positive_hz(frequency_hz: ArrayLike) -> Floats:
     """A frozen (n,) copy of target frequencies in Hz, finite and above 0, or UsageError."""
-    values = finite("target frequency", frequency_hz, 1)
-    if np.any(values <= 0.0):
-        sample = int(np.argmax(values <= 0.0))
-        raise UsageError(f"target frequency: {values[sample]} Hz at {sample}; must be above 0 Hz")
-    return values
+    return positive("target frequency", frequency_hz, "Hz")
 
 
 def _require_cover(knots: Floats, time: Floats) -> None:

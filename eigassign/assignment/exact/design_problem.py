@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -101,24 +101,6 @@ class Appraisal:
         return float(np.max(self.excess, initial=0.0))
 
 
-class Least(Protocol):
-    """What is known of all designs between two without solving for the best: more at each level.
-
-    At the last one a single design is known but for its slopes.
-    """
-
-    @property
-    def levels(self) -> int:
-        """The number of levels."""
-
-    def __call__(self, level: int, lower: Floats, upper: Floats) -> Iterable[tuple[float, Floats]]:
-        """Yield the violation and what residuals (m,) make F least that any design has.
-
-        Of the designs between each of ``lower`` and ``upper`` (n, n_y); infinite where none has an
-        answer.
-        """
-
-
 @dataclass(frozen=True)
 class DesignProblem:
     """F and its limits; ``appraise`` may raise EigassignError where a design has no answer."""
@@ -129,7 +111,6 @@ class DesignProblem:
     constraints: tuple[LinearConstraint, ...] = ()
     cost: Cost | None = None
     objective: Objective = Objective.LEAST_SQUARES
-    least: Least | None = None
 
     @property
     def is_squared(self) -> bool:
@@ -155,12 +136,12 @@ class DesignProblem:
         return self.measure(residual) + self.price(y)
 
     def least_value(self, lower: Floats, upper: Floats, residual: Floats) -> float:
-        """An F that no design between two (n_y,) is below, with these of `Least`."""
+        """An F that no design between two (n_y,) is below, with residuals that none is below."""
         cost = 0.0 if self.cost is None else self.cost.least(lower[None], upper[None])[0]
         return self.least_measure(residual) + float(cost)
 
     def least_measure(self, residual: Floats) -> float:
-        """`measure` of residuals of `Least`; without any nothing is known where it may be < 0."""
+        """`measure` of such residuals; without any nothing is known where it may be < 0."""
         unknown = self.is_one_sided and not len(residual)
         return -np.inf if unknown else self.measure(residual)
 

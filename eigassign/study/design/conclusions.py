@@ -268,8 +268,8 @@ def is_proved(scene: Scene, found: Found) -> bool:
     if not _are_convex(scene, replace(asked, aims=())):
         return False
     limits = found.variant.of(replace(asked, asked=asked.limits, least_change=None, aims=()))
-    limits = replace(limits, cost=None, objective=Objective.LEAST_SQUARES)
-    least = minimise(limits, best.y, scene.file.assignment.steps)
+    alone = replace(limits.problem, cost=None, objective=Objective.LEAST_SQUARES)
+    least = minimise(alone, best.y, scene.file.assignment.steps)
     return least.seen.violation > MET and least.stationarity <= OPTIMAL
 
 

@@ -39,7 +39,7 @@ from eigassign.modal.reduced import reduce
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.design.one_shot import catalogues
-from eigassign.study.design.search.response import DesignResponse, Glances, outlook_of, response_of
+from eigassign.study.design.search.response import DesignResponse, response_of
 from eigassign.study.design.search.variants import SPREAD, Designs
 from eigassign.study.monotone import box_corners, corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
@@ -183,7 +183,6 @@ def _nearest(
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
     followed = followers(alone, [replace(there, followed=wanted.followed), *beside, *bands])
     found = []
-    glances: dict[int, Glances] = {}
     for below in Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]:
         kept = []
         for band, n in zip(bands, below, strict=True):
@@ -196,7 +195,6 @@ def _nearest(
             lower,
             upper,
             scene.constraints,
-            least=outlook_of(alone, asked, followed, glances),
         )
         starts = (y, 0.5 * (lower + upper), scene.initial)[:STARTS]
         for (low, high), start in product(zip(*boxes, strict=True), starts):

@@ -236,7 +236,8 @@ class Choices:
         cost = None if problem.cost is None else problem.cost.least(self.lower, self.upper)
         self.cost = np.zeros(len(self.of)) if cost is None else cost
         self.value = self.cost + problem.least_measure(np.zeros(0))
-        self.levels = 0 if problem.least is None else problem.least.levels
+        outlook = self.base(0).outlook
+        self.levels = 0 if outlook is None else outlook.levels
 
     def _near(self, about: Floats) -> Ints:
         """The combinations that differ from the nearest to a design in two lists at most."""
@@ -265,7 +266,7 @@ class Choices:
     def _only(self, variant: PosedProblem) -> PosedProblem:
         if self.names is None:
             return variant
-        return replace(variant, problem=variant.with_limits(self.names))
+        return variant.with_limits(self.names)
 
     @property
     def bounds_left(self) -> NDArray[np.bool_]:
@@ -284,7 +285,7 @@ class Choices:
         """Look at the next level of one choice, and of some that are alike in this order."""
         level, base = self.level[first], self.base(self.of[first])
         alike = order[(self.level[order] == level) & (self.of[order] == self.of[first])]
-        alike, know = alike[:TOGETHER], base.problem.least
+        alike, know = alike[:TOGETHER], base.outlook
         known = () if know is None else know(int(level), self.lower[alike], self.upper[alike])
         for k, (missed, residual) in zip(alike, known, strict=True):
             self.missed[k] = max(self.missed[k], missed)

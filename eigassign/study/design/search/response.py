@@ -185,7 +185,7 @@ class Glances:
 
 @dataclass(frozen=True)
 class Outlook:
-    """What is known of all designs between two: a `Least` of requirements.
+    """What is known of all designs between two without solving for the best, by requirements.
 
     Their frequencies are between those at two corners, where they differ only in parameters in
     which every frequency is monotone: with others there is no level but that without samples.

@@ -58,6 +58,7 @@ class PosedProblem:
     requirements: Requirements
     problem: DesignProblem
     response: DesignResponse
+    outlook: Outlook | None  # None where modes are followed
 
     @property
     def limit_names(self) -> tuple[str, ...]:
@@ -65,18 +66,17 @@ class PosedProblem:
         kept = (row.name for row in self.problem.constraints)
         return tuple(dict.fromkeys((*self.requirements.limit_names, *kept)))
 
-    def of(self, some: Requirements) -> DesignProblem:
+    def of(self, some: Requirements) -> PosedProblem:
         """The problem with ``some`` of its requirements, beside limits that every step keeps."""
-        least = self.problem.least
-        if isinstance(least, Outlook):
-            least = replace(least, requirements=some)
-        appraise = _appraise(self.task, some, self.response)
-        return replace(self.problem, appraise=appraise, least=least)
+        problem = replace(self.problem, appraise=_appraise(self.task, some, self.response))
+        outlook = self.outlook and replace(self.outlook, requirements=some)
+        return replace(self, requirements=some, problem=problem, outlook=outlook)
 
-    def with_limits(self, names: Collection[str]) -> DesignProblem:
+    def with_limits(self, names: Collection[str]) -> PosedProblem:
         """The problem with those limits only that are named."""
         kept = tuple(row for row in self.problem.constraints if row.name in names)
-        return replace(self.of(self.requirements.with_limits(names)), constraints=kept)
+        some = self.of(self.requirements.with_limits(names))
+        return replace(some, problem=replace(some.problem, constraints=kept))
 
     def without_slopes(self, y: Floats) -> Appraisal:
         """A design as it is appraised, but with slopes 0: only its frequencies are solved."""
@@ -191,11 +191,11 @@ def variant_of(
         upper=upper,
         constraints=scene.constraints if kept else (),
         cost=cost,
-        least=outlook_of(scene, requirements, task.followers, task.glances),
         objective=objective,
     )
-    named = zip((band.label for band in task.bands), below, strict=True)
-    return PosedProblem(task, tuple(named), requirements, problem, response)
+    named = tuple(zip((band.label for band in task.bands), below, strict=True))
+    outlook = outlook_of(scene, requirements, task.followers, task.glances)
+    return PosedProblem(task, named, requirements, problem, response, outlook)
 
 
 def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appraise:
