@@ -99,18 +99,14 @@ def sample_target(
     """
     time = finite("time", time_s, 1)
     if knot_time_s is None:
-        return positive_hz(np.full(time.shape, float(finite("target frequency", frequency_hz, 0))))
+        frequency_hz = np.full(time.shape, float(finite("target frequency", frequency_hz, 0)))
+        return positive("target frequency", frequency_hz, "Hz")
     knots = finite("target time", knot_time_s, 1)
-    values = positive_hz(frequency_hz)
+    values = positive("target frequency", frequency_hz, "Hz")
     same_length("target frequency", values.size, knots.size, "times")
     trapezoidal_weights(knots)
     _require_cover(knots, time)
     return frozen(np.interp(time, knots, values))
-
-
-def positive_hz(frequency_hz: ArrayLike) -> Floats:
-    """A frozen (n,) copy of target frequencies in Hz, finite and above 0, or UsageError."""
-    return positive("target frequency", frequency_hz, "Hz")
 
 
 def _require_cover(knots: Floats, time: Floats) -> None:

@@ -18,29 +18,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from itertools import product
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
-from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.exact.design_problem import MET
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.assignment.listed import every_combination, with_rows
-from eigassign.assignment.program import Bounds, constraints_agree
 from eigassign.assignment.requirements.kinds import AssignedFrequency, Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.facts import positive_percent
 from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.reduced import reduce
-from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers, solve_design
-from eigassign.study.design.one_shot import catalogues
-from eigassign.study.design.search.response import DesignResponse, response_of
-from eigassign.study.design.search.variants import SPREAD, Designs
+from eigassign.study.design.search.optimum import Choices
+from eigassign.study.design.search.variants import SPREAD, Designs, Task
 from eigassign.study.monotone import box_corners, corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
@@ -168,39 +161,26 @@ def _nearest(
     combination of catalogues. The search ends with the first start that leads within ``allowed`` of
     it. None where none leads to a design within the limits, or there are many combinations.
     """
-    lower, upper = scene.bounds
-    listed = catalogues(scene.file)
-    combined = next(every_combination([own.distinct for own in listed], COMBINED + 1))
-    agree = constraints_agree(scene.constraints, Bounds(lower, upper))
-    if len(combined) > COMBINED or not agree:
-        return None
-    boxes = [with_rows(listed, combined, bound) for bound in (lower, upper)]
     at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
-    there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal)
-    beside = [_at(one, at) for one in others if one.mode_terms and _holds(one, at)]
-    elastic = [one for one in others if not one.mode_terms and one.terms and not one.constraint]
+    there = AssignedFrequency(
+        *(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal),
+        followed=wanted.followed,
+    )
     alone = replace(scene, trajectory=scene.path.chosen([at]))
+    beside = [_at(one, at) for one in others if one.mode_terms and _holds(one, at)]
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
-    followed = followers(alone, [replace(there, followed=wanted.followed), *beside, *bands])
+    names = {one.name for one in (*others, *scene.limits) if one in others or one.constraint}
+    task = Task(alone, (there, *beside, *bands), (Margin(),) * len(bands))
+    belows = Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]
+    every, (lower, upper) = Choices(task, belows, y, names), scene.bounds
+    if every.count > COMBINED * len(belows):
+        return None
     found = []
-    for below in Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]:
-        kept = []
-        for band, n in zip(bands, below, strict=True):
-            above = mode_above(scene.model, n, band.counted, alone.path.at(y)[0], y)
-            kept += band.kept_clear(n, above, Margin())
-        asked = Requirements((there, *beside, *elastic, *kept), np.ones(1))
-        response = response_of(alone, asked.modes, followed)
-        problem = DesignProblem(
-            partial(_appraised, asked, response),
-            lower,
-            upper,
-            scene.constraints,
-        )
-        starts = (y, 0.5 * (lower + upper), scene.initial)[:STARTS]
-        for (low, high), start in product(zip(*boxes, strict=True), starts):
-            held = replace(problem, lower=low, upper=high)
+    for variant in filter(None, every.left(every.count)):
+        for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
+            problem = variant.problem
             try:
-                best = minimise(held, np.clip(start, low, high), STEPS)
+                best = minimise(problem, np.clip(start, problem.lower, problem.upper), STEPS)
             except EigassignError:
                 continue
             if best.seen.violation > MET:
@@ -209,10 +189,6 @@ def _nearest(
             if found[-1][0] <= allowed:
                 return float(found[-1][1])
     return float(min(found)[1]) if found else None
-
-
-def _appraised(asked: Requirements, response: DesignResponse, y: Floats) -> Appraisal:
-    return asked.appraise(y, response(y))
 
 
 def _holds(one: Requirement, at: int) -> bool:

@@ -18,7 +18,7 @@ limits at the samples are drawn in by what is lacking, and it is sought anew fro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import prod
@@ -209,11 +209,12 @@ def deadline_of(file: CaseFile) -> float:
 class Choices:
     """All choices of a task, and what no design of each is below: more and more, as it is asked.
 
-    Of the limits ``names`` only, where these are given; linear ones may then be missed as others.
+    Of the limits ``names`` only, where these are given, and without prices; linear ones may then be
+    missed as others.
     """
 
     def __init__(
-        self, task: Task, belows: Sequence[Counts], about: Floats, names: Sequence[str] | None
+        self, task: Task, belows: Sequence[Counts], about: Floats, names: Collection[str] | None
     ) -> None:
         self.task, self.names, self.listed = task, names, catalogues(task.scene.file)
         self.belows = belows
@@ -266,7 +267,8 @@ class Choices:
     def _only(self, variant: PosedProblem) -> PosedProblem:
         if self.names is None:
             return variant
-        return variant.with_limits(self.names)
+        some = variant.with_limits(self.names)
+        return replace(some, problem=replace(some.problem, cost=None))
 
     @property
     def bounds_left(self) -> NDArray[np.bool_]:
@@ -280,6 +282,27 @@ class Choices:
         met = missed <= missed.min(initial=np.inf) + MET
         late = np.zeros(len(own)) if behind is None else behind[own]
         return own[np.lexsort((value, np.where(met, 0.0, missed), late))]
+
+    def left(self, most: int) -> Iterator[PosedProblem | None]:
+        """Yield the problems that bounds do not exclude, the best first; None for more than most.
+
+        So, too, where there are so many that not all are looked at.
+        """
+        open_, met = np.ones(len(self.of), dtype=bool), 0
+        while open_.any():
+            order = self.ahead(open_)
+            k = int(order[0])
+            if self.missed[k] > MET:  # a bound
+                break
+            if self.bounds_left[k]:
+                self.learn(k, order)
+                continue
+            if (met := met + 1) > most:
+                break
+            open_[k] = False
+            yield self.posed(k, self.task)
+        if met > most or not self.is_whole:
+            yield None
 
     def learn(self, first: int, order: Ints) -> None:
         """Look at the next level of one choice, and of some that are alike in this order."""
@@ -496,26 +519,17 @@ def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> boo
         for below in found.every.belows
     ]
     y = found.best.y
-    every = Choices(found.task, list(dict.fromkeys(belows)), y, names)
-    open_, tried = np.ones(len(every.of), dtype=bool), 0
-    while open_.any():
-        order = every.ahead(open_)
-        k = int(order[0])
-        if every.missed[k] > MET:  # a bound
-            break
-        if every.bounds_left[k]:
-            every.learn(k, order)
-            continue
-        if (tried := tried + 1) > most:
+    for variant in Choices(found.task, list(dict.fromkeys(belows)), y, names).left(most):
+        if variant is None:
             return None
-        problem, open_[k] = every.posed(k, found.task).problem, False
+        lower, upper = variant.problem.lower, variant.problem.upper
         try:
-            met = minimise(problem, np.clip(y, problem.lower, problem.upper), steps)
+            met = minimise(variant.problem, np.clip(y, lower, upper), steps)
         except EigassignError:
             return True
         if met.seen.violation <= MET:
             return True
-    return False if every.is_whole else None
+    return False
 
 
 def _of_lists(task: Task) -> list[Counts]:

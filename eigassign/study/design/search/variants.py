@@ -175,7 +175,7 @@ def variant_of(
     width = np.where(width > 0.0, width, 1.0)
     has_goals = any(one.is_goal for one in asked)
     objective = Objective.LARGEST if aims else Objective.LEAST_SQUARES
-    objective = Objective(aim) if has_goals else objective
+    objective = Objective.WORST_CASE if has_goals and aim == "worst_case" else objective
     cost = cost_of(scene, 1.0 / price_of_one(scene.file))
     requirements = Requirements(
         asked=tuple(asked),
