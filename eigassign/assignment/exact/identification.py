@@ -35,8 +35,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
-from eigassign.assignment.exact.sequential import End, Optimum, minimise
+from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.exact.sequential import End, Optimum, has_way, minimise
 from eigassign.assignment.inputs import Floats, frozen
 from eigassign.errors import EigassignError
 
@@ -208,25 +208,12 @@ def _are_same(
 ) -> bool:
     """True where two minima are one: a way joins them; of such as explain nothing, χ² is equal.
 
-    The way is the line between them, at quarters; or, where χ² is too large there, other parameters
-    are fitted anew to the one that differs most.
+    The way is nowhere worse by more than measurements notice (`has_way`).
     """
     if not (explains(a) and explains(b)):
         return abs(a.objective - b.objective) <= SAME * max(a.objective, b.objective)
-    limit, move = max(a.objective, b.objective) + NOTICED**2, b.y - a.y
-    width = problem.upper - problem.lower
-    j = int(np.abs(move / np.where(width > 0.0, width, 1.0)).argmax())
-    for share in (0.5, 0.25, 0.75):
-        y = a.y + share * move
-        try:
-            if problem(y, problem.appraise(y)) <= limit:
-                continue
-        except EigassignError:
-            return False
-        fitted = _held_at(problem, j, float(y[j]), y)
-        if fitted is None or fitted.objective > limit:
-            return False
-    return True
+    most = MET, max(a.objective, b.objective) + NOTICED**2
+    return has_way(problem, a.y, b.y, most, 1)
 
 
 def _held_at(problem: DesignProblem, j: int, at: float, start: Floats) -> Optimum | None:

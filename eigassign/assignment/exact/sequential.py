@@ -338,10 +338,10 @@ def _no_barrier(problem: DesignProblem, a: Optimum, b: Optimum) -> bool:
         alike = alike and a.objective + b.objective >= 2.0 * value - room
     if not alike and a.end in FINISHED and b.end in FINISHED:
         return False  # from the worse one, which is an optimum, no way leads down
-    return _joined(problem, a.y, b.y, (violation + missed, value + room), HALVINGS)
+    return has_way(problem, a.y, b.y, (violation + missed, value + room), HALVINGS)
 
 
-def _joined(
+def has_way(
     problem: DesignProblem, a: Floats, b: Floats, most: tuple[float, float], halvings: int
 ) -> bool:
     """True where a way from a to b was found that is nowhere worse than ``most``, violation and F.
@@ -361,4 +361,4 @@ def _joined(
     if np.any(np.array(worth(middle)) > most):
         return False
     halves = ((a, middle.y), (middle.y, b))
-    return halvings == 0 or all(_joined(problem, *each, most, halvings - 1) for each in halves)
+    return halvings == 0 or all(has_way(problem, *each, most, halvings - 1) for each in halves)

@@ -53,7 +53,6 @@ from eigassign.study.design.search.variants import (
     Designs,
     PosedProblem,
     Task,
-    counts_of,
     variant_of,
 )
 from eigassign.study.results import ClearanceRow
@@ -337,7 +336,6 @@ class _Search:
         few = self.levels[0]
         self.designs = Designs.all_over(few.scene, few.wanted, SPREAD) if few.bands else None
         belows: Sequence[Counts] = [()] if self.designs is None else self.designs.choices
-        belows = [*dict.fromkeys([*_of_lists(task), *belows])]
         self.every = Choices(task, belows, starts[0], None)
         self.outcomes: list[Outcome] = []
         self.failed: EigassignError | None = None
@@ -530,21 +528,6 @@ def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> boo
         if met.seen.violation <= MET:
             return True
     return False
-
-
-def _of_lists(task: Task) -> list[Counts]:
-    """The numbers below the bands that all combinations have, where they are all that is chosen."""
-    listed, (lower, upper) = catalogues(task.scene.file), task.scene.bounds
-    allowed = [own.distinct for own in listed]
-    if not listed or not task.bands or any(band.followed for band in task.bands):
-        return []
-    if prod(map(len, allowed)) > MOST:
-        return []
-    rows = next(every_combination(allowed, MOST))
-    low, high = (with_rows(listed, rows, y) for y in (lower, upper))
-    if not np.array_equal(low, high):
-        return []
-    return [*counts_of(task.scene, task.bands, low)]
 
 
 def _drawn_in(

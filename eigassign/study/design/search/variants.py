@@ -8,7 +8,6 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 from __future__ import annotations
 
 import itertools
-from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -305,33 +304,10 @@ class Designs:
         return [self.y[k] for k in order[:most]]
 
 
-def counts_of(
-    scene: Scene, bands: Sequence[ForbiddenBand], designs: Floats
-) -> list[tuple[int, ...]]:
-    """Every choice of k with which a design of (n, n_y) may be clear of all bands.
-
-    It is that of the first sample of each, and the same at both edges. The commonest comes first.
-    """
-    try:
-        q = np.array([scene.path.at(y)[0] for y in designs])
-        each = []
-        for band in bands:
-            lower, upper = (np.full(len(designs), edge[0]) for edge in (band.lower, band.upper))
-            first = replace(band, lower=lower, upper=upper, rows=slice(0, len(designs)))
-            hz = all_below(scene, [first], q[:, band.rows.start], designs)
-            each.append(first.below(unfollowed(hz)))
-    except EigassignError:
-        alone = designs[:, None] if len(designs) > 1 else ()
-        return list(dict.fromkeys(found for y in alone for found in counts_of(scene, bands, y)))
-    low, high = np.swapaxes(each, 0, 1)
-    found = Counter(map(tuple, low[:, (low == high).all(axis=0)].T.tolist()))
-    return [choice for choice, _ in found.most_common()]
-
-
 def all_below(scene: Scene, bands: Sequence[ForbiddenBand], q: Floats, y: Floats) -> Floats:
     """The lowest frequencies (n, count), all that matter to the bands and have mass.
 
-    At q (n, n_q), of one design y (n_y,) or of each (n, n_y).
+    At q (n, n_q), of a design y (n_y,).
     """
     available = scene.model.n_dof - scene.model.n_rigid
     beyond = max((float(band.upper.max()) for band in bands), default=0.0)
