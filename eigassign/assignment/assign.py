@@ -25,7 +25,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.inputs import Floats, LinearConstraint, finite, frozen
+from eigassign.assignment.inputs import Floats, LinearConstraint, frozen
 from eigassign.assignment.program import (
     Bounds,
     Goals,
@@ -179,7 +179,7 @@ def solve_assignment(
     given) serve messages and the list of active limits.
 
     Raises:
-        UsageError: shapes that do not fit, values that are not finite, empty ranges.
+        UsageError: data that is not a number, limits that are not ordered.
         InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
         AccuracyError: the KKT residuals of the best answer found exceed 1e-8.
         KeyboardInterrupt: Ctrl-C while the solver runs.
@@ -198,7 +198,7 @@ def solve_assignment(
         primal_residual=certificate.primal_residual,
         dual_residual=certificate.dual_residual,
         gap=certificate.gap,
-        objective_initial=program.objective(finite("initial design", y_initial, 1)),
+        objective_initial=program.objective(frozen(y_initial)),
         objective_optimal=program.objective(optimum.y),
         active=tuple(_active_limits(program, optimum)),
         undetermined=solution.undetermined,

@@ -25,43 +25,14 @@ def finite(what: str, values: ArrayLike, ndim: int) -> Floats:
     Raises:
         UsageError: other number of axes, or NaN or infinite at the index named.
     """
-    array = shaped(what, values, ndim)
+    array = frozen(values)
+    if array.ndim != ndim:
+        raise UsageError(f"{what}: has {array.ndim} axes, {ndim} expected")
     bad = np.argwhere(~np.isfinite(array))
     if bad.size:
         where = tuple(int(i) for i in bad[0])
         raise UsageError(f"{what}: {array[where]} at index {list(where)}; must be finite")
     return array
-
-
-def positive(what: str, values: ArrayLike, unit: str = "") -> Floats:
-    """A frozen copy (n,) of ``values``, at least one, all finite and above 0, or UsageError."""
-    array = finite(what, values, 1)
-    if not array.size or np.any(array <= 0.0):
-        given = f"{array.min()} {unit}".rstrip() if array.size else "none"
-        raise UsageError(f"{what}: {given} given; must be above 0")
-    return array
-
-
-def limit(what: str, values: ArrayLike, ndim: int) -> Floats:
-    """A frozen copy of ``values``: infinite means "no limit", NaN is refused."""
-    array = shaped(what, values, ndim)
-    if np.isnan(array).any():
-        raise UsageError(f"{what}: not a number; write an infinity for no limit")
-    return array
-
-
-def shaped(what: str, values: ArrayLike, ndim: int) -> Floats:
-    """A frozen copy of ``values`` with ``ndim`` axes, or UsageError."""
-    array = frozen(values)
-    if array.ndim != ndim:
-        raise UsageError(f"{what}: has {array.ndim} axes, {ndim} expected")
-    return array
-
-
-def same_length(what: str, length: int, expected: int, of: str) -> None:
-    """UsageError unless ``length == expected``, the number of ``of``."""
-    if length != expected:
-        raise UsageError(f"{what}: {length} given, but there are {expected} {of}")
 
 
 def trapezoidal_weights(time_s: ArrayLike) -> Floats:
@@ -99,14 +70,24 @@ def sample_target(
     """
     time = finite("time", time_s, 1)
     if knot_time_s is None:
-        frequency_hz = np.full(time.shape, float(finite("target frequency", frequency_hz, 0)))
-        return positive("target frequency", frequency_hz, "Hz")
+        return positive_hz(np.full(time.shape, float(finite("target frequency", frequency_hz, 0))))
     knots = finite("target time", knot_time_s, 1)
-    values = positive("target frequency", frequency_hz, "Hz")
-    same_length("target frequency", values.size, knots.size, "times")
+    values = positive_hz(frequency_hz)
+    if values.size != knots.size:
+        given = f"{values.size} given, but there are {knots.size} times"
+        raise UsageError(f"target frequency: {given}")
     trapezoidal_weights(knots)
     _require_cover(knots, time)
     return frozen(np.interp(time, knots, values))
+
+
+def positive_hz(frequency_hz: ArrayLike) -> Floats:
+    """A frozen (n,) copy of target frequencies in Hz, finite and above 0, or UsageError."""
+    values = finite("target frequency", frequency_hz, 1)
+    if np.any(values <= 0.0):
+        sample = int(np.argmax(values <= 0.0))
+        raise UsageError(f"target frequency: {values[sample]} Hz at {sample}; must be above 0 Hz")
+    return values
 
 
 def _require_cover(knots: Floats, time: Floats) -> None:
@@ -152,11 +133,6 @@ class LinearModel:
     l0: Floats
     l: Floats  # noqa: E741 - the paper's symbol
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "l0", finite("l0", self.l0, 1))
-        object.__setattr__(self, "l", finite("l", self.l, 2))
-        same_length("l", self.l.shape[0], self.l0.size, "samples in l0")
-
     def __call__(self, dy: Floats) -> Floats:
         """λ (n_t,) at y = y0 + dy."""
         return np.asarray(self.l0 + self.l @ dy)
@@ -170,13 +146,6 @@ class LinearConstraint:
     coefficients: Floats
     lower: float = -np.inf
     upper: float = np.inf
-
-    def __post_init__(self) -> None:
-        what = f"constraint {self.name!r}"
-        object.__setattr__(self, "coefficients", finite(what, self.coefficients, 1))
-        low, high = limit(what, self.lower, 0), limit(what, self.upper, 0)
-        if low > high or low == np.inf or high == -np.inf:
-            raise UsageError(f"{what}: no number is between {self.lower} and {self.upper}")
 
     def __call__(self, y: Floats) -> tuple[float, Floats]:
         """Its value at a design y (n_y,), and the slopes (n_y,)."""

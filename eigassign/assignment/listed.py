@@ -14,8 +14,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.inputs import Floats, finite, same_length
-from eigassign.errors import UsageError
+from eigassign.assignment.inputs import Floats
 
 Rows = tuple[int, ...]  # one row of every list: a combination
 Ints = NDArray[np.intp]
@@ -34,15 +33,6 @@ class ListedValues:
     rows: Floats
     labels: tuple[str, ...] = ()
     prices: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        what = f"catalogue {self.name!r}"
-        object.__setattr__(self, "rows", finite(what, self.rows, 2))
-        if not self.rows.size:
-            raise UsageError(f"{what}: lists nothing to choose from")
-        same_length(f"{what}, values", self.rows.shape[1], len(self.columns), "parameters it sets")
-        if self.labels:
-            same_length(f"{what}, labels", len(self.labels), self.rows.shape[0], "rows")
 
     @property
     def distinct(self) -> Ints:

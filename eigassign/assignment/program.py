@@ -39,14 +39,10 @@ from eigassign.assignment.inputs import (
     Floats,
     LinearConstraint,
     LinearModel,
-    finite,
     frozen,
-    limit,
-    positive,
-    same_length,
 )
 from eigassign.assignment.requirements.requirement import Requirement, time_shares
-from eigassign.errors import InfeasibleError, UsageError
+from eigassign.errors import InfeasibleError
 
 Goals = Sequence[tuple[Requirement, LinearModel]]  # wanted frequencies, each with λ at its rows
 
@@ -57,17 +53,6 @@ class Bounds:
 
     lower: Floats
     upper: Floats
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "lower", limit("lower bounds", self.lower, 1))
-        object.__setattr__(self, "upper", limit("upper bounds", self.upper, 1))
-        same_length("upper bounds", self.upper.size, self.lower.size, "lower bounds")
-        empty = (self.lower > self.upper) | (self.lower == np.inf) | (self.upper == -np.inf)
-        if empty.any():
-            j = int(np.argmax(empty))
-            raise UsageError(
-                f"bounds: [{self.lower[j]}, {self.upper[j]}] of parameter {j} is empty"
-            )
 
 
 @dataclass(frozen=True)
@@ -111,16 +96,11 @@ def build_program(
     constraints: Sequence[LinearConstraint] = (),
     names: Sequence[str] | None = None,
 ) -> QuadraticProgram:
-    """The program of all goals over all samples; arguments as in `solve_assignment`.
-
-    Raises:
-        UsageError: shapes that do not fit each other, values that are not finite.
-    """
-    y0, start = finite("expansion point y0", y0, 1), finite("initial design", y_initial, 1)
+    """The program of all goals over all samples; arguments as in `solve_assignment`."""
+    y0 = frozen(y0)
     names = tuple(f"y{j + 1}" for j in range(y0.size)) if names is None else tuple(names)
-    _require_sizes(goals, y0.size, start, bounds, constraints, names)
-    A, b = _relative_rows(goals, positive("time weights", time_weights))
-    start = np.clip(start, bounds.lower, bounds.upper)
+    A, b = _relative_rows(goals, frozen(time_weights))
+    start = np.clip(y_initial, bounds.lower, bounds.upper)
     C = np.array([c.coefficients for c in constraints]).reshape(len(constraints), y0.size)
     return QuadraticProgram(
         names=names,
@@ -143,29 +123,8 @@ def _relative_rows(goals: Goals, time_weights: Floats) -> tuple[Floats, Floats]:
     rows = []
     shares = time_shares([one for one, _ in goals], time_weights)
     for (one, model), share in zip(goals, shares, strict=True):
-        same_length("target model", model.l0.size, share.size, "samples in time")
         rows.append(one.lam_rows(model, share))
     return np.vstack([A for A, _ in rows]), np.concatenate([b for _, b in rows])
-
-
-def _require_sizes(
-    goals: Goals,
-    n_y: int,
-    start: Floats,
-    bounds: Bounds,
-    constraints: Sequence[LinearConstraint],
-    names: tuple[str, ...],
-) -> None:
-    if not goals:
-        raise UsageError("targets: none given, so there is nothing to assign")
-    for one, model in goals:
-        same_length("target frequency", one.hz.size, model.l0.size, "samples in l0")
-        same_length("columns of l", model.l.shape[1], n_y, "design parameters")
-    same_length("initial design", start.size, n_y, "design parameters")
-    same_length("bounds", bounds.lower.size, n_y, "design parameters")
-    same_length("names", len(names), n_y, "design parameters")
-    for c in constraints:
-        same_length(f"constraint {c.name!r}", c.coefficients.size, n_y, "design parameters")
 
 
 # --- Dimensionless units for a quadratic program, the program written in them, and the way back

@@ -61,8 +61,8 @@ def test_dy_counts_from_the_expansion_point_and_y_does_not():
 
 def test_two_parameters_meet_a_sum_that_binds():
     # J = mean over two samples of (y1 − 1)², (y2 − 2)²: with y1 + y2 = 2 the optimum is (½, 3/2)
-    total = LinearConstraint("total", [1.0, 1.0], upper=2.0)
-    loose = LinearConstraint("loose", [1.0, -1.0], -5.0, 5.0)
+    total = LinearConstraint("total", np.array([1.0, 1.0]), upper=2.0)
+    loose = LinearConstraint("loose", np.array([1.0, -1.0]), -5.0, 5.0)
     result = solve([0.0, -1.0], np.eye(2), [-9, -9], [9, 9], constraints=[total, loose])
     np.testing.assert_allclose(result.y, [0.5, 1.5], atol=1e-12)
     (limit,) = result.active

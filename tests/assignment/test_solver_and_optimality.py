@@ -29,7 +29,10 @@ from eigassign.errors import AccuracyError, UsageError
 
 def small_program(upper=0.1):
     """J = (0.2 − 0.5 y)² on [0, upper], y + 0 ≤ 5."""
-    box, free = Bounds(np.zeros(1), np.array([upper])), LinearConstraint("loose", [1.0], upper=5.0)
+    box, free = (
+        Bounds(np.zeros(1), np.array([upper])),
+        LinearConstraint("loose", np.array([1.0]), upper=5.0),
+    )
     return build_program([goal([1.2e6], [[-5e5]], 1e6)], [1.0], [0.0], [0.0], box, [free])
 
 
@@ -77,7 +80,7 @@ def test_the_last_bit_of_a_sum_of_large_numbers_is_no_violation_but_a_hundred_ar
     model, box = goal([1.2e6], [[-5e5]], 1e6), Bounds(np.array([1e9]), np.array([1e9 + 1]))
     for bits, met in ((1, True), (100, False)):
         value = 1e9 + bits * np.spacing(1e9)
-        limit = LinearConstraint("limit", [1.0], lower=value)
+        limit = LinearConstraint("limit", np.array([1.0]), lower=value)
         program = build_program([model], [1.0], [1e9], [1e9], box, [limit])
         assert (judge(program, answer(1e9, 0.0)).primal_residual == 0.0) is met
 
@@ -164,7 +167,7 @@ FAILURES = [s for s in Status if s not in (Status.SOLVED, Status.INTERRUPTED)]
 
 @pytest.mark.parametrize("status", FAILURES)
 def test_without_help_from_osqp_the_active_set_finds_the_same_optimum(status, monkeypatch):
-    total = [LinearConstraint("c", [1.0, 1.0, 1.0], upper=1e12)]
+    total = [LinearConstraint("c", np.array([1.0, 1.0, 1.0]), upper=1e12)]
     for seed in range(3):
         problem = random_problem(seed, n_y=3)
         expected = solve_assignment(*problem.arguments, total)
@@ -179,8 +182,8 @@ def test_without_help_from_osqp_the_active_set_finds_the_same_optimum(status, mo
 def test_an_equality_said_twice_does_no_harm(monkeypatch):
     fake_osqp(monkeypatch, Status.MAX_ITER_REACHED)
     twice = [
-        LinearConstraint("same", [1.0, -1.0], 0.0, 0.0),
-        LinearConstraint("again", [-2.0, 2.0], 0.0, 0.0),
+        LinearConstraint("same", np.array([1.0, -1.0]), 0.0, 0.0),
+        LinearConstraint("again", np.array([-2.0, 2.0]), 0.0, 0.0),
     ]
     model = goal([0.0, -1e6], 1e6 * np.eye(2), 1e6)
     box = Bounds(np.full(2, -9.0), np.full(2, 9.0))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.assignment.inputs import positive
+from eigassign.assignment.inputs import positive_hz
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,
@@ -46,7 +46,7 @@ class AssignedFrequency(Requirement):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        positive("target frequency", self.lower, "Hz")
+        positive_hz(self.lower)
 
     @staticmethod
     def asked(target: FrequencyTarget) -> str:
