@@ -70,7 +70,10 @@ def solve_program(program: QuadraticProgram) -> Solution:
         fixed = unscaled(program, scaled, np.zeros(0), np.zeros(scaled.G.shape[0]))
         return Solution((fixed,), "nothing is free", 0, 0)
     raw = solve_osqp(scaled)
-    polished = polish(scaled, _start(program, scaled, raw))
+    start = feasible_point(scaled) if raw.x is None else raw.x
+    if start is None:
+        raise contradiction(program, scaled)
+    polished = polish(scaled, start)
     candidates = [unscaled(program, scaled, polished.x, polished.mu)]
     status = f"solved (active set; {raw.status.words})"
     if raw.x is not None and raw.mu is not None:
@@ -86,23 +89,10 @@ def solve_scaled(
 
     From a ``start`` (n,) that is feasible the active-set method goes alone, without OSQP.
     """
-    if start is not None:
-        return solve_active_set(scaled, start)
-    raw = solve_osqp(scaled)
-    start = feasible_point(scaled) if raw.x is None else raw.x
     if start is None:
-        return None
-    return solve_active_set(scaled, start)
-
-
-def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
-    """OSQP's answer; without one any feasible point, or the error that there is none."""
-    if raw.x is not None:
-        return raw.x
-    point = feasible_point(scaled)
-    if point is None:
-        raise contradiction(program, scaled)
-    return point
+        raw = solve_osqp(scaled)
+        start = feasible_point(scaled) if raw.x is None else raw.x
+    return None if start is None else solve_active_set(scaled, start)
 
 
 # --- OSQP

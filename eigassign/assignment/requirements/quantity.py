@@ -93,21 +93,23 @@ class LimitedQuantity(Requirement):
         """The quantity, before an amount of it."""
         return self.label
 
+    def worst(self, y: Floats) -> tuple[int, float, Floats]:
+        """The row where the quantity of a design (n_y,) is largest, its value and slopes there."""
+        value, slopes = self.value(y, _NO_MODES)
+        k = int(np.abs(value).argmax())
+        return k, float(value[k]), slopes[k]
+
     def amount(self, y: Floats) -> float:
-        """The quantity of a design (n_y,), SI."""
-        value, c = self.terms[0]
-        assert not isinstance(value, int)
-        return float(np.asarray(c * value(y)[0]))
+        """The quantity of a design (n_y,), SI, where it is worst."""
+        return self.amount_of(self.worst(y)[1])
 
     def amount_of(self, value: float) -> float:
         """The amount that a value of its rows stands for."""
         return value
 
     def slopes(self, y: Floats) -> Floats:
-        """The slopes (n_y,) of the quantity at a design (n_y,)."""
-        value, c = self.terms[0]
-        assert not isinstance(value, int)
-        return np.asarray(c * value(y)[1])
+        """The slopes (n_y,) of the amount at a design (n_y,)."""
+        return self.worst(y)[2]
 
     def violation(self, amount: float, reach: float, near: float = 0.0) -> float:
         """The way of an amount beyond a limit, relative to that; 0 within both.
@@ -264,20 +266,18 @@ class DriveLimit(LimitedQuantity):
         """The limit of the peak."""
         return -np.inf, float(self.upper[0])
 
-    def amount(self, y: Floats) -> float:
-        """The peak of a design (n_y,)."""
-        return float(np.abs(self.load(y)[0]).max())
+    def amount_of(self, value: float) -> float:
+        """The magnitude of a load."""
+        return abs(value)
 
     def slopes(self, y: Floats) -> Floats:
         """The slopes (n_y,) of the peak."""
-        tau, slopes = self.load(y)
-        k = int(np.abs(tau).argmax())
-        return np.asarray(np.sign(tau[k]) * slopes[k])
+        _, tau, slopes = self.worst(y)
+        return np.asarray(np.sign(tau) * slopes)
 
     def where(self, y: Floats) -> str:
         """`` at sample 12 (t = 0.3 s)``."""
-        samples, tau, _ = self.load.samples(y)
-        return f" at {self.load.path.where(int(samples[np.abs(tau).argmax()]))}"
+        return f" at {self.load.path.where(int(self.load.samples(y)[0][self.worst(y)[0]]))}"
 
     @property
     def in_words(self) -> str:

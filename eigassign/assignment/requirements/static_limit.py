@@ -124,23 +124,18 @@ class StaticLimit(LimitedQuantity):
         """The stiffness, compliance or sag (n,) at its samples; NaN where nothing gives way."""
         return self._in_its_unit(self.way(y)[0])
 
-    def amount(self, y: Floats) -> float:
-        """The worst of a design (n_y,)."""
-        return self.amount_of(float(self.way(y)[0].max()))
-
     def amount_of(self, value: float) -> float:
         """The stiffness, compliance or sag of a way."""
         return float(self._in_its_unit(np.array(value)))
 
     def slopes(self, y: Floats) -> Floats:
         """The slopes (n_y,) of the worst."""
-        w, slopes = self.way(y)
-        k, inverse = int(w.argmax()), self.way.target.limit == "at_least"
-        return np.asarray(-slopes[k] / w[k] ** 2 if inverse else slopes[k])
+        _, w, slopes = self.worst(y)
+        return -slopes / w**2 if self.way.target.limit == "at_least" else slopes
 
     def where(self, y: Floats) -> str:
         """`` at sample 12 (t = 0.3 s)``."""
-        return f" at {self.way.path.where(self.rows.start + int(self.way(y)[0].argmax()))}"
+        return f" at {self.way.path.where(self.rows.start + self.worst(y)[0])}"
 
     def _in_its_unit(self, w: Floats) -> Floats:
         if self.way.target.limit == "at_most":
