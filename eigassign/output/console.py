@@ -28,7 +28,7 @@ _COLOURS = {
     "yellow": {"improved", "unfinished", "over tolerance"},
     "red": {
         *("unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),
-        *("poor_fit", "not_identified", "not run"),
+        *("poor_fit", "not_identified", "no answer"),
     },
 }
 

@@ -61,7 +61,7 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert "wrong" not in written
     assert "eigassign: 3 of 4 cases gave no answer to use" in err
     assert err.count("case ") >= 4
-    for word in ("Reached", "Do not use", "Infeasible", "Not run"):
+    for word in ("Reached", "Do not use", "Infeasible", "Failed"):
         assert f"  {word}  " in out
     suite = ET.parse("results/junit.xml").getroot()
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "2", "1")

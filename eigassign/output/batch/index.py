@@ -183,6 +183,7 @@ def write_tests(
 
 def _test(row: CaseOutcome, moves: Sequence[str]) -> Test:
     output = f"run folder: {row.run_folder}" if row.run_folder else ""
-    status = "moved" if moves and row.status == "ok" else row.status
+    status = row.status if row.status in ("ok", "error") else row.word.lower()
+    status = "moved" if moves and status == "ok" else status
     message = "\n".join(filter(None, (row.message, *moves)))
     return row.name, row.path, row.seconds, status, message, output

@@ -59,7 +59,7 @@ class CaseOutcome:
         return verdict_word(self.verdict) or _WITHOUT.get(self.status, self.status)
 
 
-_WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", "error": "Not run"}
+_WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", "error": "Failed"}
 _STATUSES = get_args(Status)
 NUMBERS = (  # that every case has, or lacks
     "initial_max_relative", "predicted_max_relative", "exact_max_relative", "exact_rms_relative",

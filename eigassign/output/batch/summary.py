@@ -125,9 +125,12 @@ def bare_names(outcomes: Sequence[CaseOutcome]) -> list[str]:
 
 
 def said(rows: Sequence[CaseOutcome]) -> str:
-    """``58 ok, 2 error``."""
-    counts, order = Counter[str](r.status for r in rows), ("ok", "tolerance", "failed", "error")
-    return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])
+    """``58 meet what is asked, 2 do not, 1 failed``: what failed could not be run."""
+    count = Counter[str](row.status for row in rows)
+    met, failed = count["ok"], count["error"]
+    others = ((len(rows) - met - failed, "do not"), (failed, "failed"))
+    words = [f"{met} meet what is asked", *(f"{n} {what}" for n, what in others if n)]
+    return ", ".join(words) if rows else ""
 
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -101,7 +101,7 @@ def test_junit_counts_and_names_what_happened(suite):
     kinds = [[child.tag for child in case if child.tag != "system-out"] for case in suite]
     assert kinds == [[], ["failure"], ["failure"], ["error"]]
     assert suite[1][0].get("message") == "5 % exceeds 2 %"
-    assert suite[1][0].get("type") == "tolerance"
+    assert suite[1][0].get("type") == "over tolerance"
     assert suite[0].get("file") == "cases/two_link.yaml"
 
 
