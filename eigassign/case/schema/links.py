@@ -176,7 +176,7 @@ class SuperelementNode(Part):
 class SuperelementLink(Part):
     """A part by its matrices, from another program, without supports.
 
-    What a file is, is told by its content: Nastran (DMIG punch), Abaqus (matrix output,
+    What a file is, is told by its content: Nastran (DMIG punch, OP4), Abaqus (matrix output,
     substructures), CalculiX (.sti, .mas), Ansys (Matrix Market), MATLAB, NumPy.
 
     Keys:

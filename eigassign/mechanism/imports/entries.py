@@ -33,6 +33,7 @@ ENTRIES = 20_000_000  # all that is done with an entry takes some 150 bytes: 3 G
 LARGEST = 1e30  # entry or coordinate, in any units: squares of squares are finite
 LEAST = 1e-75  # an entry that is not zero: squares of squares are still normal numbers
 COMPLEX = "has complex entries: damping is not modelled, export the real stiffness and mass"
+_EMPTY = 16  # lines are filled to their length: one number of 8 characters in a line of 80 is less
 LABEL = 100  # freedoms of a node that are told apart: Abaqus numbers them up to 40
 _EXPONENTS = bytes.maketrans(b"dD", b"EE")  # as Fortran writes double precision
 
@@ -102,6 +103,17 @@ def labelled(rows: Ints, columns: Ints, values: Floats, half: bool) -> Matrix:
     labels, places = np.unique(np.concatenate([rows, columns]), return_inverse=True)
     n = len(rows)
     return Matrix(assembled(len(labels), places[:n], places[n:], values, half), labels)
+
+
+def cells(lines: list[bytes], width: int, most: int) -> Cells:
+    """Columns of one ``width`` in lines of ``most`` of them; the last of a line may be missing."""
+    if len(lines) * most * width > _EMPTY * (1000 + sum(map(len, lines))):
+        raise ValueError("lines much shorter than announced")
+    whole = b"".join(line.rstrip().ljust(most * width) for line in lines)
+    if len(whole) != len(lines) * most * width:
+        raise ValueError("a line too long")
+    found = np.frombuffer(whole, f"S{width}")
+    return np.asarray(found[np.char.strip(found) != b""])
 
 
 def reals(found: Cells) -> Floats:

@@ -26,7 +26,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes, seen_from
-from eigassign.mechanism.imports import entries, matlab, programs
+from eigassign.mechanism.imports import entries, matlab, op4, programs
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
@@ -47,6 +47,8 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     entries.read_matrix_market,
     entries.read_numpy,
     matlab.read_matlab,
+    op4.read_binary,
+    op4.read_text,
     programs.read_bulk,
     programs.read_substructure,
     programs.read_nodes,
@@ -55,8 +57,8 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     entries.read_table,
 )
 _KNOWN = (
-    "Nastran (DMIG, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy, nor a square "
-    "table of numbers"
+    "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy, nor a "
+    "square table of numbers"
 )
 
 

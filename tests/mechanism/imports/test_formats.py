@@ -28,6 +28,8 @@ from writers import (
     mapping,
     matlab,
     matlab73,
+    op4_binary,
+    op4_text,
     substructure,
 )
 
@@ -57,6 +59,23 @@ def of_dmig(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
     text = "$TITLE\n" + grids(PLACES) + dmig("KAAX", K, labels) + dmig("MAAX", M, labels, e="E")
     texts(folder, part_pch=text)
     return {"file": "part.pch", "nodes": BY_ID}
+
+
+def of_op4(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
+    texts(
+        folder,
+        part_op4=op4_text("KAA", K, "dense") + op4_text("MAA", M, "bigmat"),
+        part_dof=dofs(labels),
+        nodes_csv=CSV,
+    )
+    return {"file": "part.op4", "nodes_file": ["part.dof", "nodes.csv"], "nodes": BY_ID}
+
+
+def of_op4_binary(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
+    data = op4_binary("KAA", K, "dense", ">") + op4_binary("MAA", M, "sparse", ">")
+    (folder / "part.op4").write_bytes(data)
+    texts(folder, part_dof=dofs(labels), nodes_bdf=grids(PLACES, wide=True))
+    return {"file": "part.op4", "nodes_file": ["part.dof", "nodes.bdf"], "nodes": BY_ID}
 
 
 def of_abaqus(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
@@ -117,7 +136,7 @@ def of_tables(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tre
 
 
 WRITERS: tuple[Writer, ...] = (
-    of_dmig, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
+    of_dmig, of_op4, of_op4_binary, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
     of_matlab73, of_numpy, of_tables,
 )  # fmt: skip
 
@@ -162,6 +181,20 @@ def same(file: Path, K: np.ndarray, data: str | bytes, digits: int = 17) -> None
     found = read_matrix(file, "key").toarray()
     texts = np.vectorize(lambda v: float(f"{v:.{digits - 1}e}"))
     np.testing.assert_array_equal(found, texts(K) if digits < 17 else K)
+
+
+@pytest.mark.parametrize("layout", ["dense", "sparse", "bigmat"])
+@pytest.mark.parametrize(("width", "digits"), [(16, 10), (23, 17), (26, 20)])
+def test_op4_in_text(tmp_path: Path, K: np.ndarray, layout: str, width: int, digits: int) -> None:
+    same(tmp_path / "K.op4", K, op4_text("KAA", K, layout, width), digits)
+
+
+@pytest.mark.parametrize("layout", ["dense", "sparse", "bigmat"])
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("size", [4, 8])
+def test_op4_in_binary(tmp_path: Path, K: np.ndarray, layout: str, order: str, size: int) -> None:
+    exact = K if size == 8 else K.astype(np.float32).astype(float)
+    same(tmp_path / "K.op4", exact, op4_binary("KAA", K, layout, order, size))
 
 
 @pytest.mark.parametrize(("wide", "digits"), [(True, 10), (False, 3)])
