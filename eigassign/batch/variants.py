@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
-from eigassign.case.schema.document import validated_sweep
+from eigassign.case.schema.document import validated_part
 from eigassign.case.schema.sweep import MOST, Sweep, text_of
 from eigassign.case.table import read_words
 from eigassign.case.values import key_path, objection
@@ -77,7 +77,7 @@ def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> V
     given = {"parameters": _set(settings)} if settings else source.tree.get("sweep")
     if given is None:
         return AS_IT_STANDS
-    sweep, findings = validated_sweep(given)
+    sweep, findings = validated_part(Sweep, given, None, "sweep")
     if sweep is not None:
         try:
             found = _spread(sweep, folder)

@@ -7,7 +7,7 @@ In reading order, each importing only from those above it:
     units        quantities with units, dimension-checked → SI
     table        a table in a CSV file → columns in SI
     schema       what each key may hold: one pydantic model for each part of a case file
-    rules        what keys must have in common, over the plain data; what looks like a slip
+    rules        what keys must have in common once each is right; what looks like a slip
     canonical    content of a case → canonical YAML text that reads back equal
     case_file    the validated case as the rest of the program sees it
     values       other values of some keys

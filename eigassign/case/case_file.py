@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from pathlib import Path
-from typing import Any
 
 from eigassign.brief import cut, named
-from eigassign.case.canonical import plain, to_yaml
-from eigassign.case.reader import KeyPath, Mark, Tree, dotted
+from eigassign.case.canonical import to_yaml
+from eigassign.case.reader import KeyPath, Mark, dotted
 from eigassign.case.rules.properties import (
     below,
     is_place,
@@ -21,6 +20,7 @@ from eigassign.case.rules.properties import (
     property_at,
     quantities,
     value_at,
+    with_value,
 )
 from eigassign.case.schema.design import Design, Parameter
 from eigassign.case.schema.document import Document
@@ -143,15 +143,9 @@ class CaseFile:
         """Dimension and limits of each design parameter, in the order of y."""
         return self.quantities([p.parameter for p in self.design.parameters.values()])
 
-    @property
-    def _tree(self) -> Tree:
-        """What properties are looked up in."""
-        return {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
-
     def quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
         """Dimension and limits of the property at each path."""
-        found = (property_at(self._tree, path) for path in paths)
-        return tuple(each or Quantity() for each in found)
+        return tuple(property_at(self, path) for path in paths)
 
     @property
     def design_units(self) -> tuple[str, ...]:
@@ -190,13 +184,13 @@ class CaseFile:
     @property
     def variant_units(self) -> Mapping[str, str]:
         """SI unit of each value of its `variant`, by key; empty where the schema knows of none."""
-        tree, found = self._tree, dict[str, Quantity]()
+        found = dict[str, Quantity]()
         designed = dict(zip(self.design.parameters, self.design_quantities, strict=True))
         for key in self.variant:
             *owners, last = key.split(".")
             owner = reduce(below, owners, self)
             own = quantities(type(owner)).get(last) if isinstance(owner, Part) else None
-            known = known_property(tree, key.removeprefix("mechanism.")) or own
+            known = known_property(self, key.removeprefix("mechanism.")) or own
             bound = last in ("min", "max") and owners[:1] == ["design"]
             found[key] = known or (designed.get(owners[-1]) if bound else None) or Quantity()
         return dict(zip(found, _units(found.values()), strict=True))
@@ -242,9 +236,9 @@ class CaseFile:
             for path, factor in column.factors.items():
                 head, *rest = path.split(".")
                 if head == "coordinates":
-                    coordinates = _with_value(coordinates, rest, factor * float(value))
+                    coordinates = with_value(coordinates, rest, factor * float(value))
                 else:
-                    mechanism = _with_value(mechanism, [head, *rest], factor * float(value))
+                    mechanism = with_value(mechanism, [head, *rest], factor * float(value))
         return replace(self, mechanism=mechanism, coordinates=coordinates)
 
     def with_every_property(self, places: bool = True) -> CaseFile:
@@ -255,7 +249,7 @@ class CaseFile:
         """
         entries = {
             path: Parameter(parameter=path, min=value, max=value)
-            for path in properties_of(self._tree)
+            for path in properties_of(self)
             if path not in self.loads
             and (places or not is_place(path) or f"{path}.add" in self.loads)
             if (value := self.value_at(path))
@@ -265,19 +259,6 @@ class CaseFile:
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
         return to_yaml({name: getattr(self, name) for name in Document.model_fields})
-
-
-def _with_value(part: Any, path: Sequence[str], value: float) -> Any:
-    """A copy of a part, or of a mapping of parts, with one number below it replaced."""
-    if not path:
-        return value
-    key, *rest = path
-    if isinstance(part, Mapping):
-        return FrozenDict({**part, key: _with_value(part[key], rest, value)})
-    if isinstance(part, tuple):
-        k = int(key)
-        return (*part[:k], _with_value(part[k], rest, value), *part[k + 1 :])
-    return part.model_copy(update={key: _with_value(getattr(part, key), rest, value)})
 
 
 def _units(quantities: Iterable[Quantity]) -> tuple[str, ...]:

@@ -1,9 +1,9 @@
 """Path → CaseFile, or all problems of the file at once.
 
-    bytes or mapping → reader → tree → values in SI → schema → document → CaseFile
-                       └→ rules
+    bytes or mapping → reader → tree → schema → document → rules → CaseFile
 
-The schema and the rules both look at the whole file, so that nobody mends a file twice.
+The schema looks at the form of the whole file, the rules at what its parts have in common once the
+form is right. Each tells all that it finds at once.
 """
 
 from __future__ import annotations
@@ -22,25 +22,19 @@ from typing import Any
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import Source, read_mapping, read_yaml
-from eigassign.case.rules.consistency import inconsistent, too_many
+from eigassign.case.rules.consistency import inconsistent, keys_have_values, too_many
 from eigassign.case.rules.files import (
     NamedFile,
     named_files,
     not_allowed,
     unreadable,
-    with_listed_choices,
+    with_listed,
 )
 from eigassign.case.rules.plausibility import implausible
-from eigassign.case.rules.properties import (
-    bounds_hold_nothing_impossible,
-    load_cases_set_nothing_impossible,
-    parameters_agree_with_the_file,
-    starts_outside,
-)
-from eigassign.case.rules.values import completed
+from eigassign.case.rules.properties import starts_outside, with_value
+from eigassign.case.rules.values import followed_designs
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.parts import FrozenDict
-from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.case.values import with_values
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
@@ -146,21 +140,21 @@ def checked(
     bad = [] if allow_outside else [*not_allowed(named, path.parent)]
     bad = bad or [*unreadable([each for each in named if not each.spare])]
     unread = {place for place, _ in bad}
-    tree, more = with_listed_choices(source.tree, [n for n in named if n.path not in unread])
-    source, unread = replace(source, tree=tree), unread | {place for place, _ in more}
-    document, schema_findings = validated(completed(source.tree, path.parent))
-    findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *bad, *more]
-    findings += [(place, why) for place, why in schema_findings if place not in unread]
+    tree, more = with_listed(source.tree, [n for n in named if n.path not in unread], path.parent)
+    unread |= {place for place, _ in more} | {n.path for n in named if n.path[0] == "design"}
+    document, schema_findings = validated(tree, path.parent)
     empty = {place[:3] for place in unread if "sections" in place}  # which a file would have filled
-    findings = [each for each in findings if each[0][:3] not in empty or each in (*bad, *more)]
-    if document is not None:
-        tree, motions = source.tree, named_trajectories(document.trajectory)
-        findings += parameters_agree_with_the_file(tree, document)
-        findings += bounds_hold_nothing_impossible(tree, document)
-        findings += load_cases_set_nothing_impossible(tree, document, motions)
+    findings = [*bad, *more]
+    for place, why in (*islice(keys_have_values(tree), 2 * MOST_PROBLEMS), *schema_findings):
+        if place not in unread and place[:3] not in empty:
+            findings.append((place, why))
+    if document is not None and not findings:
+        findings = [*islice(inconsistent(document), 2 * MOST_PROBLEMS)]
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(_first(list(dict.fromkeys(problems))))
+    for place, value in [*followed_designs(document)]:
+        document = with_value(document, place, value)
     return _case_file(document, source, written, values, named)
 
 
@@ -183,7 +177,7 @@ def _case_file(
 ) -> CaseFile:
     path = written.path
     content = {name: getattr(document, name) for name in Document.model_fields}
-    doubts = [*implausible(document), *starts_outside(source.tree, document)]
+    doubts = [*implausible(document), *starts_outside(document)]
     doubts += unreadable([each for each in named if each.spare])
     warnings = [source.problem(*finding) for finding in doubts]
     return CaseFile(

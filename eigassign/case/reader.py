@@ -336,27 +336,3 @@ def items(node: object, *keys: str) -> list[tuple[str, object]]:
     """Entries of the mapping below ``keys``; none if it is not a mapping."""
     inner = at(node, *keys)
     return list(inner.items()) if isinstance(inner, Mapping) else []
-
-
-def names(node: object, *keys: str) -> list[str]:
-    """Keys of the mapping below ``keys``."""
-    return [name for name, _ in items(node, *keys)]
-
-
-def lacks(node: object, keys: tuple[str, ...], name: str) -> bool:
-    """Whether the mapping below ``keys`` has no ``name``; False where it is missing or no mapping
-    (one error is enough)."""
-    inner = at(node, *keys)
-    return isinstance(inner, Mapping) and name not in inner
-
-
-def entries(node: object, *keys: str) -> tuple[object, ...]:
-    """Items of the list below ``keys``; none if it is not a list."""
-    inner = at(node, *keys)
-    return inner if isinstance(inner, tuple) else ()
-
-
-def text(node: object, *keys: str) -> str | None:
-    """Text below ``keys``, or None."""
-    inner = at(node, *keys)
-    return inner if isinstance(inner, str) else None

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from eigassign.case.reader import KeyPath, Tree
-from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import validated
 
 _BRACKET = re.compile(r"\[(\d+)\]")
@@ -97,7 +96,7 @@ def objection(tree: Tree, folder: Path, key: str, value: object) -> str | None:
     wrong = []
     if isinstance(node, Mapping):  # perhaps a key that the file leaves to its default
         first = path[: known + 1]
-        _, findings = validated(completed(with_values(tree, {key: value}), folder))
+        _, findings = validated(with_values(tree, {key: value}), folder)
         about = [(place, why) for place, why in findings if place[: len(first)] == first]
         wrong = [why for at, why in about if at != path or why.startswith("unknown key")]
         if not wrong:

@@ -121,15 +121,15 @@ def test_a_key_that_is_not_text_is_refused(key: str) -> None:
     assert message.startswith("case.yaml:36:")
 
 
-def test_a_duplicate_and_a_schema_error_and_an_unknown_name_are_told_together() -> None:
+def test_a_duplicate_is_told_with_errors_of_form_and_with_unknown_names() -> None:
     text = TEXT.replace("title: Arm", "title: Arm\ntitle: Leg")
-    text = text.replace("density: 2700", "density: -1").replace("section: pipe", "section: pip")
-    lines = message_for(text.encode()).splitlines()
-    assert [line.split(": ")[1] for line in lines] == [
-        "title",
-        "mechanism.materials.alu.density",
-        "mechanism.links.fore.section",
-    ]
+    text = text.replace("section: pipe", "section: pip")
+    for old, new, path in (
+        ("density: 2700", "density: -1", "mechanism.materials.alu.density"),
+        ("density: 2700", "density: 2700", "mechanism.links.fore.section"),
+    ):
+        lines = message_for(text.replace(old, new).encode()).splitlines()
+        assert [line.split(": ")[1] for line in lines] == ["title", path]
 
 
 def test_a_missing_file_is_wrong_usage(tmp_path: Path) -> None:

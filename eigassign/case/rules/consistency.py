@@ -1,63 +1,38 @@
-"""The table of rules: what several keys must have in common, over the plain data of a file.
+"""The table of rules: what several keys must have in common, once the form of each is right.
 
-The rules see the data as they are written, not what the schema makes of them, so that they find
-their problems even where the schema has some of its own: all are reported at once. A rule keeps
-silent about what it cannot judge. Its name and docstring say what must hold; it yields where it
-does not, and why. To add one: write it, and name it here.
+A rule keeps silent about what it cannot judge since a name in it stands for nothing: that is told
+already. Its name and docstring say what must hold; it yields where it does not, and why. To add
+one: write it, and name it here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names
-from eigassign.case.rules import joints, links, properties, study, targets
-from eigassign.case.schema.design import is_entry
+from eigassign.case.reader import Finding, KeyPath, Tree, items
+from eigassign.case.rules import joints, links, properties, study, targets, values
+from eigassign.case.schema.document import Document
 from eigassign.case.schema.mechanism import Mechanism
 
-Rule = Callable[[Tree], Iterator[Finding]]
+Rule = Callable[[Document], Iterator[Finding]]
 
 
-def keys_have_values(node: object, path: KeyPath = ()) -> Iterator[Finding]:
-    """No key and no entry of a list below ``path`` is left empty."""
-    if node is None:
-        comma = bool(path) and str(path[-1])[:1].isdigit()
-        hint = " (decimals take a point, not a comma)" if comma else ""
-        yield path, f"has no value: give one, or leave the key out{hint}"
-    for key, inner in node.items() if isinstance(node, Mapping) else ():
-        yield from keys_have_values(inner, (*path, key))
-    for k, inner in enumerate(node) if isinstance(node, tuple) else ():
-        if not isinstance(inner, (int, float)):
-            yield from keys_have_values(inner, (*path, k))
-
-
-def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
+def reserved_names_are_not_used(document: Document) -> Iterator[Finding]:
     """`ground` is no link, `time` heads every table over time, `torque` limits drives."""
-    if "time" in names(tree, "coordinates"):
+    if "time" in document.coordinates:
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
-    if "ground" in names(tree, "mechanism", "links"):
+    if "ground" in document.mechanism.links:
         path = ("mechanism", "links", "ground")
         yield path, "'ground' is the fixed frame: name the link otherwise"
-    if is_entry(at(tree, "design", "torque")):
+    if "torque" in document.design.entries:
         message = "'torque' limits what drives exert, by coordinate: name the parameter otherwise"
         yield ("design", "torque"), message
 
 
-def gravity_pulls(tree: Tree) -> Iterator[Finding]:
-    """No gravity at all is `none`: said on purpose."""
-    given = at(tree, "mechanism", "gravity")
-    if isinstance(given, tuple) and given and not any(given):
-        yield ("mechanism", "gravity"), "pulls nowhere: write none to leave gravity out"
-
-
 RULES: tuple[Rule, ...] = (
-    keys_have_values,
     reserved_names_are_not_used,
-    gravity_pulls,
     links.links_have_known_materials,
     links.beams_have_known_sections,
-    links.materials_have_a_shear_modulus_where_beams_need_it,
-    links.solids_have_a_poissons_ratio,
     links.bare_sections_have_the_moments_of_their_space,
     links.rigid_links_have_one_end,
     links.frames_hang_together,
@@ -76,6 +51,7 @@ RULES: tuple[Rule, ...] = (
     properties.parameters_name_properties,
     properties.properties_of_one_parameter_are_alike,
     properties.load_cases_set_properties,
+    values.values_are_what_they_are_of,
     study.lists_have_an_entry_for_each_coordinate,
     study.expansion_point_has_an_entry_for_each_parameter,
     study.trajectories_have_names_of_their_own,
@@ -93,15 +69,40 @@ RULES: tuple[Rule, ...] = (
     targets.robust_designs_have_tolerances,
     targets.profiles_cover_their_trajectories,
 )
+LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right
+    study.bounds_go_upwards,
+    properties.parameters_agree_with_the_file,
+    properties.bounds_hold_nothing_impossible,
+    properties.load_cases_set_nothing_impossible,
+)
 
 
-def inconsistent(tree: Tree) -> Iterator[Finding]:
+def inconsistent(document: Document) -> Iterator[Finding]:
     """Everything that does not fit together."""
+    found = False
     for rule in RULES:
-        yield from rule(tree)
+        for finding in rule(document):
+            found = True
+            yield finding
+    for rule in () if found else LAST:
+        yield from rule(document)
 
 
-# --- Files that are no mechanism's
+# --- Before the form is looked at
+
+
+def keys_have_values(node: object, path: KeyPath = ()) -> Iterator[Finding]:
+    """No key and no entry of a list below ``path`` is left empty."""
+    if node is None:
+        comma = bool(path) and str(path[-1])[:1].isdigit()
+        hint = " (decimals take a point, not a comma)" if comma else ""
+        yield path, f"has no value: give one, or leave the key out{hint}"
+    for key, inner in node.items() if isinstance(node, Mapping) else ():
+        yield from keys_have_values(inner, (*path, key))
+    for k, inner in enumerate(node) if isinstance(node, tuple) else ():
+        if not isinstance(inner, (int, float)):
+            yield from keys_have_values(inner, (*path, k))
+
 
 _MOST = 1000  # entries of a group
 _MOST_INSIDE = 10_000  # nodes or beams of one link
@@ -118,7 +119,7 @@ def too_many(tree: Tree) -> Iterator[Finding]:
     for place in _GROUPS:
         if len(items(tree, *place)) > _MOST:
             yield place, f"more than {_MOST} entries"
-    for name in names(tree, "mechanism", "links"):
+    for name, _ in items(tree, "mechanism", "links"):
         for key in ("nodes", "beams"):
             place = ("mechanism", "links", name, key)
             if len(items(tree, *place)) > _MOST_INSIDE:

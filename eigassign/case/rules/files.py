@@ -13,15 +13,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, dotted, entries, items
-from eigassign.case.rules.lookups import curves, design_entries, links, trajectories
-from eigassign.case.rules.properties import NoPropertyError, known_property, property_at
+from eigassign.case.reader import Finding, KeyPath, Tree, at, dotted, items
+from eigassign.case.rules.properties import NoPropertyError, property_at, quantities
 from eigassign.case.schema.design import PRICE
-from eigassign.case.suggestions import unknown
+from eigassign.case.schema.document import validated
+from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.sections import SHAPES
+from eigassign.case.suggestions import listed, suggestion, unknown
 from eigassign.case.table import CsvColumn, read_table, read_words
 from eigassign.case.units import PLAIN
 from eigassign.errors import MechanismError
@@ -30,6 +33,20 @@ from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 _SPARE = ("measurements", "sweep")
 _MATRIX = ("stiffness", "mass")  # keys that may name a matrix in a file
 _VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62})", re.DOTALL)
+_SUPERELEMENT = ("mechanism", "links", "*superelement")
+_PLACES: tuple[tuple[KeyPath, int], ...] = (  # where files are named, and how large they may be
+    (("trajectory", "file"), TABLE),
+    (("trajectory", "*", "file"), TABLE),
+    (("targets", "*", "*", "file"), TABLE),
+    (("targets", "*", "keep_out", "of", "file"), TABLE),
+    (("measurements", "file"), TABLE),
+    (("sweep", "file"), TABLE),
+    (("mechanism", "sections", "*", "file"), TABLE),
+    (("design", "*", "choices", "file"), TABLE),  # with what sections are by then
+    *(((*_SUPERELEMENT, key), MATRIX) for key in (*_MATRIX, "file", "nodes_file")),
+    ((*_SUPERELEMENT, "nodes_file", "*"), MATRIX),
+    (("mechanism", "links", "*solid", "mesh"), MESH),
+)
 
 
 class NamedFile(NamedTuple):
@@ -45,39 +62,36 @@ class NamedFile(NamedTuple):
     spare: bool
     variable: str = ""
 
-    @property
-    def value(self) -> str:
-        """What the case would write with an absolute path."""
-        return f"{self.file}:{self.variable}" if self.variable else self.file
-
 
 def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     """Files that the case names; relative paths start in ``folder``."""
-    tables = [(path, body, "file") for path, body in trajectories(tree) if at(body, "tip") is None]
-    tables += [(path, body, "file") for path, body in curves(tree)]
-    tables += [((key,), at(tree, key), "file") for key in _SPARE]
-    lists = ((name, at(body, "choices")) for name, body in design_entries(tree))
-    tables += [(("design", name, "choices"), body, "file") for name, body in lists]
-    sections = items(tree, "mechanism", "sections")
-    tables += [(("mechanism", "sections", name), body, "file") for name, body in sections]
-    matrices = [
-        (path, body, key)
-        for _, path, body in links(tree, "superelement")
-        for key in (*_MATRIX, "file", "nodes_file")
-    ]
-    meshes = [(path, body, "mesh") for _, path, body in links(tree, "solid")]
     found = []
-    for group, limit in ((tables, TABLE), (matrices, MATRIX), (meshes, MESH)):
-        for path, body, key in group:
-            listed = enumerate(entries(body, key))
-            given = [((*path, key), at(body, key)), *(((*path, key, k), f) for k, f in listed)]
-            for place, name in given:
-                if isinstance(name, str):
-                    file, variable = os.path.abspath(folder / name), ""
-                    if key in _MATRIX:
-                        file, variable = split_variable(file)
-                    found.append(NamedFile(place, file, limit, path[0] in _SPARE, variable))
+    for place, limit in _PLACES:
+        for path, name in _at(tree, place):
+            if isinstance(name, str):
+                file, variable = os.path.abspath(folder / name), ""
+                if path[-1] in _MATRIX:
+                    file, variable = split_variable(file)
+                found.append(NamedFile(path, file, limit, path[0] in _SPARE, variable))
     return found
+
+
+def _at(node: object, place: KeyPath, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object]]:
+    """Key path and content of what stands at a ``place``: * is any key or entry, *solid any solid.
+
+    Of a trajectory with a tip, `file` is a key too many.
+    """
+    if not place:
+        yield path, node
+        return
+    known: dict[str | int, object] = dict(node) if isinstance(node, Mapping) else {}
+    known |= dict(enumerate(node)) if isinstance(node, tuple) else {}
+    star, _, kind = str(place[0]).partition("*")
+    for key, inner in known.items():
+        if (key == place[0] and "tip" not in known) or (
+            not star and (not kind or at(inner, "type") == kind)
+        ):
+            yield from _at(inner, place[1:], (*path, key))
 
 
 def split_variable(name: str) -> tuple[str, str]:
@@ -108,71 +122,82 @@ def unreadable(named: Sequence[NamedFile]) -> Iterator[Finding]:
             yield each.path, f"no such file: {printable(each.file)} ({reason})"
 
 
-def with_listed_choices(tree: Tree, named: Sequence[NamedFile]) -> tuple[Tree, list[Finding]]:
-    """``tree`` with the content of those ``named`` files that list choices, in SI; what is wrong.
+def with_listed(tree: Tree, named: Sequence[NamedFile], folder: Path) -> tuple[Tree, list[Finding]]:
+    """``tree`` with the sections and choices that ``named`` files list, in SI; what is wrong there.
 
-    A file that cannot be read lists nothing.
+    A file that cannot be read lists nothing, nor do choices of a mechanism of wrong form.
     """
     findings: list[Finding] = []
     for each in named:
-        place = [str(key) for key in each.path[:-1]]
-        match each.path:
-            case ("design", _, "choices", "file"):
-                owner = ""
-            case ("mechanism", "sections", str(name), "file"):
-                owner = f"sections.{name}."
-            case _:
-                continue
+        file, key = Path(each.file), dotted(each.path)
         try:
-            read: Mapping[str, Any] = dict(
-                _choices(tree, Path(each.file), dotted(each.path), owner)
-            )
+            match each.path:
+                case ("mechanism", "sections", str(name), "file"):
+                    own = dict(items(tree, "mechanism", "sections", name))
+                    profile = str(own.get("name"))
+                    read = dict(_lines(file, key, partial(_of_section, name, own.get("shape"))))
+                    if profile not in read:
+                        message = unknown("profile", profile, read)
+                        findings.append(((*each.path[:-1], "name"), message))
+                        continue
+                    lines = own | {k: v for k, v in read[profile].items() if k != PRICE}
+                    tree = _put(
+                        tree,
+                        each.path[:3],
+                        {k: lines[k] for k in lines if k not in ("file", "name")},
+                    )
+                case ("design", str(name), "choices", "file"):
+                    document, _ = validated({**tree, "design": {}, "targets": ()}, folder)
+                    if document is not None:
+                        asked = partial(property_at, document)
+                        tree = _put(tree, each.path[:3], dict(_lines(file, key, asked)))
         except MechanismError as error:
             findings.append((each.path, error.message))
-            continue
-        if owner:
-            own = dict(items(tree, *place))
-            del own["file"]
-            profile = str(own.pop("name", None))
-            if profile not in read:
-                findings.append(((*place, "name"), unknown("profile", profile, read)))
-                continue
-            read = own | {key: value for key, value in read[profile].items() if key != PRICE}
-        tree = _put(tree, place, read)
     return tree, findings
 
 
-def _put(tree: Tree, place: Sequence[str], value: object) -> Tree:
+def _of_section(name: str, shape: object, key: str) -> Quantity:
+    model = SHAPES.get(shape if isinstance(shape, str) else "bare")
+    known = quantities(model) if model else {}
+    if key not in known:
+        message = f"sections.{name} has no property {key!r}{suggestion(key, known)}"
+        raise NoPropertyError(f"{message}; can vary: {listed(known)}")
+    return known[key]
+
+
+def _put(tree: Any, place: KeyPath, value: object) -> Any:
     """``tree`` with ``value`` at ``place``."""
+    if not place:
+        return value
     first, *rest = place
-    inner = {**dict(items(tree, first))}
-    return {**tree, first: _put(inner, rest, value) if rest else value}
+    return {**tree, first: _put(tree[first], tuple(rest), value)}
 
 
-def _choices(
-    tree: Tree, file: Path, key: str, owner: str = ""
+def _lines(
+    file: Path, key: str, quantity: Callable[[str], Quantity]
 ) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Yield each choice by its name, of ``owner``. Raises MechanismError at ``key``."""
+    """Yield the values of each line by its name, of columns that are each a ``quantity``.
+
+    Raises MechanismError at ``key``.
+    """
     header = read_words(file, key)[0][1]
     name, *paths = (cell.partition("[")[0].strip() for cell in header)
-    if name == PRICE or known_property(tree, name):
-        message = f"{file.name}: the first column names the choices: put one before {name}"
-        raise MechanismError(key, message)
-    for cell, path in zip(header[1:], paths, strict=True):
+    columns = []
+    for cell, path in zip(header, (name, *paths), strict=True):
+        try:
+            asked = None if path == PRICE else quantity(path)
+        except NoPropertyError as error:
+            if path == name:
+                columns.append(CsvColumn(name))
+                continue
+            raise MechanismError(key, f"{file.name}: column {path}: {error}") from None
+        if path == name:
+            message = f"{file.name}: the first column names the choices: put one before {name}"
+            raise MechanismError(key, message)
         if path == PRICE != cell:
             message = f"{file.name}: column {cell}: prices are plain numbers: call it {PRICE}"
             raise MechanismError(key, message)
-    if owner:  # which has them from here
-        place = ["mechanism", *owner.split(".")[:-1]]
-        tree = _put(tree, place, dict(items(tree, *place)) | dict.fromkeys(paths, 1.0))
-    columns = [CsvColumn(name)]
-    for path in paths:
-        try:
-            asked = None if path == PRICE else property_at(tree, owner + path)
-        except NoPropertyError as error:
-            raise MechanismError(key, f"{file.name}: column {path}: {error}") from None
-        dimension = None if asked is None else asked.dimension
-        columns.append(CsvColumn(path, (dimension or PLAIN,)))
+        columns.append(CsvColumn(path, ((asked and asked.dimension) or PLAIN,)))
     table = read_table(file, key, columns)
     lines: dict[str, str] = {}
     for k, choice in enumerate(table.words[name]):

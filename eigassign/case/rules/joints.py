@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items, lacks, names, text
-from eigassign.case.rules.lookups import (
-    freedoms,
-    guessed,
-    is_planar,
-    links,
-    moving,
-    node_problem,
-    number,
-    type_of,
-)
-from eigassign.case.schema.joints import RIDING
-from eigassign.case.schema.parts import PLACE
+from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.rules.lookups import freedoms, guessed, moving, node_problem
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.joints import JointBase, NutJoint, RevoluteJoint
+from eigassign.case.schema.links import BeamLink
+from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 _JOINTS = ("mechanism", "joints")
@@ -41,15 +34,15 @@ class Walk(NamedTuple):
     apart: tuple[Edge, ...]  # neither of their links is placed
 
 
-def walk_from_the_ground(tree: Tree) -> Walk | None:
+def walk_from_the_ground(mechanism: Mechanism) -> Walk | None:
     """Place link after link, joints in the order of the file.
 
     None if a joint does not join two links that exist.
     """
-    known = set(names(tree, "mechanism", "links"))
+    known = set(mechanism.links)
     waiting = []
-    for joint, body in items(tree, *_JOINTS):
-        base, follower = ((text(body, key) or "").partition(".")[0] for key in ("base", "follower"))
+    for joint, body in mechanism.joints.items():
+        base, follower = (node.partition(".")[0] for node in (body.base, body.follower))
         if base not in {*known, "ground"} or follower not in known or base == follower:
             return None
         waiting.append(Edge(joint, base, follower))
@@ -61,61 +54,53 @@ def walk_from_the_ground(tree: Tree) -> Walk | None:
     return Walk(frozenset(placed), loops, tuple(e for e in waiting if e.base not in placed))
 
 
-def beams_carry_one_rider(tree: Tree) -> Iterator[Finding]:
+def beams_carry_one_rider(document: Document) -> Iterator[Finding]:
     """One carriage or nut travels along a beam: its mesh is divided where that stands."""
     riders: dict[str, str] = {}
-    for joint, body in items(tree, *_JOINTS):
-        base = text(body, "base")
-        if text(body, "type") not in RIDING or base is None:
+    for name, joint in document.mechanism.joints.items():
+        if not joint.travels:
             continue
-        if base in riders:
+        if joint.base in riders:
             message = (
-                f"{riders[base]!r} travels along {base!r} already, and a beam carries one carriage "
-                "or nut: make it two beams, with a fixed joint between them"
+                f"{riders[joint.base]!r} travels along {joint.base!r} already, and a beam carries "
+                "one carriage or nut: make it two beams, with a fixed joint between them"
             )
-            yield (*_JOINTS, joint, "base"), message
-        riders.setdefault(base, joint)
+            yield (*_JOINTS, name, "base"), message
+        riders.setdefault(joint.base, name)
 
 
-def nuts_are_on_their_shaft(tree: Tree) -> Iterator[Finding]:
+def nuts_are_on_their_shaft(document: Document) -> Iterator[Finding]:
     """A nut turns about its shaft: beside it there is none to turn about."""
-    for joint, body in items(tree, *_JOINTS):
-        if text(body, "type") == "nut" and any(
-            number(value, PLACE) for value in entries(body, "position")[1:]
-        ):
+    for name, joint in document.mechanism.joints.items():
+        if isinstance(joint, NutJoint) and any((joint.position or ())[1:]):
             message = (
                 "a nut stands on the axis of its shaft, so that only the first component of its "
                 "position may differ from zero: place what it carries by the nodes of its follower"
             )
-            yield (*_JOINTS, joint, "position"), message
+            yield (*_JOINTS, name, "position"), message
 
 
-def joints_connect_two_links(tree: Tree) -> Iterator[Finding]:
+def joints_connect_two_links(document: Document) -> Iterator[Finding]:
     """A joint's base and follower are nodes of two links; the base may be the ground, or a beam."""
-    if not names(tree, "mechanism", "links"):
-        return
-    for joint, body in items(tree, *_JOINTS):
-        path = (*_JOINTS, joint)
-        base, follower = text(body, "base"), text(body, "follower")
-        if base is not None and (problem := _base_problem(tree, base, text(body, "type"))):
+    for name, joint in document.mechanism.joints.items():
+        path = (*_JOINTS, name)
+        if problem := _base_problem(document.mechanism, joint):
             yield (*path, "base"), problem
-        if follower is None:
-            continue
-        link = follower.partition(".")[0]
+        link = joint.follower.partition(".")[0]
         if link == "ground":
             yield (*path, "follower"), "ground cannot follow: make it the base"
-        elif problem := node_problem(tree, follower):
+        elif problem := node_problem(document.mechanism, joint.follower):
             yield (*path, "follower"), problem
-        elif base is not None and base.partition(".")[0] == link:
+        elif joint.base.partition(".")[0] == link:
             yield path, "base and follower are the same link: a joint connects two"
 
 
-def _base_problem(tree: Tree, base: str, kind: str | None) -> str | None:
-    if kind not in RIDING:
-        return None if base == "ground" else node_problem(tree, base, "ground")
-    known = dict(items(tree, "mechanism", "links"))
-    beams = [name for name, *_ in links(tree, "beam")]
-    if base in beams or (base in known and type_of(known[base]) is None):
+def _base_problem(mechanism: Mechanism, joint: JointBase) -> str | None:
+    base = joint.base
+    if not joint.travels:
+        return None if base == "ground" else node_problem(mechanism, base, "ground")
+    beams = [name for name, link in mechanism.links.items() if isinstance(link, BeamLink)]
+    if base in beams:
         return None
     hint = suggestion(base.partition(".")[0], beams)
     if not beams:
@@ -123,10 +108,10 @@ def _base_problem(tree: Tree, base: str, kind: str | None) -> str | None:
     return f"rides along a beam: expected one of {listed(beams)}, got {shown(base)}{hint}"
 
 
-def links_are_connected_to_the_ground(tree: Tree) -> Iterator[Finding]:
+def links_are_connected_to_the_ground(document: Document) -> Iterator[Finding]:
     """Joints lead from the ground to every link; what hangs together apart is reported once."""
-    walk = walk_from_the_ground(tree)
-    left = [link for link in names(tree, "mechanism", "links") if walk and link not in walk.placed]
+    walk = walk_from_the_ground(document.mechanism)
+    left = [link for link in document.mechanism.links if walk and link not in walk.placed]
     while walk and left:
         group = {left[0]}
         while more := [e for e in walk.apart if (e.base in group) != (e.follower in group)]:
@@ -144,102 +129,93 @@ def links_are_connected_to_the_ground(tree: Tree) -> Iterator[Finding]:
 # --- Coordinates move joints
 
 
-def coordinates_move_one_freedom_each(tree: Tree) -> Iterator[Finding]:
+def coordinates_move_one_freedom_each(document: Document) -> Iterator[Finding]:
     """Each coordinate names a freedom that exists and that no other moves; in an open mechanism
     every freedom has one, since nothing else determines it."""
+    mechanism = document.mechanism
     owner: dict[tuple[str, str], str] = {}  # coordinate by joint and freedom
     complete = True
-    for name, body in items(tree, "coordinates"):
-        joint, path = text(body, "joint"), ("coordinates", name)
-        problems = list(_coordinate(tree, joint, body, path))
-        yield from problems
-        known, component = freedoms(tree, joint or ""), at(body, "component")
-        if known == ():
+    for name, body in document.coordinates.items():
+        path: KeyPath = ("coordinates", name)
+        known = freedoms(mechanism, body.joint)
+        if problem := _problem(mechanism, known, body, path):
+            yield problem
+            complete = complete and known == ()
             continue
-        if joint is None or known is None or problems or component not in (None, *known, 1, 2, 3):
-            complete = False  # what it moves is not known
-            continue
-        freedom = known[0] if component is None else str(component)
-        if (joint, freedom) in owner:
-            which = f"joint {joint!r}" if len(known) == 1 else f"{freedom} of joint {joint!r}"
-            yield (*path, "joint"), f"{which} has a coordinate already: {owner[joint, freedom]!r}"
-        owner.setdefault((joint, freedom), name)
-        turns = text(tree, *_JOINTS, joint, "type") == "revolute"
-        if is_planar(tree) and at(body, "angle") == "absolute" and not turns:
+        freedom = str(body.component or (known or ("",))[0])
+        if (body.joint, freedom) in owner:
+            of = f"{freedom} of " if known and len(known) > 1 else ""
+            message = f"{of}joint {body.joint!r} has a coordinate already: "
+            yield (*path, "joint"), f"{message}{owner[body.joint, freedom]!r}"
+        owner.setdefault((body.joint, freedom), name)
+        if body.angle == "absolute" and not isinstance(mechanism.joints[body.joint], RevoluteJoint):
             yield (*path, "angle"), "only the angle of a revolute joint can be absolute"
-    walk = walk_from_the_ground(tree)
+    walk = walk_from_the_ground(mechanism)
     if complete and walk is not None and not walk.loops:
-        yield from _undriven(tree, owner)
+        yield from _undriven(document, owner)
 
 
-def _coordinate(tree: Tree, joint: str | None, body: object, path: KeyPath) -> Iterator[Finding]:
-    """Mistakes in the joint, or in the component of it."""
-    if joint is None:
-        return
-    if lacks(tree, _JOINTS, joint):
-        yield (*path, "joint"), unknown("joint", joint, names(tree, *_JOINTS))
-        return
-    known = freedoms(tree, joint)
+def _problem(
+    mechanism: Mechanism, known: tuple[str, ...] | None, body: Coordinate, path: KeyPath
+) -> Finding | None:
+    """The mistake in the joint, or in the component of it, if there is one."""
+    joint, component = body.joint, body.component
+    if known is None:
+        return (*path, "joint"), unknown("joint", joint, mechanism.joints)
     if known == ():
         message = f"joint {joint!r} is fixed and has no coordinate; joints that move: "
-        yield (*path, "joint"), message + listed(moving(tree))
-        return
-    kind, component = text(tree, *_JOINTS, joint, "type"), at(body, "component")
-    if known is None or str(component) in known or (component is None and len(known) == 1):
-        return
-    if component is None:
-        message = f"joint {joint!r} is {kind}: say which of its freedoms this is, component: "
-        yield path, message + " or ".join(known)
-    elif component in (1, 2, 3, "rotation", "translation"):  # otherwise the schema refuses it
-        message = f"joint {joint!r} is {kind}: expected {' or '.join(known)}, got "
-        yield (*path, "component"), message + shown(component)
+        return (*path, "joint"), message + listed(moving(mechanism))
+    message = f"joint {joint!r} is {mechanism.joints[joint].type}: "
+    if component is None and len(known) > 1:
+        message += "say which of its freedoms this is, component: "
+        return path, message + " or ".join(known)
+    if component is not None and str(component) not in known:
+        message += f"expected {' or '.join(known)}, got {shown(component)}"
+        return (*path, "component"), message
+    return None
 
 
-def _undriven(tree: Tree, owner: dict[tuple[str, str], str]) -> Iterator[Finding]:
-    n = len(names(tree, "coordinates"))
-    for joint in moving(tree):
-        known = freedoms(tree, joint) or ()
+def _undriven(document: Document, owner: dict[tuple[str, str], str]) -> Iterator[Finding]:
+    for joint in moving(document.mechanism):
+        known = freedoms(document.mechanism, joint) or ()
         missing = [freedom for freedom in known if (joint, freedom) not in owner]
         if missing:
             which = f", component: {missing[0]}" if len(known) > 1 else ""
-            message = f"no coordinate: add one under coordinates, e.g. q{n + 1}: "
+            first = f"q{len(document.coordinates) + 1}"
+            message = f"no coordinate: add one under coordinates, e.g. {first}: "
             yield (*_JOINTS, joint), message + f"{{joint: {joint}{which}}}"
 
 
 # --- Loops are put together
 
 
-def assembly_names_coordinates_and_joints(tree: Tree) -> Iterator[Finding]:
+def assembly_names_coordinates_and_joints(document: Document) -> Iterator[Finding]:
     """`at` names coordinates, `guess` joints that move, with a number for each freedom."""
-    path = ("mechanism", "assembly")
-    known = names(tree, "coordinates")
-    for name in names(tree, *path, "at"):
-        if name not in known:
-            yield (*path, "at", name), unknown("coordinate", name, known)
-    for joint, value in items(tree, *path, "guess"):
-        if problem := _guess_problem(tree, joint, value):
+    assembly, path = document.mechanism.assembly, ("mechanism", "assembly")
+    for name in assembly.at if assembly else ():
+        if name not in document.coordinates:
+            yield (*path, "at", name), unknown("coordinate", name, document.coordinates)
+    for joint, value in assembly.guess.items() if assembly else ():
+        if problem := _guess_problem(document, joint, value):
             yield (*path, "guess", joint), problem
 
 
-def _guess_problem(tree: Tree, joint: str, value: object) -> str | None:
-    if lacks(tree, _JOINTS, joint):
-        return unknown("joint", joint, names(tree, *_JOINTS))
-    known = freedoms(tree, joint)
+def _guess_problem(document: Document, joint: str, value: object) -> str | None:
+    known = freedoms(document.mechanism, joint)
+    if known is None:
+        return unknown("joint", joint, document.mechanism.joints)
     if known == ():
         return f"joint {joint!r} is fixed: there is nothing to guess"
-    if known and len(known) > 1:
-        count = len(value) if isinstance(value, tuple) else 1
-        if guessed(tree, joint, count) is None:
-            return (
-                f"needs a list of {len(known)}: {listed(known)}; or of those without a coordinate"
-            )
-    if known and len(known) == 1 and isinstance(value, tuple):
+    count = len(value) if isinstance(value, tuple) else 1
+    if len(known) > 1 and guessed(document, joint, count) is None:
+        return f"needs a list of {len(known)}: {listed(known)}; or of those without a coordinate"
+    if len(known) == 1 and isinstance(value, tuple):
         return f"joint {joint!r} has one freedom: expected a number, got a list"
     return None
 
 
-def assembly_is_for_loops(tree: Tree) -> Iterator[Finding]:
+def assembly_is_for_loops(document: Document) -> Iterator[Finding]:
     """An open mechanism can be put together in one way only."""
-    walk = walk_from_the_ground(tree)
-    if at(tree, "mechanism", "assembly") is not None and walk is not None and not walk.loops:
+    walk = walk_from_the_ground(document.mechanism)
+    if document.mechanism.assembly is not None and walk is not None and not walk.loops:
         yield ("mechanism", "assembly"), "no joint closes a loop: there is nothing to choose"

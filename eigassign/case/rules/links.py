@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items, names, text
-from eigassign.case.rules.lookups import (
-    beams,
-    is_planar,
-    is_spatial,
-    links,
-    node_problem,
-    number,
-    trajectories,
-)
-from eigassign.case.schema.joints import RIDING
-from eigassign.case.schema.parts import PLACE
-from eigassign.case.suggestions import listed, shown, unknown
+from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.rules.lookups import beams, node_problem
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.links import BeamLink, FrameLink, RigidLink, SolidLink, SuperelementLink
+from eigassign.case.schema.sections import BareSection, SectionBase
+from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
+from eigassign.case.suggestions import listed, unknown
 from eigassign.files import how_to_raise, raised
 
 MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
@@ -24,80 +18,71 @@ MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
 # --- Materials and sections
 
 
-def links_have_known_materials(tree: Tree) -> Iterator[Finding]:
-    """The material of every beam and solid exists."""
-    known = names(tree, "mechanism", "materials")
-    solids = ((path, body) for _, path, body in links(tree, "solid"))
-    for path, beam in (*beams(tree), *solids):
-        name = text(beam, "material")
-        if name is not None and name not in known:
-            yield (*path, "material"), unknown("material", name, known)
+def links_have_known_materials(document: Document) -> Iterator[Finding]:
+    """The material of every beam and solid exists, and has what these need of it."""
+    mechanism = document.mechanism
+    known, spatial = mechanism.materials, mechanism.space == "spatial"
+    needs: dict[str, str] = {}
+    for path, beam in beams(mechanism):
+        if beam.material not in known:
+            yield (*path, "material"), unknown("material", beam.material, known)
+        elif spatial or beam.shear:
+            needs[beam.material] = (
+                "beams in space twist" if spatial else "a beam with shear: true uses it"
+            )
+    for name, what in needs.items():
+        if known[name].poissons_ratio is None and known[name].shear_modulus is None:
+            message = f"needs poissons_ratio or shear_modulus: {what}"
+            yield ("mechanism", "materials", name), message
+    for name, solid in mechanism.links.items():
+        if not isinstance(solid, SolidLink):
+            continue
+        if (material := known.get(solid.material)) is None:
+            path = ("mechanism", "links", name, "material")
+            yield path, unknown("material", solid.material, known)
+        elif material.poissons_ratio is None:  # its matrices are made for one ν
+            instead = "" if material.shear_modulus is None else " instead of shear_modulus"
+            path = ("mechanism", "materials", solid.material)
+            yield path, f"a solid needs poissons_ratio{instead}"
 
 
-def beams_have_known_sections(tree: Tree) -> Iterator[Finding]:
+def beams_have_known_sections(document: Document) -> Iterator[Finding]:
     """The section of every beam exists, or both sections of a taper; these are alike."""
-    known = dict(items(tree, "mechanism", "sections"))
-    for path, beam in beams(tree):
-        ends: list[tuple[KeyPath, str | None]] = [(("section",), text(beam, "section"))]
-        ends += [(("section", end), text(beam, "section", end)) for end in ("start", "end")]
-        given = [(key, name) for key, name in ends if name is not None]
-        missing = [(key, name) for key, name in given if name not in known]
-        for key, name in missing:
+    known = document.mechanism.sections
+    for path, beam in beams(document.mechanism):
+        if isinstance(beam.section, str):
+            given: dict[KeyPath, str] = {("section",): beam.section}
+        else:
+            given = {("section", end): getattr(beam.section, end) for end in ("start", "end")}
+        missing = {key: name for key, name in given.items() if name not in known}
+        for key, name in missing.items():
             yield (*path, *key), unknown("section", name, known)
         if len(given) == 2 and not missing:
-            (_, a), (_, b) = given
-            if not _alike(known[a], known[b]):
+            a, b = given.values()
+            if _keys(known[a]) != _keys(known[b]):
                 message = "a taper runs between sections of one shape, given by the same keys: "
                 yield (*path, "section"), f"{message}{a!r} and {b!r} are not"
 
 
-def _alike(a: object, b: object) -> bool:
-    if not isinstance(a, Mapping) or not isinstance(b, Mapping):
-        return True
-    keys = [{*section, "shape"} for section in (a, b)]
-    return keys[0] == keys[1] and a.get("shape", "bare") == b.get("shape", "bare")
+def _keys(section: SectionBase) -> tuple[object, set[str]]:
+    return type(section), section.model_fields_set - {"shape"}
 
 
-def materials_have_a_shear_modulus_where_beams_need_it(tree: Tree) -> Iterator[Finding]:
-    """Torsion and shear need G, or Poisson's ratio."""
-    spatial = is_spatial(tree)
-    what = "beams in space twist" if spatial else "a beam with shear: true uses it"
-    using = [text(b, "material") for _, b in beams(tree) if spatial or at(b, "shear") is True]
-    for name in dict.fromkeys(using):
-        material = at(tree, "mechanism", "materials", name or "")
-        if not isinstance(material, Mapping):
-            continue
-        if at(material, "poissons_ratio") is None and at(material, "shear_modulus") is None:
-            message = f"needs poissons_ratio or shear_modulus: {what}"
-            yield ("mechanism", "materials", name or ""), message
-
-
-def solids_have_a_poissons_ratio(tree: Tree) -> Iterator[Finding]:
-    """The matrices of a solid are made for one ν; Young's modulus and density multiply them."""
-    for _, _, body in links(tree, "solid"):
-        name = text(body, "material") or ""
-        material = at(tree, "mechanism", "materials", name)
-        if isinstance(material, Mapping) and at(material, "poissons_ratio") is None:
-            instead = " instead of shear_modulus" if "shear_modulus" in material else ""
-            yield ("mechanism", "materials", name), f"a solid needs poissons_ratio{instead}"
-
-
-def bare_sections_have_the_moments_of_their_space(tree: Tree) -> Iterator[Finding]:
+def bare_sections_have_the_moments_of_their_space(document: Document) -> Iterator[Finding]:
     """One second moment of area in a plane; two, and the torsion constant, in space."""
     missing = "required key is missing: second moment of area (in m4 when bare; or mm4, cm4)"
-    for name, section in items(tree, "mechanism", "sections"):
-        if at(section, "shape") not in (None, "bare") or not isinstance(section, Mapping):
+    for name, section in document.mechanism.sections.items():
+        if not isinstance(section, BareSection):
             continue
         path: KeyPath = ("mechanism", "sections", name)
-        has = {key for key, value in section.items() if value is not None}
-        if not is_spatial(tree):
-            if not has & {"bending_inertia", "inertia_z"}:
+        if document.mechanism.space == "planar":
+            if not section.in_plane:
                 yield (*path, "bending_inertia"), missing
-        elif "bending_inertia" not in has:
+        elif section.bending_inertia is None:
             for key in ("inertia_y", "inertia_z", "torsion_constant"):
-                if key not in has:
+                if getattr(section, key) is None:
                     yield (*path, key), missing
-        elif "inertia_z" not in has:  # the schema refuses both
+        else:
             message = "is for planar mechanisms: in space write inertia_z (bending in the local "
             yield (*path, "bending_inertia"), message + "x-y plane) and inertia_y (x-z)"
 
@@ -105,35 +90,34 @@ def bare_sections_have_the_moments_of_their_space(tree: Tree) -> Iterator[Findin
 # --- Links
 
 
-def rigid_links_have_one_end(tree: Tree) -> Iterator[Finding]:
+def rigid_links_have_one_end(document: Document) -> Iterator[Finding]:
     """The node `end` of a rigid link is given by its length or by its place."""
-    for _, path, body in links(tree, "rigid"):
-        if at(body, "length") is not None and "end" in names(body, "nodes"):
+    for name, link in document.mechanism.links.items():
+        if isinstance(link, RigidLink) and link.length is not None and "end" in link.nodes:
             message = "the node 'end' is given by length already: leave one of them out"
-            yield (*path, "nodes", "end"), message
+            yield ("mechanism", "links", name, "nodes", "end"), message
 
 
-def frames_hang_together(tree: Tree) -> Iterator[Finding]:
+def frames_hang_together(document: Document) -> Iterator[Finding]:
     """A frame's beams run between nodes in different places, and connect all of them."""
-    for _, path, body in links(tree, "frame"):
-        nodes = at(body, "nodes")
-        if not isinstance(nodes, Mapping):
+    for name, link in document.mechanism.links.items():
+        if not isinstance(link, FrameLink):
             continue
+        path: KeyPath = ("mechanism", "links", name)
+        nodes = link.nodes
         if "start" not in nodes:
             yield (*path, "nodes"), "a frame needs a node 'start'"
         joined: dict[str, list[str]] = {node: [] for node in nodes}
         ends_exist = True
-        for name, beam in items(body, "beams"):
-            inner = (*path, "beams", name)
-            a, b = text(beam, "from"), text(beam, "to")
-            for key, node in (("from", a), ("to", b)):
-                if node is not None and node not in nodes:
-                    yield (*inner, key), unknown("node", node, nodes)
-            if a not in nodes or b not in nodes or a is None or b is None:
-                ends_exist = False
+        for key, beam in link.beams.items():
+            inner, (a, b) = (*path, "beams", key), (beam.from_node, beam.to_node)
+            for end, node in (("from", a), ("to", b)):
+                if node not in nodes:
+                    yield (*inner, end), unknown("node", node, nodes)
+                    ends_exist = False
+            if a not in nodes or b not in nodes:
                 continue
-            places = [[number(c, PLACE) for c in entries(nodes, node)] for node in (a, b)]
-            if a == b or (places[0] == places[1] and places[0] and None not in places[0]):
+            if nodes[a] == nodes[b]:
                 yield inner, f"has no length: {a!r} and {b!r} are the same place"
             joined[a].append(b)
             joined[b].append(a)
@@ -153,81 +137,81 @@ def _loose_nodes(path: KeyPath, joined: Mapping[str, list[str]]) -> Iterator[Fin
         yield (*path, "nodes", loose[0]), message
 
 
-def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Finding]:
+def beams_have_no_more_elements_than_can_be_meant(document: Document) -> Iterator[Finding]:
     """The beams together have MOST_ELEMENTS at most."""
-    given = [(path, at(body, "elements")) for path, body in beams(tree)]
-    allowed = range(100_000 + 1)  # the schema finds the others
-    known = [(n, path) for path, n in given if type(n) is int and n in allowed]
-    total = sum(n for n, _ in known)
+    given = [
+        (beam.elements, path)
+        for path, beam in beams(document.mechanism)
+        if isinstance(beam.elements, int)
+    ]
+    total = sum(n for n, _ in given)
     if total > raised(MOST_ELEMENTS):
-        _, path = max(known, key=lambda each: each[0])
+        _, path = max(given, key=lambda each: each[0])
         yield (
             (*path, "elements"),
-            f"the mechanism has {shown(total)} elements: more than {raised(MOST_ELEMENTS):g} take "
+            f"the mechanism has {total} elements: more than {raised(MOST_ELEMENTS):g} take "
             f"minutes and hundreds of MB; {how_to_raise(total, MOST_ELEMENTS)}",
         )
 
 
-def superelements_have_rows_of_their_own_for_each_node(tree: Tree) -> Iterator[Finding]:
+def superelements_have_rows_of_their_own_for_each_node(document: Document) -> Iterator[Finding]:
     """A node of a superelement has as many rows as degrees of freedom, shared with no other."""
-    wanted = "u_x, u_y, θ_z" if is_planar(tree) else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
+    planar = document.mechanism.space == "planar"
+    wanted = "u_x, u_y, θ_z" if planar else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
     n = len(wanted.split())
-    for _, path, body in links(tree, "superelement"):
+    for name, link in document.mechanism.links.items():
         owner: dict[int, str] = {}
         numbered: dict[int, str] = {}
-        for name, node in items(body, "nodes"):
-            number = at(node, "id")
-            number = number[0] if isinstance(number, tuple) and number else number
-            first = numbered.setdefault(number, name) if isinstance(number, int) else name
-            if first != name and at(node, "dofs") is None:
-                message = f"node {shown(number)} is {first!r} already"
-                yield (*path, "nodes", name, "id"), message
-            dofs, inner = entries(node, "dofs"), (*path, "nodes", name, "dofs")
-            if 3 <= len(dofs) <= 6 and len(dofs) != n:
-                yield inner, f"needs {n} entries, the rows of {wanted}; got {len(dofs)}"
-            for k, dof in enumerate(dofs):
-                if not isinstance(dof, int) or isinstance(dof, bool):
-                    continue
+        for node, body in link.nodes.items() if isinstance(link, SuperelementLink) else ():
+            path: KeyPath = ("mechanism", "links", name, "nodes", node)
+            number = body.id[0] if isinstance(body.id, tuple) else body.id
+            first = node if number is None else numbered.setdefault(number, node)
+            if first != node and body.dofs is None:
+                yield (*path, "id"), f"node {number} is {first!r} already"
+            if body.dofs is not None and len(body.dofs) != n:
+                message = f"needs {n} entries, the rows of {wanted}; got {len(body.dofs)}"
+                yield (*path, "dofs"), message
+            for k, dof in enumerate(body.dofs or ()):
                 if dof in owner:
-                    yield (*inner, k), f"row {shown(dof)} belongs to node {owner[dof]!r} already"
-                owner.setdefault(dof, name)
+                    yield (*path, "dofs", k), f"row {dof} belongs to node {owner[dof]!r} already"
+                owner.setdefault(dof, node)
 
 
-def links_that_a_joint_travels_along_are_not_reduced(tree: Tree) -> Iterator[Finding]:
+def links_that_a_joint_travels_along_are_not_reduced(document: Document) -> Iterator[Finding]:
     """A link on which a carriage or nut travels bends differently at every place of it."""
-    for joint, body in items(tree, "mechanism", "joints"):
-        base = text(body, "base")
-        path = ("mechanism", "links", base or "", "reduce_to")
-        beams = [name for name, *_ in links(tree, "beam")]
-        if text(body, "type") in RIDING and base in beams and at(tree, *path) is not None:
-            message = f"{joint!r} travels along this link, so that it cannot be reduced: "
+    for name, joint in document.mechanism.joints.items():
+        base = document.mechanism.links.get(joint.base)
+        if joint.travels and isinstance(base, BeamLink) and base.reduce_to is not None:
+            message = f"{name!r} travels along this link, so that it cannot be reduced: "
+            path = ("mechanism", "links", joint.base, "reduce_to")
             yield path, message + "leave reduce_to out"
 
 
 # --- Bodies, springs and the tip stand on nodes
 
 
-def bodies_and_tips_are_on_nodes(tree: Tree) -> Iterator[Finding]:
+def bodies_and_tips_are_on_nodes(document: Document) -> Iterator[Finding]:
     """The node of a body, and the one that a trajectory guides, exist."""
-    placed: list[tuple[KeyPath, str | None]] = []
-    for name, body in items(tree, "mechanism", "bodies"):
-        placed.append((("mechanism", "bodies", name, "at"), text(body, "at")))
-    placed += [((*path, "tip"), text(body, "tip")) for path, body in trajectories(tree)]
-    for path, node in placed:
-        if node is not None and (problem := node_problem(tree, node)):
+    placed: dict[KeyPath, str] = {
+        ("mechanism", "bodies", name, "at"): body.at
+        for name, body in document.mechanism.bodies.items()
+    }
+    for path, _, motion in named_trajectories(document.trajectory):
+        if isinstance(motion, TipTrajectory):
+            placed[(*path, "tip")] = motion.tip
+    for path, node in placed.items():
+        if problem := node_problem(document.mechanism, node):
             yield path, problem
 
 
-def springs_join_two_nodes(tree: Tree) -> Iterator[Finding]:
+def springs_join_two_nodes(document: Document) -> Iterator[Finding]:
     """A spring runs from a node to another, or to the ground, and has a stiffness."""
-    for name, spring in items(tree, "mechanism", "springs"):
+    for name, spring in document.mechanism.springs.items():
         path: KeyPath = ("mechanism", "springs", name)
-        ends = entries(spring, "between")
-        nodes = ((k, e) for k, e in enumerate(ends) if isinstance(e, str) and e != "ground")
-        for k, node in nodes:
-            if problem := node_problem(tree, node):
+        for k, node in enumerate(spring.between):
+            if node != "ground" and (problem := node_problem(document.mechanism, node)):
                 yield (*path, "between", k), problem
-        if len(ends) == 2 and ends[0] == ends[1]:
+        if spring.between[0] == spring.between[1]:
             yield (*path, "between"), "both ends are the same node"
-        if isinstance(spring, Mapping) and not {"translational", "rotational"} & set(spring):
+        if not {"translational", "rotational"} & spring.model_fields_set:
             yield path, "a spring needs translational, rotational or both"

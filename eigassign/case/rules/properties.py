@@ -12,24 +12,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic_core import PydanticUndefined
-
-from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names, text
-from eigassign.case.rules.lookups import (
-    ANY,
-    columns,
-    driven,
-    is_spatial,
-    links,
-    trajectories,
-    type_of,
-)
+from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.rules.lookups import ANY, driven, places
 from eigassign.case.schema.design import Choices, Design
-from eigassign.case.schema.joints import JOINTS
-from eigassign.case.schema.links import LINKS
-from eigassign.case.schema.mechanism import Body, Spring
-from eigassign.case.schema.parts import ANGLE, PLACE, Part, Quantity, quantity
-from eigassign.case.schema.sections import SHAPES, Material, Section
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.joints import NutJoint
+from eigassign.case.schema.links import RigidLink, SolidLink
+from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, quantity
+from eigassign.case.schema.sections import Section
+from eigassign.case.schema.trajectory import Added, named_trajectories
 from eigassign.case.suggestions import listed, suggestion, unknown
 from eigassign.case.units import QuantityError
 
@@ -75,49 +67,48 @@ class NoPropertyError(ValueError):
     """The path names nothing that can be varied; the message says why."""
 
 
-def property_at(tree: Tree, path: str) -> Quantity | None:
+def property_at(case: Any, path: str) -> Quantity:
     """What the property at ``path`` may be (relative to `mechanism`, or from `coordinates` on).
 
-    None where the path may be right but the file has another error there; raises NoPropertyError
-    where it names nothing, or something that is not a real number.
+    ``case`` has a `mechanism` and `coordinates`. Raises NoPropertyError where the path names
+    nothing, or something that is not a real number.
     """
+    mechanism: Mechanism = case.mechanism
     group, *rest = path.split(".")
     if group == "mechanism" and rest and rest[0] in _GROUPS:
         raise NoPropertyError(f"paths start below mechanism: write {'.'.join(rest)!r}")
-    if group == "coordinates" and len(rest) == 3 and rest[1] == "drive" and rest[2] in DRIVEN:
-        return _of_drive(tree, rest[0], rest[2])
     if group == "coordinates" and len(rest) == 3 and rest[1] == "drive":
-        wrong = f"a drive has no property {rest[2]!r}{suggestion(rest[2], DRIVEN)}"
-        raise NoPropertyError(f"{wrong}; can vary: {listed(DRIVEN)}")
+        return _of_drive(mechanism, case.coordinates, rest[0], rest[2])
     if group in _VECTORS and len(rest) > 1 and rest[1] in _VECTORS[group]:
-        return _of_component(tree, group, rest[0], rest[1], rest[2:])
+        return _of_component(mechanism, group, rest[0], rest[1], rest[2:])
     if group not in _GROUPS or len(rest) != 2:
-        raise NoPropertyError(f"{_FORMS}; got {path!r}{_meant(tree, group, path)}")
-    return _of_part(tree, group, *rest)
+        raise NoPropertyError(f"{_FORMS}; got {path!r}{_meant(mechanism, group, path)}")
+    return _of_part(mechanism, group, *rest)
 
 
-def known_property(tree: Tree, path: str | None) -> Quantity | None:
+def known_property(case: Any, path: str) -> Quantity | None:
     """Quantity of the property at ``path``, None where it is unknown."""
     try:
-        return None if path is None else property_at(tree, path)
+        return property_at(case, path)
     except NoPropertyError:
         return None
 
 
-def properties_of(tree: Tree) -> Iterator[str]:
-    """The paths of all numbers of a valid mechanism that can vary."""
-    paths = [
-        f"coordinates.{name}.drive.{key}" for name in names(tree, "coordinates") for key in DRIVEN
-    ]
+def properties_of(case: Any) -> Iterator[str]:
+    """The paths of all numbers of a mechanism that can vary."""
+    paths = [f"coordinates.{name}.drive.{key}" for name in case.coordinates for key in DRIVEN]
     for group in _GROUPS:
-        for name, body in items(tree, "mechanism", group):
-            model = _model(group, body)
-            paths += [f"{group}.{name}.{key}" for key in (quantities(model) if model else ())]
+        for name, part in getattr(case.mechanism, group).items():
+            paths += [f"{group}.{name}.{key}" for key in quantities(type(part))]
             for key in _VECTORS.get(group, ()):
                 own = f"{group}.{name}.{key}"
-                each = [f"{own}.{node}" for node in names(body, key)] if key == "nodes" else [own]
+                each = (
+                    [f"{own}.{node}" for node in getattr(part, key, ())]
+                    if key == "nodes"
+                    else [own]
+                )
                 paths += [f"{place}.{k}" for place in each for k in range(3)]
-    yield from (path for path in paths if known_property(tree, path) is not None)
+    yield from (path for path in paths if known_property(case, path) is not None)
 
 
 def is_place(path: str) -> bool:
@@ -126,50 +117,42 @@ def is_place(path: str) -> bool:
     return key in ("length", "angle", *_VECTORS.get(group, ()))
 
 
-def properties(tree: Tree) -> dict[str, Quantity | None]:
-    """Quantity of each component of y, None where it is unknown."""
-    return {column.name: known_property(tree, column.parameter) for column in columns(tree)}
-
-
-def _meant(tree: Tree, group: str, path: str) -> str:
+def _meant(mechanism: Mechanism, group: str, path: str) -> str:
     """The group that was left out or misspelt, as a question."""
     if group in (*_GROUPS, "coordinates"):
         return ""
     for known in _GROUPS:
-        named = at(tree, "mechanism", known)
-        if isinstance(named, Mapping) and group in named:
+        if group in getattr(mechanism, known):
             return f"; did you mean '{known}.{path}'?"
     return suggestion(group, (*_GROUPS, "coordinates"))
 
 
-def _part(tree: Tree, group: str, name: str) -> object:
-    known = at(tree, "mechanism", group)
-    if known is None and group != "links":
-        known = {}
-    if isinstance(known, Mapping) and name not in known:
+def _part(mechanism: Mechanism, group: str, name: str) -> Any:
+    known = getattr(mechanism, group)
+    if name not in known:
         raise NoPropertyError(unknown(_GROUPS[group], name, known))
-    return at(known, name)
+    return known[name]
 
 
 def _of_component(
-    tree: Tree, group: str, name: str, key: str, inner: Sequence[str]
-) -> Quantity | None:
+    mechanism: Mechanism, group: str, name: str, key: str, inner: Sequence[str]
+) -> Quantity:
     """What a component of a place, or of the angles in space, may be."""
-    body, owner, axes = _part(tree, group, name), f"{group}.{name}.{key}", "xyz"
-    if group == "links" and type_of(body) != "rigid":
+    part, owner, axes = _part(mechanism, group, name), f"{group}.{name}.{key}", "xyz"
+    if group == "links" and not isinstance(part, RigidLink):
         raise NoPropertyError(f"{owner} cannot vary: the places in a link can where it is rigid")
-    if key == "orientation" and not is_spatial(tree):
-        raise NoPropertyError(f"{owner} is for spatial mechanisms: vary joints.{name}.angle")
-    if not is_spatial(tree):
+    if mechanism.space == "planar":
         axes = "xy"
-    if key == "position" and text(body, "type") == "nut":
+        if key == "orientation":
+            instead = f"vary joints.{name}.angle"
+            raise NoPropertyError(f"{owner} is for spatial mechanisms: {instead}")
+    if key == "position" and isinstance(part, NutJoint):
         axes = "x"  # it stands on the axis of its shaft
-    value = at(body, key)
+    value = getattr(part, key)
     if key == "nodes":
-        nodes = names(body, key)
-        if not inner or inner[0] not in nodes:
-            raise NoPropertyError(unknown("node with a place", ".".join(inner[:1]), nodes))
-        value, owner, inner = at(value, inner[0]), f"{owner}.{inner[0]}", inner[1:]
+        if not inner or inner[0] not in value:
+            raise NoPropertyError(unknown("node with a place", ".".join(inner[:1]), value))
+        value, owner, inner = value[inner[0]], f"{owner}.{inner[0]}", inner[1:]
     if len(inner) != 1 or inner[0] not in [str(k) for k in range(len(axes))]:
         forms = listed([f"{owner}.{k}" for k in range(len(axes))])
         raise NoPropertyError(f"{owner} varies by component ({', '.join(axes)}): {forms}")
@@ -178,52 +161,37 @@ def _of_component(
     return _VECTORS[group][key]
 
 
-def _of_part(tree: Tree, group: str, name: str, key: str) -> Quantity | None:
-    body, owner = _part(tree, group, name), f"{group}.{name}"
-    model = _model(group, body)
-    if model is None:
-        return None
-    if (group, key) == ("joints", "angle") and is_spatial(tree):
+def _of_part(mechanism: Mechanism, group: str, name: str, key: str) -> Quantity:
+    part, owner = _part(mechanism, group, name), f"{group}.{name}"
+    spatial = mechanism.space == "spatial"
+    if (group, key) == ("joints", "angle") and spatial:
         raise NoPropertyError(f"{owner}.angle is for planar mechanisms: vary {owner}.orientation.2")
-    real = quantities(model)
-    if key not in real or (group, key) in _FIXED:
-        real = {each: q for each, q in real.items() if (group, each) not in _FIXED}
+    real = {k: q for k, q in quantities(type(part)).items() if (group, k) not in _FIXED}
+    if key not in real:
         message = f"{owner} has no property {key!r}{suggestion(key, real)}"
-        if key in model.model_fields:
+        if key in type(part).model_fields:
             message = f"{owner}.{key} is not a real number and cannot vary"
         raise NoPropertyError(f"{message}; can vary: {listed(real)}")
-    if key == "inertia" and is_spatial(tree):
+    if key == "inertia" and spatial:
         raise NoPropertyError(f"{owner}.inertia is a tensor in space and cannot vary")
-    solids = [link for link, _, each in links(tree, "solid") if text(each, "material") == name]
+    solids = [
+        link
+        for link, each in mechanism.links.items()
+        if isinstance(each, SolidLink) and each.material == name
+    ]
     if (group, key) == ("materials", "poissons_ratio") and solids:
         raise NoPropertyError(
             f"{owner}.{key} cannot vary: the matrices of the solid {solids[0]} are made for one; "
             f"vary {owner}.youngs_modulus or {owner}.density"
         )
-    written = at(body, key)
+    written = getattr(part, key)
     if written is None:
-        written = model.model_fields[key].get_default()
-    if written is None or written is PydanticUndefined:
         raise NoPropertyError(f"{owner}.{key} has no value in this file: give it an initial value")
-    if isinstance(written, (tuple, list)):
+    if isinstance(written, tuple):
         raise NoPropertyError(
             f"{owner}.{key} is a list in this file and cannot vary: give one number"
         )
     return real[key]
-
-
-def _model(group: str, body: object) -> type[Part] | None:
-    if not isinstance(body, Mapping):
-        return None
-    if group == "sections":
-        shape = body.get("shape", "bare")
-        return SHAPES.get(shape) if isinstance(shape, str) else None
-    if group == "links":
-        return LINKS.get(type_of(body) or "")
-    if group == "joints":
-        return JOINTS.get(text(body, "type") or "")
-    models: dict[str, type[Part]] = {"materials": Material, "bodies": Body, "springs": Spring}
-    return models[group]
 
 
 def quantities(model: type[Part]) -> dict[str, Quantity]:
@@ -243,62 +211,28 @@ def _quantity(annotation: Any, metadata: Sequence[object]) -> Quantity | None:
     return next((q for kind, *more in inner if (q := _quantity(kind, more)) is not None), None)
 
 
-def _of_drive(tree: Tree, name: str, key: str) -> Quantity:
-    if name not in (known := names(tree, "coordinates")):
+def _of_drive(
+    mechanism: Mechanism, known: Mapping[str, Coordinate], name: str, key: str
+) -> Quantity:
+    if key not in DRIVEN:
+        wrong = f"a drive has no property {key!r}{suggestion(key, DRIVEN)}"
+        raise NoPropertyError(f"{wrong}; can vary: {listed(DRIVEN)}")
+    if name not in known:
         raise NoPropertyError(unknown("coordinate", name, known))
-    if at(tree, "coordinates", name, "drive", key) is None:
+    if getattr(known[name].drive, key, None) is None:
         raise NoPropertyError(
             f"coordinate {name!r} has no drive {key}: write drive: {{{key}: ...}}"
         )
-    return drive_quantity(tree, at(tree, "coordinates", name), key)
+    return drive_quantity(mechanism, known[name], key)
 
 
-def drive_quantity(tree: Tree, coordinate: object, key: str) -> Quantity:
+def drive_quantity(mechanism: Mechanism, coordinate: Coordinate, key: str) -> Quantity:
     """Quantity of a property of a coordinate's drive."""
-    freedom = driven(tree, coordinate)
+    freedom = driven(mechanism, coordinate)
     if freedom is None:
         return ANY
     turning, sliding = DRIVEN[key]
     return sliding if freedom == "translation" else turning
-
-
-# --- Rules
-
-
-def parameters_name_properties(tree: Tree) -> Iterator[Finding]:
-    """The path of a design parameter names a number that can vary."""
-    for column in columns(tree):
-        for path, place in column.properties:
-            try:
-                property_at(tree, path)
-            except NoPropertyError as error:
-                yield place, str(error)
-
-
-def properties_of_one_parameter_are_alike(tree: Tree) -> Iterator[Finding]:
-    """A factor has no unit: what a parameter varies together has one dimension."""
-    for column in columns(tree):
-        first = known_property(tree, column.parameter)
-        for path, place in column.properties[1:]:
-            own = known_property(tree, path)
-            if own and first and ANY not in (own, first) and own.dimension != first.dimension:
-                kinds = [q.dimension.name if q.dimension else "number" for q in (own, first)]
-                message = f"{path} is a {kinds[0]}, {column.parameter} a {kinds[1]}: a factor"
-                yield place, f"{message} has no unit, so that they need parameters of their own"
-
-
-def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
-    """Trajectories set numbers that can vary; to design parameters they can only add."""
-    owner = {path: column.name for column in columns(tree) for path, _ in column.properties}
-    for place, body in trajectories(tree):
-        for path, value in items(body, "set"):
-            try:
-                property_at(tree, path)
-            except NoPropertyError as error:
-                yield (*place, "set", path), str(error)
-            if path in owner and not isinstance(value, Mapping):
-                message = f"is the design parameter {owner[path]!r}, which a trajectory cannot set"
-                yield (*place, "set", path), message + ": write {add: …} for what it adds"
 
 
 def value_at(case: Any, path: str) -> float:
@@ -317,38 +251,91 @@ def below(part: Any, key: str) -> Any:
     return getattr(part, key, None)
 
 
-def parameters_agree_with_the_file(tree: Tree, case: Any) -> Iterator[Finding]:
+def with_value(part: Any, path: Sequence[str | int], value: float) -> Any:
+    """A copy of a part, or of a mapping or list of parts, with one number below it replaced."""
+    if not path:
+        return value
+    key, *rest = path
+    if isinstance(part, Mapping):
+        return FrozenDict({**part, str(key): with_value(part[str(key)], rest, value)})
+    if isinstance(part, tuple):
+        k = int(key)
+        return (*part[:k], with_value(part[k], rest, value), *part[k + 1 :])
+    return part.model_copy(update={key: with_value(getattr(part, str(key)), rest, value)})
+
+
+# --- Rules
+
+
+def parameters_name_properties(document: Document) -> Iterator[Finding]:
+    """The path of a design parameter names a number that can vary."""
+    for own in places(document.design).values():
+        yield from _no_properties(document, own)
+
+
+def _no_properties(document: Document, own: Mapping[str, KeyPath]) -> Iterator[Finding]:
+    for path, place in own.items():
+        try:
+            property_at(document, path)
+        except NoPropertyError as error:
+            yield place, str(error)
+
+
+def properties_of_one_parameter_are_alike(document: Document) -> Iterator[Finding]:
+    """A factor has no unit: what a parameter varies together has one dimension."""
+    for own in places(document.design).values():
+        name, *others = own
+        first = known_property(document, name)
+        for path in others:
+            kind = known_property(document, path)
+            if kind and first and ANY not in (kind, first) and kind.dimension != first.dimension:
+                kinds = [q.dimension.name if q.dimension else "number" for q in (kind, first)]
+                message = f"{path} is a {kinds[0]}, {name} a {kinds[1]}: a factor"
+                yield own[path], f"{message} has no unit, so that they need parameters of their own"
+
+
+def load_cases_set_properties(document: Document) -> Iterator[Finding]:
+    """Trajectories set numbers that can vary; to design parameters they can only add."""
+    owner = {path: name for name, own in places(document.design).items() for path in own}
+    for place, _, motion in named_trajectories(document.trajectory):
+        yield from _no_properties(document, {path: (*place, "set", path) for path in motion.set})
+        for path, value in motion.set.items():
+            if path in owner and not isinstance(value, Added):
+                message = f"is the design parameter {owner[path]!r}, which a trajectory cannot set"
+                yield (*place, "set", path), message + ": write {add: …} for what it adds"
+
+
+def parameters_agree_with_the_file(document: Document) -> Iterator[Finding]:
     """What one parameter varies together is in its proportion where the mechanism is written."""
-    placed = {column.name: column.properties[1:] for column in columns(tree)}
-    for name, column in case.design.parameters.items():
-        known = all(known_property(tree, path) for path in column.factors)
-        first = value_at(case, column.parameter) if known else 0.0
-        for path, place in placed[name] if known else ():
-            value, wanted = value_at(case, path), column.factors[path] * first
+    placed = places(document.design)
+    for name, column in document.design.parameters.items():
+        first = value_at(document, column.parameter)
+        for path, factor in [*column.factors.items()][1:]:
+            value, wanted = value_at(document, path), factor * first
             # digits that a product has and no file: 0.8 × 0.04 is not 0.032 to the last one
             if abs(value - wanted) > 1e-9 * abs(wanted):
-                prop = known_property(tree, path)
-                unit = f" {prop.dimension.si}".rstrip() if prop and prop.dimension else ""
+                dimension = property_at(document, path).dimension
+                unit = f" {dimension.si}".rstrip() if dimension else ""
                 yield (
-                    place,
-                    f"is {value:.12g}{unit} in this file, where {column.factors[path]:.12g} × "
+                    placed[name][path],
+                    f"is {value:.12g}{unit} in this file, where {factor:.12g} × "
                     f"{column.parameter} is {wanted:.12g}{unit}: write that, or another factor",
                 )
 
 
-def starts_outside(tree: Tree, case: Any) -> Iterator[Finding]:
+def starts_outside(document: Document) -> Iterator[Finding]:
     """Warnings where what the file has as design is outside its bounds, or none of those listed.
 
     Bounds and lists say where the answer may be, so that the start need not be there.
     """
-    design = case.design
-    found = [known_property(tree, column.parameter) for column in design.parameters.values()]
-    units = [p.dimension.si if p and p.dimension else "" for p in found]
-    start = [value_at(case, column.parameter) for column in design.parameters.values()]
+    design = document.design
+    start = [value_at(document, column.parameter) for column in design.parameters.values()]
     listed_only = {k for catalogue in design.catalogues for k in catalogue.columns}
     slips = set[int]()
     for k, (name, column) in enumerate(design.parameters.items()):
-        value, unit, bounds = start[k], units[k], f"[{column.min:g}, {column.max:g}]"
+        dimension = property_at(document, column.parameter).dimension
+        unit, bounds = dimension.si if dimension else "", f"[{column.min:g}, {column.max:g}]"
+        value = start[k]
         if column.min <= value <= column.max:
             continue
         why, (meant, size) = "the optimum will lie inside", _MEANT.get(unit, ("", 0.0))
@@ -372,12 +359,12 @@ Varied = Mapping[str, Sequence[tuple[int, float]]]  # properties by path: Σ fac
 Box = Sequence[tuple[float, float]]  # SI: the least and the largest value of each entry
 
 
-def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Finding]:
+def bounds_hold_nothing_impossible(document: Document) -> Iterator[Finding]:
     """Mechanisms exist wherever the design may go; each problem is at the bound to narrow.
 
     A robust one may go further by its tolerances.
     """
-    design: Design = document.design
+    design = document.design
     columns = list(design.parameters.values())
     owner = [
         name
@@ -388,8 +375,8 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
     for k, column in enumerate(columns):
         if document.assignment.robust and column.tolerance is not None:
             low, high = (column.tolerance.deviation(end) for end in box[k])
-            prop = known_property(tree, column.parameter)
-            if prop and 0 in (prop.at_least, prop.above):  # as masses are never below 0
+            prop = property_at(document, column.parameter)
+            if 0 in (prop.at_least, prop.above):  # as masses are never below 0
                 low = min(low, max(column.min, 0.0))
             box[k] = column.min - low, column.max + high
     for row, message in impossible(document.mechanism.sections, varied, box):
@@ -405,7 +392,7 @@ def bounds_hold_nothing_impossible(tree: Tree, document: Any) -> Iterator[Findin
     deviates = [document.assignment.robust and bool(column.tolerance) for column in columns]
     first = {column.parameter for column, more in zip(columns, deviates, strict=True) if not more}
     together = {path: terms for path, terms in varied.items() if path not in first}
-    for path, side, message in _outside(tree, together, box):
+    for path, side, message in _outside(document, together, box):
         ((k, factor),) = varied[path]
         place = _bound(design, owner[k], (side == 0) == (factor > 0.0))
         where = "at this bound with its tolerance" if deviates[k] else "at this bound"
@@ -420,37 +407,34 @@ def _bound(design: Design, name: str, lower: bool) -> KeyPath:
     return ("design", name, "values" if entry.values is not None else "min" if lower else "max")
 
 
-def load_cases_set_nothing_impossible(
-    tree: Tree, document: Any, motions: Sequence[tuple[KeyPath, str, Any]]
-) -> Iterator[Finding]:
+def load_cases_set_nothing_impossible(document: Document) -> Iterator[Finding]:
     """Mechanisms exist along each trajectory that sets or adds something."""
-    design: Design = document.design
+    design = document.design
     bounds = [(column.min, column.max) for column in design.parameters.values()]
-    for place, _, motion in motions:
+    for place, _, motion in named_trajectories(document.trajectory):
         varied, box = dict(design.varied), list(bounds)
         for path, value in motion.set.items():
-            more = getattr(value, "add", None)
-            amount = value if more is None else more
-            if more is not None and path not in varied and known_property(tree, path):
-                amount = more + value_at(document, path)
+            amount = value.add if isinstance(value, Added) else value
+            if isinstance(value, Added) and path not in varied:
+                amount += value_at(document, path)
             varied[path] = (*varied.get(path, ()), (len(box), 1.0))
             box.append((amount, amount))
         paths = list(motion.set)
         for row, message in impossible(document.mechanism.sections, varied, box):
             for k in [k for k in row if k >= len(bounds)][:1]:
                 yield (*place, "set", paths[k - len(bounds)]), message
-        added = {p: varied[p] for p in paths if getattr(motion.set[p], "add", None) is not None}
-        for path, _, message in _outside(tree, added, box):
+        added = {p: varied[p] for p in paths if isinstance(motion.set[p], Added)}
+        for path, _, message in _outside(document, added, box):
             yield (*place, "set", path), f"with this {message}"
 
 
-def _outside(tree: Tree, varied: Varied, box: Box) -> Iterator[tuple[str, int, str]]:
+def _outside(document: Document, varied: Varied, box: Box) -> Iterator[tuple[str, int, str]]:
     """Path, end (0 least, 1 largest) and what is wrong of properties beyond what they may be."""
     for path, terms in varied.items():
-        prop = known_property(tree, path)
+        prop = property_at(document, path)
         for side, value in enumerate(least_and_largest(terms, box)):
             try:
-                _ = prop and prop.checked(value, f"{value:g}")
+                prop.checked(value, f"{value:g}")
             except QuantityError as error:
                 yield path, side, f"{path} {error}"
                 break

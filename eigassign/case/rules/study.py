@@ -3,42 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items, names, text
-from eigassign.case.rules.lookups import (
-    choices,
-    columns,
-    coordinate_lists,
-    design_entries,
-    freedoms,
-    moving,
-    number,
-    trajectories,
-)
-from eigassign.case.schema.design import is_entry
-from eigassign.case.schema.parts import ANGLE
+from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.rules.lookups import coordinate_lists, freedoms, moving, places
+from eigassign.case.schema.design import Choices
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.joints import RevoluteJoint
+from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
 from eigassign.case.suggestions import listed, unknown
 
 # --- Lists with one entry for each coordinate or design parameter
 
 
-def lists_have_an_entry_for_each_coordinate(tree: Tree) -> Iterator[Finding]:
-    """Points of trajectories and other poses are as long as q, and so is the validated box."""
-    q = names(tree, "coordinates")
-    for path, listed_values in coordinate_lists(tree):
-        yield from _one_for_each(listed_values, path, "coordinate", q)
+def lists_have_an_entry_for_each_coordinate(document: Document) -> Iterator[Finding]:
+    """Points of trajectories and other poses are as long as q."""
+    for path, row in coordinate_lists(document):
+        yield from _one_for_each(row, path, "coordinate", document.coordinates)
 
 
-def expansion_point_has_an_entry_for_each_parameter(tree: Tree) -> Iterator[Finding]:
+def expansion_point_has_an_entry_for_each_parameter(document: Document) -> Iterator[Finding]:
     """`expansion.y` is as long as the design."""
-    y = [column.name for column in columns(tree)]
-    path = ("expansion", "y")
-    yield from _one_for_each(at(tree, *path), path, "design parameter", y)
+    y, path = document.expansion.y, ("expansion", "y")
+    yield from _one_for_each(y, path, "design parameter", document.design.parameters)
 
 
 def _one_for_each(
-    value: object, path: KeyPath, kind: str, known: Sequence[str]
+    value: object, path: KeyPath, kind: str, known: Collection[str]
 ) -> Iterator[Finding]:
     if isinstance(value, tuple) and len(value) != len(known):
         message = f"needs {len(known)} entries, one for each {kind} ({listed(known)}); got "
@@ -48,70 +39,79 @@ def _one_for_each(
 # --- Trajectories
 
 
-def trajectories_have_names_of_their_own(tree: Tree) -> Iterator[Finding]:
+def trajectories_have_names_of_their_own(document: Document) -> Iterator[Finding]:
     """No two names agree but for case: they name files, and some file systems ignore it."""
     seen: dict[str, str] = {}
-    for path, body in trajectories(tree):
-        name = text(body, "name")
-        if name is None:
+    for path, _, motion in named_trajectories(document.trajectory):
+        if motion.name is None:
             continue
-        if same := seen.get(name.casefold()):
-            hint = "" if same == name else f": {same!r} (some file systems ignore upper case)"
+        if same := seen.get(motion.name.casefold()):
+            ignored = f": {same!r} (some file systems ignore upper case)"
+            hint = "" if same == motion.name else ignored
             yield (*path, "name"), f"a trajectory has this name already{hint}"
-        seen.setdefault(name.casefold(), name)
+        seen.setdefault(motion.name.casefold(), motion.name)
 
 
-def branches_are_ranges_of_driven_joints(tree: Tree) -> Iterator[Finding]:
+def branches_are_ranges_of_driven_joints(document: Document) -> Iterator[Finding]:
     """A range that keeps a tip path in its branch is that of a joint which a coordinate moves."""
-    ranged = [name for name in moving(tree) if len(freedoms(tree, name) or ()) == 1]
-    driven = {text(body, "joint") for _, body in items(tree, "coordinates")}
-    for place, body in trajectories(tree):
-        for joint in names(body, "branch"):
+    mechanism = document.mechanism
+    ranged = [name for name in moving(mechanism) if len(freedoms(mechanism, name) or ()) == 1]
+    driven = {body.joint for body in document.coordinates.values()}
+    for place, _, motion in named_trajectories(document.trajectory):
+        for joint, (low, high) in (
+            motion.branch.items() if isinstance(motion, TipTrajectory) else ()
+        ):
             path: KeyPath = (*place, "branch", joint)
             if joint not in ranged:
                 yield path, unknown("joint with one freedom", joint, ranged)
             elif joint not in driven:
                 known = listed([name for name in ranged if name in driven])
                 yield path, f"no coordinate moves this joint, but the loop does; use {known}"
-            elif text(tree, "mechanism", "joints", joint, "type") == "revolute":
-                ends = [number(v, ANGLE) for v in entries(body, "branch", joint)]
-                low, high = ends if len(ends) == 2 else (None, None)
-                if low is not None and high is not None and high - low > 2 * math.pi:
-                    yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
+            elif isinstance(mechanism.joints[joint], RevoluteJoint) and high - low > 2 * math.pi:
+                yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
 
 
 # --- Design
 
 
-def parameters_vary_different_properties(tree: Tree) -> Iterator[Finding]:
+def parameters_vary_different_properties(document: Document) -> Iterator[Finding]:
     """Components of the design have properties of their own."""
     owner: dict[str, str] = {}
-    for column in columns(tree):
-        name, entry = column.name, str(column.place[1])
-        if column.parameter is None and entry.lower().startswith("constraint"):
-            yield ("design", entry), "did you mean the reserved key 'constraints'?"
-        for path, place in column.properties:
-            if path in owner and owner[path] != name:
+    for name, own in places(document.design).items():
+        for path, place in own.items():
+            if path in owner:
                 yield place, f"{path} is a design parameter already: {owner[path]!r}"
             owner.setdefault(path, name)
 
 
-def limited_drives_are_of_coordinates(tree: Tree) -> Iterator[Finding]:
+def bounds_go_upwards(document: Document) -> Iterator[Finding]:
+    """No minimum is above its maximum."""
+    design = document.design
+    limited: dict[KeyPath, object] = {("design", name): e for name, e in design.entries.items()}
+    limited |= {("design", "constraints", name): c for name, c in design.constraints.items()}
+    limited |= {("design", "mass"): design.mass}
+    for path, part in limited.items():
+        low, high = getattr(part, "min", None), getattr(part, "max", None)
+        if low is not None and high is not None and low > high:
+            yield (*path, "min"), f"min {low:g} is above max {high:g} (SI units)"
+
+
+def limited_drives_are_of_coordinates(document: Document) -> Iterator[Finding]:
     """The drives under `design.torque` are named by their coordinates."""
-    known, limits = names(tree, "coordinates"), at(tree, "design", "torque")
-    for name in () if is_entry(limits) else names(limits):
-        if name not in known:
-            yield ("design", "torque", name), unknown("coordinate", name, known)
+    for name in document.design.torque:
+        if name not in document.coordinates:
+            yield ("design", "torque", name), unknown("coordinate", name, document.coordinates)
 
 
-def constraints_are_between_design_parameters(tree: Tree) -> Iterator[Finding]:
+def constraints_are_between_design_parameters(document: Document) -> Iterator[Finding]:
     """The terms of a constraint name design parameters."""
-    known = [name for name, body in design_entries(tree) if choices(body) is None]
-    for name, body in items(tree, "design", "constraints"):
-        for term in names(body, "terms"):
+    entries = document.design.entries
+    known = [name for name, entry in entries.items() if not isinstance(entry, Choices)]
+    for name, constraint in document.design.constraints.items():
+        for term in constraint.terms:
             if term in known:
                 continue
             message = unknown("design parameter", term, known)
-            if choices(at(tree, "design", term)) is not None:
+            if term in entries:
                 message = f"{term!r} is a list of choices; a constraint is between parameters"
             yield ("design", "constraints", name, "terms", term), message

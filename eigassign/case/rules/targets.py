@@ -2,198 +2,194 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, names, text
-from eigassign.case.rules.lookups import (
-    choices,
-    curves,
-    design_entries,
-    followed_modes,
-    is_spatial,
-    node_problem,
-    number,
-    trajectories,
-    trajectory_names,
+from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.rules.lookups import followed_modes, node_problem
+from eigassign.case.schema.design import Choices
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.study import Highest, HighestMode, Measurement
+from eigassign.case.schema.targets import (
+    FrequencyFile,
+    FrequencyProfile,
+    FrequencyTarget,
+    GapTarget,
+    KeepOutTarget,
+    Pose,
+    SagTarget,
+    StaticTarget,
 )
-from eigassign.case.schema.design import is_entry
-from eigassign.case.schema.targets import TARGETS, StaticTarget, kinds_of
-from eigassign.case.schema.trajectory import DURATION, TIME, TipTrajectory
+from eigassign.case.schema.trajectory import (
+    FileTrajectory,
+    SampledTrajectory,
+    TrajectoryForm,
+    named_trajectories,
+)
 from eigassign.case.suggestions import listed, shown, unknown
 
 Span = tuple[float, float]  # first and last time, s
 
 
-def targets_are_on_trajectories(tree: Tree) -> Iterator[Finding]:
+def targets_are_on_trajectories(document: Document) -> Iterator[Finding]:
     """A target names a trajectory that exists, and a part of it that it has."""
-    known = trajectory_names(tree)
-    motions = dict(zip(known, _motions(tree), strict=True))
-    for k, target in enumerate(entries(tree, "targets")):
-        name, span = text(target, "trajectory"), _span(at(target, "during"))
-        if name is not None and name not in known:
-            yield ("targets", k, "trajectory"), unknown("trajectory", name, known)
+    motions = _motions(document)
+    for k, target in enumerate(document.targets):
+        name, span = target.trajectory, target.during
+        if name is not None and name not in motions:
+            yield ("targets", k, "trajectory"), unknown("trajectory", name, motions)
             continue
         if span is None:
             continue
         path: KeyPath = ("targets", k, "during")
-        if name is None and len(known) > 1:
-            yield path, f"needs the trajectory that is meant, as trajectory ({listed(known)})"
+        if name is None and len(motions) > 1:
+            yield path, f"needs the trajectory that is meant, as trajectory ({listed(motions)})"
             continue
-        motion = motions.get(name or (known[0] if known else ""))
+        motion = motions.get(name or next(iter(motions), ""))
         if motion is not None and not (motion[0] <= span[1] and span[0] <= motion[1]):
             lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
             yield path, f"lies outside: {lasts}"
 
 
-def statics_are_of_nodes(tree: Tree) -> Iterator[Finding]:
+def statics_are_of_nodes(document: Document) -> Iterator[Finding]:
     """The node of a static target exists, and what sags has a weight."""
-    kinds = [kind for kind, form in TARGETS.items() if issubclass(form, StaticTarget)]
-    for k, target in enumerate(entries(tree, "targets")):
-        for kind in kinds:
-            node = text(target, kind, "at")
-            if node is not None and (problem := node_problem(tree, node)):
-                yield ("targets", k, kind, "at"), problem
-        weighs = isinstance(at(tree, "mechanism", "gravity"), tuple)
-        if at(target, "sag") is not None and not weighs:
-            down = "[0, 0, -9.81]" if is_spatial(tree) else "[0, -9.81]"
+    mechanism = document.mechanism
+    for k, target in enumerate(document.targets):
+        if not isinstance(target, StaticTarget):
+            continue
+        if problem := node_problem(mechanism, target.place.at):
+            yield ("targets", k, target.kind, "at"), problem
+        if isinstance(target, SagTarget) and not isinstance(mechanism.gravity, tuple):
+            down = "[0, -9.81]" if mechanism.space == "planar" else "[0, 0, -9.81]"
             yield ("targets", k, "sag"), f"nothing sags without mechanism.gravity: {down}, say"
 
 
-def a_mode_has_one_frequency_at_a_time(tree: Tree) -> Iterator[Finding]:
+def a_mode_has_one_frequency_at_a_time(document: Document) -> Iterator[Finding]:
     """No two targets want frequencies of the same mode on the same part of a trajectory."""
-    known, seen = trajectory_names(tree), dict[tuple[int, str], list[Span | None]]()
-    for k, target in enumerate(entries(tree, "targets")):
-        if at(target, "frequency") is None:
+    known, seen = list(_motions(document)), dict[tuple[int, str], list[Span | None]]()
+    for k, target in enumerate(document.targets):
+        if not isinstance(target, FrequencyTarget):
             continue
-        single, where, span = (
-            at(target, "mode"),
-            text(target, "trajectory"),
-            _span(at(target, "during")),
-        )
-        places: list[tuple[KeyPath, object]] = [(("targets", k, "mode"), single)]
-        each = enumerate(entries(target, "modes"))
-        places += [(("targets", k, "modes", i), mode) for i, mode in each]
-        own: list[tuple[int, str]] = []
-        for path, mode in places:
-            if not isinstance(mode, int) or isinstance(mode, bool):
-                continue
-            along = [(mode, name) for name in ([where] if where else known or [""])]
+        span, own = target.during, list[tuple[int, str]]()
+        for i, mode in enumerate(target.numbers if not target.followed else ()):
+            names = [target.trajectory] if target.trajectory else known or [""]
             both = sorted(
                 name
-                for mode, name in along
+                for name in names
                 for other in seen.get((mode, name), ())
                 if span is None or other is None or (span[0] < other[1] and other[0] < span[1])
             )
             if both:
                 which = f" along trajectory {both[0]!r}" if len(known) > 1 else ""
-                yield path, f"mode {mode} has a target already{which}"
-            own += along
-        for place in own:
-            seen.setdefault(place, []).append(span)
+                place: KeyPath = ("mode",) if target.modes is None else ("modes", i)
+                yield ("targets", k, *place), f"mode {mode} has a target already{which}"
+            own += [(mode, name) for name in names]
+        for one in own:
+            seen.setdefault(one, []).append(span)
 
 
-def followed_modes_are_at_a_pose(tree: Tree) -> Iterator[Finding]:
+def followed_modes_are_at_a_pose(document: Document) -> Iterator[Finding]:
     """A mode named by its shape has a pose of the mechanism and a possible design."""
-    lists = {name: choices(body) for name, body in design_entries(tree)}
-    for path, body in followed_modes(tree):
-        yield from _no_pose(tree, (*path, "at"), at(body, "at"))
-        for name in names(body, "design"):
-            place, value = (*path, "design", name), at(body, "design", name)
-            if name not in lists:
-                yield place, unknown("design parameter", name, lists)
-            elif (of_choices := lists[name]) is not None:
-                named = [choice for choice, _ in of_choices]
-                if not isinstance(value, str):
-                    yield place, f"expected one of the choices {listed(named)}, got {shown(value)}"
-                elif value not in named:
-                    yield place, unknown("choice", value, named)
+    entries = document.design.entries
+    for path, mode in followed_modes(document):
+        yield from _no_pose(document, (*path, "at"), mode.at)
+        for name, value in mode.design.items():
+            place, entry = (*path, "design", name), entries.get(name)
+            if entry is None:
+                yield place, unknown("design parameter", name, entries)
+            elif isinstance(entry, Choices) and not isinstance(value, str):
+                yield (
+                    place,
+                    f"expected one of the choices {listed(entry.choices)}, got {shown(value)}",
+                )
+            elif isinstance(entry, Choices) and value not in entry.choices:
+                yield place, unknown("choice", str(value), entry.choices)
 
 
-def measurements_are_at_poses(tree: Tree) -> Iterator[Finding]:
+def measurements_are_at_poses(document: Document) -> Iterator[Finding]:
     """Measurements of a list were made at a time of a trajectory, or with a value for each q."""
-    for k, body in enumerate(entries(tree, "measurements")):
-        yield from _no_pose(tree, ("measurements", k), body)
+    measured = document.measurements
+    for k, each in enumerate(measured if isinstance(measured, tuple) else ()):
+        yield from _no_pose(document, ("measurements", k), each)
 
 
-def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
+def _no_pose(document: Document, path: KeyPath, pose: Pose | Measurement) -> Iterator[Finding]:
     """Mistakes that keep `time` and `trajectory` of a part from being a pose of the mechanism."""
-    known, where = trajectory_names(tree), text(body, "trajectory")
-    time = number(at(body, "time"), TIME)
-    if where is not None and where not in known:
-        yield (*path, "trajectory"), unknown("trajectory", where, known)
-    elif time is not None and not known:
+    motions, where, time = _motions(document), pose.trajectory, pose.time
+    if where is not None and where not in motions:
+        yield (*path, "trajectory"), unknown("trajectory", where, motions)
+    elif time is not None and not motions:
         yield (*path, "time"), "there is no trajectory: give q"
-    elif time is not None and where is None and len(known) > 1:
-        message = f"needs the trajectory that is meant, as trajectory ({listed(known)})"
+    elif time is not None and where is None and len(motions) > 1:
+        message = f"needs the trajectory that is meant, as trajectory ({listed(motions)})"
         yield (*path, "time"), message
     elif time is not None:
-        motion = dict(zip(known, _motions(tree), strict=True))[where or known[0]] or (time, time)
+        motion = motions[where or next(iter(motions))] or (time, time)
         if not motion[0] <= time <= motion[1]:
             lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
             yield (*path, "time"), f"{time:g} s is outside: {lasts}"
 
 
-def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
+def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
     """The paper's program has wanted frequencies, bounds, linear constraints, no more."""
-    if text(tree, "assignment", "method") != "one_shot":
+    assignment, design = document.assignment, document.design
+    if assignment.method != "one_shot":
         return
     instead = "method: one_shot takes only frequency targets of numbered modes, bounds and "
     instead += "linear constraints: write method: sequential"
-    if at(tree, "assignment", "objective") not in (None, "least_squares"):
+    if assignment.objective != "least_squares":
         yield ("assignment", "objective"), f"is not least_squares: {instead}"
-    if at(tree, "assignment", "robust") is True:
+    if assignment.robust:
         yield ("assignment", "robust"), f"is not linear in the design: {instead}"
-    for k, target in enumerate(entries(tree, "targets")):
-        kinds = kinds_of(target) if isinstance(target, Mapping) else []
-        if kinds and not TARGETS[kinds[0]].is_goal:
-            yield ("targets", k, kinds[0]), f"is not a wanted frequency: {instead}"
-    for path, _ in followed_modes(tree):
+    for k, target in enumerate(document.targets):
+        if not target.is_goal:
+            yield ("targets", k, target.kind), f"is not a wanted frequency: {instead}"
+    for path, _ in followed_modes(document):
         yield path, f"is followed by its shape: {instead}"
-    for key, what in (("mass", "the mass"), ("torque", "torques of drives")):
-        limits = at(tree, "design", key)
-        if limits is not None and not is_entry(limits):
-            limited = "limits" if key == "torque" or set(names(limits)) != {"price"} else "prices"
-            yield ("design", key), f"{limited} {what}: {instead}"
-    for name, body in design_entries(tree):
-        for key in ("values", "choices"):
-            if at(body, key) is not None:
-                yield ("design", name, key), f"is a list: {instead}"
+    if design.mass is not None:
+        limited = design.mass.min is not None or design.mass.max is not None
+        yield ("design", "mass"), f"{'limits' if limited else 'prices'} the mass: {instead}"
+    if "torque" in design.model_fields_set:
+        yield ("design", "torque"), f"limits torques of drives: {instead}"
+    for name, entry in design.entries.items():
+        key = "choices" if isinstance(entry, Choices) else "values"
+        if getattr(entry, key) is not None:
+            yield ("design", name, key), f"is a list: {instead}"
 
 
 # --- Objectives that are no error of wanted frequencies
 
 
-def objectives_have_what_they_take(tree: Tree) -> Iterator[Finding]:
+def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
     """What is to be light, high or wide has limits beside it, no wanted frequencies.
 
     Bands or gaps can be wide where there are some, a mode high along a trajectory that there is.
     """
-    objective, path = at(tree, "assignment", "objective"), ("assignment", "objective")
-    highest, known = at(objective, "highest"), trajectory_names(tree)
-    name = "highest" if highest is not None else objective
+    objective, path = document.assignment.objective, ("assignment", "objective")
+    name = document.assignment.named_objective
     if name not in ("lightest", "highest", "widest"):
         return
-    if text(tree, "assignment", "method") == "one_shot":  # which takes none of them
+    if document.assignment.method == "one_shot":  # which takes none of them
         return
-    kinds = [
-        {key for key in TARGETS if at(own, key) is not None} for own in entries(tree, "targets")
-    ]
-    for k in (k for k, kind in enumerate(kinds) if "frequency" in kind):
-        message = f"objective {name} takes no wanted frequency: write at_least, at_most or both"
-        yield ("targets", k, "frequency"), message
-    if name == "widest" and not any(kind & {"keep_out", "gap"} for kind in kinds):
+    for k, target in enumerate(document.targets):
+        if isinstance(target, FrequencyTarget):
+            message = f"objective {name} takes no wanted frequency: write at_least, at_most or both"
+            yield ("targets", k, "frequency"), message
+    wide = [isinstance(target, (KeepOutTarget, GapTarget)) for target in document.targets]
+    if name == "widest" and not any(wide):
         yield path, "widest needs a target with keep_out or gap"
-    for place, _ in followed_modes(tree) if name == "widest" else ():
-        if "keep_out" in kinds[int(place[1])] or "gap" in kinds[int(place[1])]:
+    for place, _ in followed_modes(document) if name == "widest" else ():
+        if wide[int(place[1])]:
             yield place, "is followed by its shape: widest takes numbered modes only"
-    if (where := text(highest, "trajectory")) is not None and where not in known:
-        yield (*path, "highest", "trajectory"), unknown("trajectory", where, known)
+    if isinstance(objective, Highest) and isinstance(objective.highest, HighestMode):
+        where, known = objective.highest.trajectory, _motions(document)
+        if where is not None and where not in known:
+            yield (*path, "highest", "trajectory"), unknown("trajectory", where, known)
 
 
-def robust_designs_have_tolerances(tree: Tree) -> Iterator[Finding]:
+def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
     """Something deviates where deviations count."""
-    deviates = any(at(body, "tolerance") is not None for _, body in design_entries(tree))
-    if at(tree, "assignment", "robust") is True and not deviates:
+    deviates = any(entry.tolerance for entry in document.design.entries.values())
+    if document.assignment.robust and not deviates:
         message = "no parameter has a tolerance: give at least one, such as tolerance: 2 %"
         yield ("assignment", "robust"), message
 
@@ -203,53 +199,46 @@ def robust_designs_have_tolerances(tree: Tree) -> Iterator[Finding]:
 _SLACK = 1e-9  # of the duration: rounding of the ends, far below a sampling step
 
 
-def profiles_cover_their_trajectories(tree: Tree) -> Iterator[Finding]:
+def profiles_cover_their_trajectories(document: Document) -> Iterator[Finding]:
     """A profile reaches from the first to the last time of every motion that it is for."""
-    motions = list(zip(trajectory_names(tree), _motions(tree), strict=True))
-    at_rest = [_is_at_rest(body) for _, body in trajectories(tree)]
-    for path, curve in curves(tree):
-        target = entries(tree, "targets")[int(path[1])]
-        for (name, _), rests in zip(motions, at_rest, strict=True):
-            if rests and isinstance(curve, Mapping) and text(target, "trajectory") in (None, name):
+    motions = _motions(document)
+    at_rest = [
+        name
+        for _, name, form in named_trajectories(document.trajectory)
+        if isinstance(form, SampledTrajectory) and len(form.q) == 1
+    ]
+    for k, target in enumerate(document.targets):
+        where = [target.trajectory] if target.trajectory else list(motions)
+        for keys, curve in target.frequencies:
+            path = ("targets", k, *keys)
+            if not isinstance(curve, (FrequencyProfile, FrequencyFile)):
+                continue
+            for name in (name for name in at_rest if name in where):
                 message = f"changes in time, and trajectory {name!r} is a pose at rest: give one "
                 yield path, message + "frequency, or a trajectory with a time"
-        span, where = _span(at(curve, "time")), text(target, "trajectory")
-        for name, motion in motions:
-            if span is None or motion is None or where not in (None, name):
-                continue
-            first, last = _span(at(target, "during")) or motion
-            first, last = max(first, motion[0]), min(last, motion[1])
-            slack = _SLACK * (motion[1] - motion[0])
-            if span[0] > first + slack or span[1] < last - slack:
-                which = f"trajectory {name!r}" if len(motions) > 1 else "the trajectory"
-                whole = (first, last) == motion
-                does = "lasts" if whole else "is wanted"
-                message = f"covers {span[0]:g} … {span[1]:g} s only; {which} {does} from {first:g}"
-                yield (*path, "time"), f"{message} to {last:g} s"
+            span = (curve.time[0], curve.time[-1]) if isinstance(curve, FrequencyProfile) else None
+            for name in where:
+                if span is None or (motion := motions.get(name)) is None:
+                    continue
+                first, last = target.during or motion
+                first, last = max(first, motion[0]), min(last, motion[1])
+                slack = _SLACK * (motion[1] - motion[0])
+                if span[0] > first + slack or span[1] < last - slack:
+                    which = f"trajectory {name!r}" if len(motions) > 1 else "the trajectory"
+                    does = "lasts" if (first, last) == motion else "is wanted"
+                    message = f"covers {span[0]:g} … {span[1]:g} s only; {which} {does} from "
+                    yield (*path, "time"), f"{message}{first:g} to {last:g} s"
 
 
-def _motions(tree: Tree) -> list[Span | None]:
+def _motions(document: Document) -> dict[str, Span | None]:
     """First and last time of each trajectory; None where the file does not say (a CSV does)."""
-    return [_duration(body) for _, body in trajectories(tree)]
+    return {name: _span(form) for _, name, form in named_trajectories(document.trajectory)}
 
 
-def _is_at_rest(trajectory: object) -> bool:
-    return len(entries(trajectory, "q")) == 1
-
-
-def _duration(trajectory: object) -> Span | None:
-    for key in ("time", "times"):
-        if at(trajectory, key) is not None:
-            return _span(at(trajectory, key))
-    given = at(trajectory, "duration")
-    if given is None and at(trajectory, "tip") is not None:
-        given = TipTrajectory.model_fields["duration"].default
-    duration = number(given, DURATION)
-    return None if duration is None else (0.0, duration)
-
-
-def _span(times: object) -> Span | None:
-    if not isinstance(times, tuple) or not times:
+def _span(motion: TrajectoryForm) -> Span | None:
+    if isinstance(motion, FileTrajectory):
         return None
-    first, last = number(times[0], TIME), number(times[-1], TIME)
-    return None if first is None or last is None or last < first else (first, last)
+    times = getattr(motion, "times", None) or getattr(motion, "time", None)
+    if times is not None:
+        return times[0], times[-1]
+    return None if motion.duration is None else (0.0, motion.duration)

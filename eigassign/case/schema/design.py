@@ -13,10 +13,11 @@ from decimal import Decimal
 from functools import cached_property
 from typing import Annotated, Any, Self, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 from pydantic_core import core_schema
 
 from eigassign.case.schema.parts import (
+    ByReference,
     Frozen,
     FrozenDict,
     Named,
@@ -36,11 +37,12 @@ YValue: TypeAlias = Annotated[
     float, Quantity(elsewhere="of the parameter's dimension, SI when bare")
 ]
 _RATE = "for one SI unit when bare, or such as 3 / kg"
-Price: TypeAlias = Annotated[float, Quantity(elsewhere=_RATE)]
+Price: TypeAlias = Annotated[float, Quantity(elsewhere=_RATE, rate=True)]
 RESERVED = ("constraints", "mass", "torque")  # names under `design` that are no entries of it
 PRICE = "price"  # beside the paths of a choice
 MOST_CHOICES = 1000  # of an entry; a maker's whole list of profiles has some hundreds
 _SHARE = quantity("fraction", above=0)
+_AMOUNT = Quantity(above=0, elsewhere="share such as 2 %, or amount, SI when bare")
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Tolerance:
             return value
         relative = isinstance(value, str) and value.rstrip().endswith("%")
         try:
-            amount = (_SHARE if relative else Quantity(above=0)).read(value)
+            amount = (_SHARE if relative else _AMOUNT).read(value)
         except QuantityError as error:
             raise wrong(str(error)) from None
         if relative and amount >= 1.0:
@@ -76,23 +78,17 @@ class Tolerance:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> core_schema.CoreSchema:
-        read = Quantity(above=0, elsewhere="share such as 2 %, or amount, SI when bare")
         return core_schema.no_info_plain_validator_function(
             cls._validate,
-            metadata={"pydantic_js_functions": [lambda _schema, _handler: read.json_schema()]},
+            metadata={"pydantic_js_functions": [lambda _schema, _handler: _AMOUNT.json_schema()]},
         )
 
 
-def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+def _differ(values: tuple[float, ...]) -> tuple[float, ...]:
     for k, value in enumerate(values):
         if value in values[:k]:
             raise wrong(f"{value:g} (SI units) is listed twice", k)
-    return tuple(sorted(values))
-
-
-def _require_order(low: float | None, high: float | None) -> None:
-    if low is not None and high is not None and low > high:
-        raise wrong(f"min {low:g} is above max {high:g} (SI units)", "min")
+    return values
 
 
 def _several(given: tuple[str | Mapping[str, float], ...]) -> tuple[str | Mapping[str, float], ...]:
@@ -145,7 +141,7 @@ class Parameter(Part):
         Annotated[
             tuple[YValue, ...],
             Field(min_length=1, max_length=MOST_CHOICES),
-            AfterValidator(_ascending),
+            AfterValidator(_differ),
         ]
         | None
     ) = None
@@ -159,7 +155,6 @@ class Parameter(Part):
                 raise wrong("required key is missing: give min and max, or values", key)
             if self.values is not None and bound is not None:
                 raise wrong(f"values are given, and leave nothing to limit: leave {key} out", key)
-        _require_order(self.min, self.max)
         return self
 
     @property
@@ -172,8 +167,8 @@ class Parameter(Part):
     @property
     def range(self) -> tuple[float, float]:
         """The bounds, or the smallest and the largest of the values."""
-        bounds = self.values or tuple(v for v in (self.min, self.max) if v is not None)
-        return bounds[0], bounds[-1]
+        bounds = self.values or [v for v in (self.min, self.max) if v is not None]
+        return min(bounds), max(bounds)
 
 
 class Choices(Part):
@@ -195,8 +190,8 @@ class Choices(Part):
         Frozen,
         OrFile(1),
     ]
-    price: Annotated[Mapping[str, Price], Frozen] = FrozenDict()
-    tolerance: Annotated[Mapping[str, Tolerance], Frozen] = FrozenDict()
+    price: ByReference[Price] = FrozenDict()
+    tolerance: ByReference[Tolerance] = FrozenDict()
 
     @model_validator(mode="after")
     def _are_alike_and_differ(self) -> Self:
@@ -260,7 +255,6 @@ class Constraint(Part):
     def _binds(self) -> Self:
         if self.min is None and self.max is None:
             raise wrong("a constraint needs min, max or both")
-        _require_order(self.min, self.max)
         if not any(self.terms.values()):
             raise wrong("all coefficients are zero", "terms")
         return self
@@ -277,13 +271,12 @@ class MassLimits(Part):
 
     min: Annotated[float, quantity("mass", above=0)] | None = None
     max: Annotated[float, quantity("mass", above=0)] | None = None
-    price: Annotated[float, Quantity(above=0, elsewhere=_RATE)] | None = None
+    price: Annotated[float, Quantity(above=0, elsewhere=_RATE, rate=True)] | None = None
 
     @model_validator(mode="after")
     def _binds(self) -> Self:
         if self.min is None and self.max is None and self.price is None:
             raise wrong("the mass needs min, max or both, or a price")
-        _require_order(self.min, self.max)
         return self
 
 
@@ -384,6 +377,14 @@ class Design(Part):
     mass: MassLimits | None = None
     torque: Named[TorqueLimit] = FrozenDict()
 
+    @field_validator("entries", mode="before")
+    @classmethod
+    def _has_no_misspelt_constraints(cls, entries: Any) -> Any:
+        for name, body in entries.items() if isinstance(entries, Mapping) else ():
+            if name.lower().startswith("constraint") and not is_entry(body):
+                raise wrong("did you mean the reserved key 'constraints'?", name)
+        return entries
+
     @cached_property
     def parameters(self) -> Mapping[str, DesignColumn]:
         """y by the names of its columns, in order."""
@@ -420,7 +421,8 @@ class Design(Part):
                 start += len(columns)
                 continue
             if entry.values is not None:
-                names = tuple(f"{value:g}" for value in entry.values)
-                found.append(Catalogue(name, (start,), names, tuple((v,) for v in entry.values)))
+                values = sorted(entry.values)
+                names = tuple(f"{value:g}" for value in values)
+                found.append(Catalogue(name, (start,), names, tuple((v,) for v in values)))
             start += 1
         return tuple(found)

@@ -6,13 +6,14 @@ To add a key: give `Document` a field, with a model of what stands below it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import Finding, KeyPath, Tree, text, unspaced
+from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
@@ -25,6 +26,7 @@ from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm, kinds_of
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
+P = TypeVar("P", bound=Part)
 _ONE_LINE = must(str.isprintable, "expected one line of printable text")
 
 
@@ -78,22 +80,26 @@ _TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>", "<path>"
 _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
-def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
-    """The document, or None and everything the schema has against it."""
-    context = {"space": text(tree, "mechanism", "space")}  # see `schema.vectors`
-    try:
-        return Document.model_validate(_with_entries_apart(tree), context=context), []
-    except ValidationError as error:
-        findings = _findings(error)
-        return None, [f for f in findings if not f[1].endswith("got nothing")]  # a rule finds those
+def validated(tree: Tree, folder: Path) -> tuple[Document | None, list[Finding]]:
+    """The document, or None and everything the schema has against it.
+
+    Files are named from ``folder``. Keys without a value are another's to find.
+    """
+    mechanism = tree.get("mechanism")
+    space = mechanism.get("space") if isinstance(mechanism, Mapping) else None
+    body, context = _with_entries_apart(tree), {"space": space, "folder": folder}
+    document, findings = validated_part(Document, body, context)
+    return document, [each for each in findings if not each[1].endswith("got nothing")]
 
 
-def validated_sweep(body: object) -> tuple[Sweep | None, list[Finding]]:
-    """The content of the key `sweep` by itself, or None and what the schema has against it."""
+def validated_part(
+    model: type[P], body: object, context: Mapping[str, object] | None = None, *place: str
+) -> tuple[P | None, list[Finding]]:
+    """A part that stands at ``place``, or None and everything the schema has against it."""
     try:
-        return Sweep.model_validate(body), []
+        return model.model_validate(body, context=context), []
     except ValidationError as error:
-        return None, _findings(error, "sweep")
+        return None, _findings(error, *place)
 
 
 def _findings(error: ValidationError, *below: str) -> list[Finding]:

@@ -18,7 +18,7 @@ from eigassign.case.schema.parts import (
     Direction,
     KindBy,
     Orientation,
-    Part,
+    Placed,
     Vector,
     kinds,
     must,
@@ -30,7 +30,7 @@ from eigassign.case.schema.parts import (
 from eigassign.case.suggestions import listed
 
 
-class JointBase(Part):
+class JointBase(Placed):
     """What all joints have: where they are and how they are turned.
 
     Keys:
@@ -44,6 +44,7 @@ class JointBase(Part):
         axis: in the axes of the follower where the coordinate is 0
     """
 
+    place = "position"
     freedoms: ClassVar[tuple[str, ...]]  # names of its coordinates: what `component` may be
     planar: ClassVar[bool] = False  # whether planar mechanisms may have it
     travels: ClassVar[bool] = False  # whether its base is a beam along which it moves

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from eigassign.case.schema.joints import Joint
 from eigassign.case.schema.links import Link
@@ -22,14 +22,17 @@ from eigassign.case.schema.parts import (
     OrFile,
     Orientation,
     Part,
+    Placed,
     Quantity,
     ValueOr,
     Vector,
+    must,
     only_in,
     quantity,
     wrong,
 )
 from eigassign.case.schema.sections import Material, Section
+from eigassign.case.suggestions import shown
 from eigassign.case.units import DIMENSIONS
 
 _FAR = DIMENSIONS["angle"].largest  # rad, and m where the joint slides
@@ -44,7 +47,9 @@ TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", 
 
 
 _Acceleration: TypeAlias = Annotated[
-    tuple[Annotated[float, quantity("acceleration")], ...], Components()
+    tuple[Annotated[float, quantity("acceleration")], ...],
+    Components(),
+    must(any, "pulls nowhere: write none to leave gravity out"),
 ]
 _AboutAxes: TypeAlias = Annotated[
     tuple[TurningStiffness, ...],
@@ -53,7 +58,7 @@ _AboutAxes: TypeAlias = Annotated[
 ]
 
 
-class Body(Part):
+class Body(Placed):
     """A rigid body on a node.
 
     Keys:
@@ -65,13 +70,14 @@ class Body(Part):
         offset: from the node to the centre of mass, in the link's axes; none unless given
     """
 
+    place = "offset"
     at: str
     mass: Annotated[float, quantity("mass", at_least=0)] = 0.0
     inertia: Inertia = 0.0
     offset: Vector | None = None
 
 
-class Spring(Part):
+class Spring(Placed):
     """A spring between two nodes, or a node and `ground`; the pose as written is free of stress.
 
     Where the two nodes are apart, the spring acts at the second: what it resists is the motion of
@@ -176,6 +182,13 @@ class Coordinate(Part):
         ),
     ] = "relative"
     drive: ValueOr[Literal["free", "locked"], Drive] = "free"
+
+    @field_validator("component", mode="before")
+    @classmethod
+    def _is_no_truth(cls, value: object) -> object:
+        if isinstance(value, bool):
+            raise wrong(f"expected 1, 2, 3, 'rotation' or 'translation', got {shown(value)}")
+        return value
 
     @property
     def moves(self) -> Literal["free", "held", "locked"]:

@@ -8,17 +8,19 @@ What a key is for stands in the docstring of its model, in the list `Keys:`. Fro
 the JSON Schema, for editors, and into the reference of the manual.
 
 Vectors have two components in a plane and three in space, and some keys belong to one space only.
-The space of the mechanism is the context of a validation, {"space": "planar"}; without one, as of
-parts built in Python, every space is right.
+The space of the mechanism and the folder of the file are the context of a validation, {"space":
+"planar", "folder": Path(...)}; without one, as of parts built in Python, every space is right.
 """
 
 from __future__ import annotations
 
 import inspect
+import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args
+from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar, Union, get_args
 
 from pydantic import (
     AfterValidator,
@@ -30,12 +32,20 @@ from pydantic import (
     GetJsonSchemaHandler,
     Tag,
     ValidationInfo,
+    model_validator,
 )
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from eigassign.case.suggestions import shown
-from eigassign.case.units import DIMENSIONS, PLAIN, Dimension, QuantityError, read_quantity
+from eigassign.case.units import (
+    DIMENSIONS,
+    PLAIN,
+    Dimension,
+    QuantityError,
+    read_quantity,
+    read_rate,
+)
 
 T = TypeVar("T")
 L = TypeVar("L")
@@ -106,13 +116,31 @@ def must(hold: Callable[[Any], object], message: str) -> AfterValidator:
 # --- Quantities
 
 
+class Written(float):
+    """A number in SI whose dimension another key decides, with the ``text`` that gives it.
+
+    It is NaN where it cannot be read, or is beyond a limit. What is wrong with it `rules.values`
+    says.
+    """
+
+    __slots__ = ("text",)
+    text: str | float
+
+    def __new__(cls, value: float, text: str | float = math.nan) -> Written:
+        """``value`` in SI, written as ``text``."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A real number with a dimension and limits, as pydantic annotation: ``Annotated[float, ...]``.
 
     Accepts a bare number (SI) or text with a unit; the validated value is SI. ``elsewhere`` says
-    where the dimension comes from when it is another key that decides it (documentation only: such
-    values are SI numbers already when the schema sees them).
+    where the dimension comes from when it is another key that decides it: that is then for
+    `rules.values`, and text becomes a `Written`. ``rate``: it is an amount for one unit of that,
+    such as `3 / kg`.
     """
 
     dimension: Dimension | None = None
@@ -121,11 +149,19 @@ class Quantity:
     below: float | None = None
     at_most: float | None = None
     elsewhere: str = ""
+    rate: bool = False
 
     def read(self, value: object) -> float:
-        """SI value within the limits. Raises QuantityError, or the one that ``value`` is."""
-        if isinstance(value, QuantityError):
-            raise value
+        """SI value within the limits. Raises QuantityError."""
+        if isinstance(value, Written):
+            value = value.text
+        if self.elsewhere and isinstance(value, (str, int, float)) and not isinstance(value, bool):
+            try:
+                si = (read_rate if self.rate else read_quantity)(value, None)
+                self.checked(si, "")
+            except QuantityError:
+                return Written(math.nan, value)
+            return Written(si, value) if isinstance(value, str) else si
         if self.dimension is None and isinstance(value, str):
             raise QuantityError(f"expected a number without unit, got text {shown(value)}")
         return self.checked(read_quantity(value, self.dimension), shown(value))
@@ -237,7 +273,14 @@ Name: TypeAlias = Annotated[
         "(at most 64)",
     ),
 ]
-File: TypeAlias = str  # absolute; `rules.files` looks at it
+
+
+def _absolute(file: str, info: ValidationInfo) -> str:
+    folder = info.context and info.context["folder"]
+    return file if folder is None else os.path.abspath(os.path.join(folder, file))
+
+
+File: TypeAlias = Annotated[str, AfterValidator(_absolute)]  # `rules.files` looks at it
 Named: TypeAlias = Annotated[Mapping[Name, T], Frozen]  # parts by the names that a file gives them
 OneOrMoreNamed: TypeAlias = Annotated[Mapping[Name, T], Field(min_length=1), Frozen]
 ByReference: TypeAlias = Annotated[Mapping[str, T], Frozen]  # values by the names of other parts
@@ -323,6 +366,7 @@ LENGTH = quantity("length", above=0)
 ANGLE = quantity("angle")
 PLACE = quantity("length")
 _SHORTEST = 1e-30  # component of a direction; squares of less end in 0
+_AXES = {"planar": "xy", "spatial": "xyz"}
 _ROUND_OFF = 1e-12  # of the trace: a thin rod's zero inertia computed elsewhere
 
 
@@ -347,15 +391,32 @@ IN_PLANE = only_in("planar", "is for planar mechanisms: in space write orientati
 IN_SPACE = only_in("spatial", "is for spatial mechanisms: in a plane write angle")
 
 
+class Placed(Part):
+    """What stands at a node, and is not turned, where the file is silent."""
+
+    place: ClassVar[str] = ""  # the key that says how far from the node it stands
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_at_its_node(cls, value: Any, info: ValidationInfo) -> Any:
+        space = space_of(info)
+        if space is None or not isinstance(value, Mapping):
+            return value
+        default: dict[str, object] = {cls.place: (0.0,) * len(_AXES[space])} if cls.place else {}
+        if space == "spatial" and "orientation" in cls.model_fields:
+            default["orientation"] = (0.0, 0.0, 0.0)
+        return {**default, **value}
+
+
 class Components:
     """A component along each axis: two in a plane, three in space."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         def fits(value: Any, info: ValidationInfo) -> Any:
             space = space_of(info) or ""
-            axes = {"planar": "x, y", "spatial": "x, y, z"}.get(space)
-            if axes and isinstance(value, tuple) and len(value) != len(axes.split()):
-                needed = f"{space}: needs {len(axes.split())} components ({axes})"
+            axes = _AXES.get(space)
+            if axes and isinstance(value, tuple) and len(value) != len(axes):
+                needed = f"{space}: needs {len(axes)} components ({', '.join(axes)})"
                 raise wrong(f"{needed}, got {len(value)}")
             return value
 

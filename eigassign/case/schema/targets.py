@@ -195,8 +195,6 @@ class AnyTarget(Part):
 
     kind: ClassVar[str]
     is_goal: ClassVar[bool] = False  # its error is a distance; a limit's is a violation
-    # keys of the frequencies that may change in time
-    in_time: ClassVar[tuple[tuple[str, ...], ...]] = ()
     weight: Annotated[float, Quantity(above=0)] = 1.0
     trajectory: str | None = None
     during: tuple[Annotated[float, TIME], Annotated[float, TIME]] | None = None
@@ -289,7 +287,6 @@ class FrequencyTarget(ModeTarget):
 
     kind = "frequency"
     is_goal = True
-    in_time = (("frequency",),)
     never_all = "all modes cannot have one frequency: list those that shall"
     frequency: Curve
 
@@ -302,7 +299,6 @@ class AtLeastTarget(ModeTarget):
     """
 
     kind = "at_least"
-    in_time = (("at_least",),)
     at_least: Curve
 
 
@@ -314,7 +310,6 @@ class AtMostTarget(ModeTarget):
     """
 
     kind = "at_most"
-    in_time = (("at_most",),)
     never_all = "there is always a higher mode: list those that are meant"
     at_most: Curve
 
@@ -329,7 +324,6 @@ class KeepOutTarget(AnyTarget):
     """
 
     kind = "keep_out"
-    in_time = (("keep_out", "of"),)
     keep_out: OneOrList[Harmonic, tuple[Speed, Speed]]
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None

@@ -207,7 +207,7 @@ class TipTrajectory(Timed):
             if a == b:
                 raise wrong("the same point as the one before it", "waypoints", k)
         for joint, (low, high) in self.branch.items():
-            if not low < high:
+            if low >= high:
                 raise wrong(_UPWARDS, "branch", joint)
         return self
 

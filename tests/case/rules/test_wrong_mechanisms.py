@@ -226,26 +226,26 @@ def test_an_assembly_without_loops_has_nothing_to_choose(tmp_path: Path) -> None
     ]
 
 
-def test_every_mistake_of_a_file_is_told_at_once(tmp_path: Path) -> None:
-    text = PLANAR
-    for old, new in (
-        ("stiffness: K.mtx", "stiffness: N.mtx"),
-        ("{from: start, to: tip,", "{from: strat, to: tip,"),
-        ("axis: [1, 0.1]", "axis: [0, 0]"),
-        ("translational: 100", "translational: 100 N"),
-        ("at: {turn: 60 deg}", "at: {turm: 60 deg}"),
-        ("stiffness: 3 kN/m,", "stiffness: 3 N m/rad,"),
-    ):
-        text = changed(text, old, new)
-    paths = {path for *_, path, _ in problems_of(text, write(tmp_path, text))}
-    assert paths >= {
-        "mechanism.links.plate.stiffness",
-        "mechanism.links.bracket.beams.lower.from",
-        "mechanism.joints.guide.axis",
-        "mechanism.springs.soft.translational",
-        "mechanism.assembly.at.turm",
-        "coordinates.place.drive.stiffness",
+def test_every_mistake_of_form_is_told_at_once_and_then_every_other(tmp_path: Path) -> None:
+    form = {
+        ("stiffness: K.mtx", "stiffness: N.mtx"): "mechanism.links.plate.stiffness",
+        ("axis: [1, 0.1]", "axis: [0, 0]"): "mechanism.joints.guide.axis",
+        ("translational: 100", "translational: 100 N"): "mechanism.springs.soft.translational",
     }
+    other = {
+        (
+            "{from: start, to: tip,",
+            "{from: strat, to: tip,",
+        ): "mechanism.links.bracket.beams.lower.from",
+        ("at: {turn: 60 deg}", "at: {turm: 60 deg}"): "mechanism.assembly.at.turm",
+        ("stiffness: 3 kN/m,", "stiffness: 3 N m/rad,"): "coordinates.place.drive.stiffness",
+    }
+    text = PLANAR
+    for mistakes in (other, form):
+        for old, new in mistakes:
+            text = changed(text, old, new)
+        paths = {path for *_, path, _ in problems_of(text, write(tmp_path, text))}
+        assert paths >= set(mistakes.values())
 
 
 def test_names_of_the_tables_are_unique() -> None:
