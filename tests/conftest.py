@@ -1,7 +1,5 @@
 """Shared set-up: oracles and helpers for tests of several packages; reproducible hypothesis."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

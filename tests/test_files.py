@@ -1,7 +1,5 @@
 """What anybody may have put at a path is read within limits, or refused; nothing waits for it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The package as one meets it in an interactive session."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Problems and an independent oracle shared by the tests of the assignment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

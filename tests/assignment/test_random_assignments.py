@@ -1,7 +1,5 @@
 """The random cases and the reference that designs are judged by, before they judge anything."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from assignment_oracle import best_least_squares, of_case

@@ -5,8 +5,6 @@ and parts of trajectories that end between samples. It is judged by counting mod
 instants, q being linear between samples and the profile between its points.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Ten cases of each kind: planar and spatial arms, loops, trees, thin tubes, gantr
 case listed values, which SLSQP goes through one by one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import objective_oracle as oracle
 import pytest

@@ -3,8 +3,6 @@
 Random mechanisms, 6 to 12 parameters, two or three modes: within 1 % of SciPy's rms in 95 %.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

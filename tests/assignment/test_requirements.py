@@ -1,7 +1,5 @@
 """What targets ask for, at the samples of the trajectories."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from pathlib import Path

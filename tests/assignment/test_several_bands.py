@@ -5,8 +5,6 @@ some of them along one trajectory or in a part of it, some beside a wanted frequ
 mass or prices. The answer is compared with the best of a thousand random designs that are clear.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any, NamedTuple
 

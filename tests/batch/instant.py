@@ -1,7 +1,5 @@
 """Batches whose cases take no time: an executor that makes a folder for each and says it is ok."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A limit of memory for what a test does."""
 
-from __future__ import annotations
-
 import contextlib
 import resource
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A scheduler of dask and its workers, as the command line of dask starts them; and `eigassign`."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -2,8 +2,6 @@
 processes, the same command ends with the same results.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """A batch on a dask.distributed cluster is the same as on this machine, whoever is killed."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

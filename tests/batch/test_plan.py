@@ -1,7 +1,5 @@
 """A plan has its cases in order, each with a name that says its values and a key that tells it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A batch computes nothing twice, whoever is killed, and whatever was in its folder before."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """`sweep` and --set: which variants of a case there are, and what is wrong with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

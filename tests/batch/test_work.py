@@ -1,7 +1,5 @@
 """A case runs within its limits, and gives the same numbers wherever it runs."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Worker processes: what they start with, and that none of them outlives its work."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """As much of JSON Schema as that of case files uses, written down once more, independently."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A mistake in a case file, where it must be shown and what must be said of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

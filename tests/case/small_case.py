@@ -1,7 +1,5 @@
 """A small valid case file, and edits of it in which ``¦`` marks where a problem is expected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 TEXT = Path(__file__).with_name("small_case.yaml").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """`resolved()`: canonical, complete, SI, and itself a case file with the same content."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What a valid file becomes: SI values, defaults, frozen and equal by content."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import math

@@ -1,7 +1,5 @@
 """Whatever is fed in, only errors meant for the user come out. Deterministic (derandomised)."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

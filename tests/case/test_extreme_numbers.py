@@ -1,7 +1,5 @@
 """Numbers of no size that a mechanism has are refused where they stand, with what is allowed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Files that are no YAML case at all: one clear message each, never a traceback, never a crash."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import NamedTuple

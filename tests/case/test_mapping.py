@@ -1,7 +1,5 @@
 """A case given as a mapping is the case that a file with the same content is."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from fractions import Fraction
 from pathlib import Path

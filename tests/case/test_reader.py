@@ -1,7 +1,5 @@
 """Plain scalars follow the YAML 1.2 core schema, not PyYAML's 1.1."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Quantities: what each unit is worth, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

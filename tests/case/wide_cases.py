@@ -1,7 +1,5 @@
 """Two valid case files that use every key of a mechanism between them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 PLANAR = Path(__file__).with_name("wide_planar.yaml").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """A small effort, so that a whole chart takes a moment."""
 
-from __future__ import annotations
-
 from eigassign.chart import Effort
 
 TINY = Effort(

@@ -1,7 +1,5 @@
 """The shipped arm, and what a small chart of it shows, made once for all tests."""
 
-from __future__ import annotations
-
 import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of

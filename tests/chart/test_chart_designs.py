@@ -1,7 +1,5 @@
 """Ways to a design end where they should, and gradients are what they say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

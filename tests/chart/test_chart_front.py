@@ -1,7 +1,5 @@
 """Fronts and advice follow from the numbers alone; times are medians of repeats in turns."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The mesh axis: beams converge with the fourth power of the element length."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a chart of the shipped arm shows: every method, at the price and with its error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from pathlib import Path

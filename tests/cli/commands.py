@@ -1,7 +1,5 @@
 """Running eigassign in tests: inside this process, or as a process of its own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Many cases on the command line: one folder each, a summary, and nothing lost to what fails."""
 
-from __future__ import annotations
-
 import csv
 import re
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """The chart command: its folder, its JSON, its exit codes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

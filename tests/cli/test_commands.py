@@ -1,7 +1,5 @@
 """Each command by its result: text and JSON on stdout, everything else on stderr."""
 
-from __future__ import annotations
-
 import json
 import re
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """What ends a process, and how: errors of ours and of the world, pipes, locales, signals."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os

@@ -3,8 +3,6 @@
 A uniform arm in the vertical plane turns by a quintic: mass and torque have closed forms.
 """
 
-from __future__ import annotations
-
 import csv
 import html
 import itertools

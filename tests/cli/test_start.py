@@ -1,7 +1,5 @@
 """The first minute: starters that run as they are, the manual, tabs, and the examples."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """What a file says, or is called, neither moves a cursor nor finds its way into a message."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

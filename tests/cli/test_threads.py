@@ -1,7 +1,5 @@
 """Answers with one thread and with two: what the manual says of the number of threads."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

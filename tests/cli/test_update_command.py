@@ -1,7 +1,5 @@
 """The update command: its folder, its JSON, its exit codes, the case it leaves."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Wrong case files end in a clear message at the right place and exit code 2, never otherwise."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Wrong case files: a name, the file's bytes, what must be said, and which command finds it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -14,8 +14,6 @@ A comment `<!-- not run: reason -->` above a block leaves it out. By default onl
 Python run, without drawings, and what they print is compared; all of it with `-m slow`.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

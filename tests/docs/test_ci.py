@@ -1,7 +1,5 @@
 """The workflow and the hook of the manual are well formed, and their commands do their work."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import xml.etree.ElementTree as ET

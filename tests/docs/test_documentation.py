@@ -1,7 +1,5 @@
 """README and manual, held to what they describe."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import sys

@@ -1,7 +1,5 @@
 """The site of the manual is built without a warning, and every link on it leads to a page of it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

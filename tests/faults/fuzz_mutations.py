@@ -1,7 +1,5 @@
 """Case files that were right once: shipped cases with some of their values and keys changed."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
-from eigassign.output import is_untouched, run_folder
+from eigassign.cli import main
+from eigassign.output import Cache, is_untouched, run_folder
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 
 CASE = Path("cases/arm.yaml")
 TARGET = Path("results/arm")
 NAMES = ("case.yaml", "results.json", "figures/modes.png")
+TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+SHORT = (("samples: 152", "samples: 12"), ("order: 4", "order: 2"))
+LITTLE = ("--study", "none", "--figures", "none")
 
 
 def write_a_few_files(case: Path, target: Path, force: bool) -> int:
@@ -25,6 +32,30 @@ def write_a_few_files(case: Path, target: Path, force: bool) -> int:
         for name in NAMES:
             (folder / name).write_text(f"{name} of {os.getpid()}")
     return 0
+
+
+def optimize(case: Path, target: Path, force: bool) -> int:
+    """The whole command, with a cache beside its case."""
+    os.chdir(case.parents[1])
+    args = ["optimize", case, "--out", target, "--cache-dir", case.parents[1] / "cache"]
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        patch.dict(os.environ, EIGASSIGN_CACHE="always"),
+    ):
+        return main([*map(str, args), *LITTLE, *(["--force"] if force else [])])
+
+
+def case_text() -> str:
+    text = TWO_LINK.read_text()
+    for old, new in SHORT:
+        assert old in text
+        text = text.replace(old, new)
+    return text + "assignment: {method: one_shot}\n"
+
+
+def empty_cache(scene: Scene) -> None:
+    for entry in (scene.root / "cache").iterdir():
+        entry.unlink()
 
 
 def untouched(root: Path) -> Mapping[str, str]:
@@ -147,4 +178,7 @@ def faults(scene: Scene) -> list[str]:
         found.append("the next run fails")
     found += [] if scene.whole() else ["the next run is not whole"]
     found += [] if scene.aside() else ["what was mine is not beside the next run"]
+    cache = Cache(scene.root / "cache")
+    damaged = [path for path in cache.directory.glob("*.arrays") if cache.load(path.stem) is None]
+    found += [f"{path.name} of the cache is damaged" for path in damaged]
     return found + [f"{name} is left" for name in scene.left()]

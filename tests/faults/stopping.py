@@ -5,8 +5,6 @@ library; a filter of seccomp lets all other calls pass at full speed. Between tw
 disk stays the same, so kills before each of them meet every state in which a kill can leave it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

@@ -5,8 +5,6 @@ killed. Slow: sixty kills, each followed by the same command again, some of them
 case was cut, emptied or deleted.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -3,8 +3,6 @@
 Nothing that was there is lost, and the same command, given again, ends as if nothing had failed.
 """
 
-from __future__ import annotations
-
 import builtins
 import contextlib
 import errno

@@ -1,7 +1,5 @@
 """A disk that is full at any moment of a run costs that run and nothing else."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os
@@ -12,8 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from kill_runs import case_text, optimize
-from run_scenes import Scene, Stage, added, faults, write_a_few_files
+from run_scenes import Scene, Stage, added, case_text, faults, optimize, write_a_few_files
 
 from eigassign.errors import StorageError
 

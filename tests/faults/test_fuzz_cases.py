@@ -1,6 +1,4 @@
-"""Whatever a case file holds: an answer, or an error with its place; the long form is `fuzz.py`."""
-
-from __future__ import annotations
+"""Whatever a case file holds: an answer, or an error with its place."""
 
 import copy
 import math

@@ -1,20 +1,31 @@
 """Killed or told to end before any change that it makes to a file, a run loses nothing.
 
-What it leaves is swept by the next. Whole runs are killed by ``kill_runs.py``.
+What it leaves is swept by the next. Whole runs of `eigassign optimize` are stopped at random
+instants too, forked from a process that has imported everything, so that they are met at work.
 """
 
-from __future__ import annotations
-
+import random
 import signal
 import sys
+import time
 from collections.abc import Callable, Mapping
 from itertools import count
 from pathlib import Path
 
 import click
 import pytest
-from run_scenes import EARLIER, Stage, added, faults, write_a_few_files
-from stopping import can_stop, stopped_at
+from run_scenes import (
+    EARLIER,
+    Stage,
+    added,
+    case_text,
+    edited,
+    empty_cache,
+    faults,
+    optimize,
+    write_a_few_files,
+)
+from stopping import can_stop, stopped_after, stopped_at
 
 from eigassign.cli import cli, main
 
@@ -72,6 +83,37 @@ def test_a_signal_before_any_change_of_a_file_loses_nothing_and_leaves_nothing(
         assert not faults(scene), call
         if not stopped.reached:
             return
+
+
+@pytest.mark.slow
+def test_whole_runs_killed_before_a_change_of_a_file_lose_nothing(tmp_path: Path) -> None:
+    """With an empty cache, in the place of a run that was edited."""
+    scenes = Stage(tmp_path, optimize, case_text()).scenes(edited)
+    for call, scene in zip(count(1, 3), scenes, strict=False):
+        empty_cache(scene)
+        stopped = stopped_at(scene.run, call, signal.SIGKILL)
+        assert not faults(scene), call
+        if not stopped.reached:
+            return
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("earlier", EARLIER)
+def test_whole_runs_stopped_at_random_instants_lose_nothing(
+    tmp_path: Path, earlier: Callable[[Path], Mapping[str, str]], number: signal.Signals
+) -> None:
+    draw, start = random.Random(number), time.perf_counter()
+    scenes = Stage(tmp_path, optimize, case_text()).scenes(earlier)  # the first run is timed
+    scene = next(scenes)
+    longest = 1.3 * (time.perf_counter() - start)
+    for turn in range(6):
+        if turn % 2:
+            empty_cache(scene)
+        code = stopped_after(scene.run, draw.uniform(0.0, longest), number)
+        assert code in (0, -number, 128 + number)
+        assert not faults(scene), turn
+        scene = next(scenes)
 
 
 def as_a_command(job: Callable[[], int]) -> int:

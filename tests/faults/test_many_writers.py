@@ -1,7 +1,5 @@
 """Sixteen processes that write the same, some of them killed at work, never spoil it."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """A case may ask for ten million variants, and be called anything: both are answered."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """Cases for tests, written as plain trees: the paper's arm, bars, and random planar chains."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """An arm whose links change with the design, and can be reduced."""
 
-from __future__ import annotations
-
 from spatial_cases import ALLOY
 from spatial_oracle import Tree
 

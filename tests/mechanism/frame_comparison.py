@@ -5,8 +5,6 @@ The spectra agree to round-off. That is the machine's 1e-16 times the ratio of t
 1600 random poses the worst was 3e-9.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from spatial_cases import Built, built
 from spatial_oracle import Tree, World, world

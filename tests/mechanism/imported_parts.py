@@ -1,7 +1,5 @@
 """A beam as another program would export it, and the arm that it is a link of."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

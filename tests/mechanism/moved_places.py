@@ -1,7 +1,5 @@
 """Mechanisms whose joints, bodies and nodes the design moves and turns."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Planar serial arms in closed form, written down without the code under test."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from eigassign.mechanism import TipChain, TipEvaluation

@@ -1,7 +1,5 @@
 """Mechanisms whose tip follows a path while design parameters move it, and extrapolated slopes."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from itertools import pairwise

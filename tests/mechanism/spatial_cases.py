@@ -1,7 +1,5 @@
 """Mechanisms for tests in the language of a case file, and what is built from them."""
 
-from __future__ import annotations
-
 import copy
 import json
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Well-known mechanisms in the language of a case file: those of the reference program."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Random mechanisms, planar and spatial, open and with loops, in the language of a case file."""
 
-from __future__ import annotations
-
 import copy
 from functools import cache
 from typing import Any

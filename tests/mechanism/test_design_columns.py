@@ -1,7 +1,5 @@
 """A choice that is made by y is the mechanism that has it written in its file."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_case import edited

@@ -1,7 +1,5 @@
 """What drives exert: textbook formulas, d'Alembert on differenced poses, energies, slopes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import load_cases

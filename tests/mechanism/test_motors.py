@@ -1,8 +1,5 @@
 """The rotor of a motor behind a gear: as data sheets give it, and behind a gear that gives."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +10,6 @@ from spatial_oracle import Tree
 
 import eigassign as ea
 from eigassign.mechanism import drive_forces
-
-PATH = Path("test.yaml")
 
 
 def arm(drive: Any, kind: str = "revolute", design: Tree | None = None) -> Tree:

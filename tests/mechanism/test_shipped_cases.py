@@ -1,7 +1,5 @@
 """The shipped cases: what closed forms know of them, and that each can be followed."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

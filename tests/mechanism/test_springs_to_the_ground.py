@@ -3,8 +3,6 @@
 What a rigid post carries is the same spring, and the nonlinear potential another program.
 """
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stiffness under weight against a nonlinear potential and another program; symbols and numbers."""
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Rigid links agree to 1e-9, which is round-off; beams of eight elements to the error of their mesh.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,7 @@ from scipy.special import jn_zeros
 from spatial_cases import STEEL, Tree, case_of
 
 import eigassign as ea
-from eigassign.modal import buckling, sag_of_nodes, weight_changes
+from eigassign.modal import Model, buckling, sag_of_nodes, weight_changes
 
 G = 9.81
 WIDTH, HEIGHT = 0.02, 0.004
@@ -34,7 +32,7 @@ def scene(
     section: Tree = STRIP,
     material: Tree = STEEL,
     **more: Any,
-) -> ea.Model:
+) -> Model:
     mechanism = {
         "space": space,
         "gravity": DOWN[space] if gravity is None else gravity,
@@ -48,7 +46,7 @@ def scene(
     return ea.Case(case_of({"mechanism": mechanism, "coordinates": coordinates})).model()
 
 
-def hertz(model: ea.Model, q: Any, count: int) -> np.ndarray:
+def hertz(model: Model, q: Any, count: int) -> np.ndarray:
     return np.asarray(model.frequencies(np.atleast_2d(q), np.zeros(0), count)[0])
 
 
@@ -65,16 +63,6 @@ def hinge(base: str, follower: str, **more: Any) -> Tree:
 
 
 # --- rigid links
-
-
-@pytest.mark.parametrize("length", [0.01, 0.7, 300.0])
-def test_a_pendulum(length: float) -> None:
-    model = scene(
-        {"a": rod(length)}, {"A": hinge("ground", "a")}, {"b": {"at": "a.end", "mass": 3.0}},
-        {"q": {"joint": "A"}},
-    )  # fmt: skip
-    assert model.n_rigid == 0
-    np.testing.assert_allclose(hertz(model, -np.pi / 2, 1), hz([G / length]), rtol=1e-9)
 
 
 def test_a_compound_pendulum() -> None:
@@ -94,17 +82,6 @@ def test_a_pendulum_held_off_the_vertical_by_a_constant_torque() -> None:
     )  # fmt: skip
     tilted = hertz(model, 0.4 - np.pi / 2, 1)
     np.testing.assert_allclose(tilted, hz([G * np.cos(0.4) / 0.7]), rtol=1e-9)
-
-
-def test_a_double_pendulum() -> None:
-    L = 0.7
-    model = scene(
-        {"a": rod(L), "c": rod(L)}, {"A": hinge("ground", "a"), "B": hinge("a.end", "c")},
-        {"b": {"at": "a.end", "mass": 3.0}, "d": {"at": "c.end", "mass": 3.0}},
-        {"q": {"joint": "A"}, "p": {"joint": "B"}},
-    )  # fmt: skip
-    expected = G / L * (2.0 + np.array([-1.0, 1.0]) * np.sqrt(2.0))
-    np.testing.assert_allclose(hertz(model, [-np.pi / 2, 0.0], 2), hz(expected), rtol=1e-9)
 
 
 def test_a_chain_of_equal_pendulums() -> None:
@@ -272,7 +249,7 @@ def test_a_narrow_cantilever_buckles_sideways() -> None:
 # --- booms: what the issue is about
 
 
-def boom(length: float, diameter: float, wall: float, load: float, gravity: Any) -> ea.Model:
+def boom(length: float, diameter: float, wall: float, load: float, gravity: Any) -> Model:
     tube = {"shape": "tube", "outer_diameter": diameter, "thickness": wall}
     return scene(
         {"l": beam(length)}, {"A": hinge("ground", "l")}, {"load": {"at": "l.end", "mass": load}},

@@ -1,7 +1,5 @@
 """Sampled motions for tests, and the linear equations of a motion integrated in time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

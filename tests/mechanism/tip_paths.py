@@ -1,7 +1,5 @@
 """Tip paths on built mechanisms: the chain of a node, and a course to follow."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two beams on elastic drives with a motor and a tool, as a mapping that `load_case` reads."""
 
-from __future__ import annotations
-
 from typing import Any
 
 ALLOY = {"youngs_modulus": 70e9, "density": 2700}

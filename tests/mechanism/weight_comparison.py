@@ -5,8 +5,6 @@ errors stand out of the round-off of K. Each λ agrees to 1e-6 of what gravity c
 of itself, which is the round-off of `frame_comparison`.
 """
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

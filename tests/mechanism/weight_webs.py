@@ -1,7 +1,5 @@
 """Bars welded and pinned to each other in many loops."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

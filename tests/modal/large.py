@@ -1,7 +1,5 @@
 """Arms of any size, treated as large ones: sparse algebra for a handful of unknowns."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

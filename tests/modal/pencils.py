@@ -1,7 +1,5 @@
 """Small pencils made by hand: matrices that are given functions of x."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

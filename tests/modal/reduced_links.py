@@ -1,7 +1,5 @@
 """Random arms whose links can be reduced."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The rungs of the ladder: residual of the recursion, slope of the error, differences."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 

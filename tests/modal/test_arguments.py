@@ -1,7 +1,5 @@
 """What callers get wrong from Python: answered by name, never by an error of NumPy's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,26 +3,23 @@
 The ladder is in tests/modal/taylor.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from chains import bar, model_of, two_link
 from rungs import richardson
-from spatial_cases import built
-from spatial_examples import arm3r
 
-from eigassign import expand
+from eigassign import expand, load_case
 from eigassign.errors import UsageError
 from eigassign.modal import (
     Expansion,
     Model,
     eigenvalues,
-    expand_subspace,
-    modes,
 )
 from eigassign.modal import expand as expand_pencil
 from eigassign.series import lower_set, total_degree
+
+# --- The Taylor expansion: subsets of the series, evaluation, eq. (9), and refusals
+
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 BOTH = ("absolute", "absolute")
@@ -43,21 +40,6 @@ def exact_lam(model: Model, q: np.ndarray, y: np.ndarray, count: int) -> np.ndar
 def agree(a: np.ndarray, b: np.ndarray, tolerance: float) -> None:
     size = np.abs(b).max(axis=-1, keepdims=True)
     np.testing.assert_allclose(a / size, b / size, rtol=tolerance, atol=tolerance)
-
-
-def test_the_quotient_has_the_eigenvalues_of_the_recursion() -> None:
-    model, order = paper(), 5
-    found = expand(model, Q0, Y0, (1,), order)
-    theta = model.pencil.theta_series(found.space, found.x0, np.eye(4)[:, 1:])
-    vectors = modes(model.pencil, found.x0[None], 1)
-    series = expand_subspace(model.pencil, theta, found.space, vectors.lam[0], vectors.phi[0])
-    agree(found.clusters[0].coefficients[0, 0], series.values[:, 0, 0], 1e-10)
-
-
-def test_a_coordinate_that_turns_the_whole_mechanism_is_in_no_series() -> None:
-    e = expand_pencil(built(arm3r("free")).pencil, [0.3, 0.5, -0.9], [], (1,), 3)
-    assert not e.coefficients[:, e.indices[:, 0] > 0].any()
-    assert (e.coefficients[:, (e.indices[:, 0] == 0) & (e.indices[:, 1] > 0)] != 0.0).any()
 
 
 def test_too_few_vectors_do_not_give_the_order() -> None:
@@ -213,23 +195,7 @@ def test_a_structure_without_variables_has_a_constant_expansion() -> None:
 # Large pencils
 
 
-def test_six_hundred_unknowns_have_the_series_of_a_coarser_mesh() -> None:
-    fine = expand(model_of(two_link((110, 88))), Q0, Y0, (1,), 4)
-    coarse = expand(model_of(two_link((44, 33))), Q0, Y0, (1,), 4)
-    agree(fine.coefficients, coarse.coefficients, 1e-5)  # discretisation, amplified by γ!
-
-
 # Refusals
-
-
-def test_evaluation_checks_its_samples_and_takes_one_or_many() -> None:
-    e = expand(paper(), Q0, Y0, (1, 2), 2)
-    assert e.frequencies(Q0, Y0).shape == (1, 2)
-    assert e.frequencies(np.tile(Q0, (4, 1)), Y0).shape == (4, 2)
-    with pytest.raises(UsageError, match="q has"):
-        e.frequencies([0.1], Y0)
-    with pytest.raises(UsageError, match="finite"):
-        e.eigenvalues([0.1, np.nan], Y0)
 
 
 def test_a_negative_polynomial_has_no_frequency() -> None:
@@ -247,3 +213,31 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
     for array in (a.coefficients, a.q0, a.clusters[0].vectors, a.clusters[0].coefficients):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
+
+
+# --- What the coefficients say of a polynomial's error: a guide, and where the series ends
+
+
+Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
+
+
+def test_the_share_of_the_last_degree_is_what_that_degree_adds():
+    """f² ∝ λ: it is the change of the frequency from one order to the next, in the first order."""
+    case = load_case("cases/two_link.yaml")
+    model, q = case.model(), case.trajectory.q
+    three, four = (expand_pencil(model.pencil, Q0, Y0, (1, 2), order=p) for p in (3, 4))
+    share, hz = four.last_degree_share(q, Y0), four.frequencies(q, Y0)
+    added = np.abs(three.eigenvalues(q, Y0) / four.eigenvalues(q, Y0) - 1.0)
+    np.testing.assert_allclose(2.0 * share, added, rtol=1e-9, atol=1e-14)
+    error = np.abs(hz / model.frequencies(q, Y0, 2) - 1.0)
+    assert 0.1 < share.max() / error.max() < 30.0
+
+
+def test_of_a_cluster_it_is_that_of_its_matrix():
+    model = model_of(two_link())
+    expansion = expand_pencil(model.pencil, Q0, Y0, (2, 3), order=4, cluster_gap=0.64)
+    assert [c.modes for c in expansion.clusters] == [(2, 3)]
+    q = Q0 + np.column_stack([np.zeros(5), np.linspace(-0.3, 0.3, 5)])
+    share = expansion.last_degree_share(q, Y0)
+    assert share.shape == (5, 2)
+    assert share[2].max() == 0.0 < share[[0, 4]].min()

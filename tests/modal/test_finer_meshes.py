@@ -1,7 +1,5 @@
 """What a mesh leaves out, measured by finer ones: not below the true error, and near it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Frequencies of what moves: the forces of the motion stretch and compress links."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

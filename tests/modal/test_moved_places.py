@@ -1,7 +1,5 @@
 """Frequencies of mechanisms whose places and angles are design parameters, and their slopes."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -1,13 +1,26 @@
 """What ``auto`` chooses meets what was asked for, by exact solves, and is not more than that."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from paper_arm import build, exact, samples
+from chains import model_of, two_link
 
+from eigassign import load_case
 from eigassign.errors import AccuracyError
 from eigassign.modal import MARGIN, Model, raise_order
+
+
+def build(elements) -> Model:
+    return model_of(two_link(elements=(elements["upper"], elements["fore"])))
+
+
+def samples() -> np.ndarray:
+    """Every fourth pose of the paper's trajectory with random masses of its design box."""
+    q = load_case("cases/two_link.yaml").trajectory.q[::4]
+    return np.hstack([q, np.random.default_rng(5).uniform(0.0, 0.25, (len(q), 2))])
+
+
+def exact(model: Model, x: np.ndarray, modes) -> np.ndarray:
+    return model.frequencies(x[:, :2], x[:, 2:], max(modes))[:, np.array(modes) - 1]
 
 
 @pytest.fixture(scope="module")
@@ -80,23 +93,3 @@ def test_many_points_do_while_more_of_them_help(x):
     assert 8 < len(chosen.parts) <= 32
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
-
-
-def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
-    model = build({"upper": 4, "fore": 3})
-    with pytest.raises(AccuracyError, match=r"no expansion of order up to 2 .* at sample \d+"):
-        raise_order(model.pencil, x, middle(x), 1e-7, (1, 2), orders=(2,))
-
-
-def test_several_points_of_low_order_stand_for_one_of_high_order(x):
-    """Along the paper's trajectory: one point needs a high order, several do with a low one."""
-    model = build({"upper": 2, "fore": 2})
-    x = np.hstack([x[:, :2], np.full((len(x), 2), 0.1)])
-    alone = raise_order(model.pencil, x, middle(x), 1e-5)
-    several = raise_order(model.pencil, x, middle(x), 1e-5, orders=(2, 3, 4))
-    assert len(alone.parts) == 1 < len(several.parts)
-    assert several.order <= 4 < alone.order
-    for chosen in (alone, several):
-        hz = chosen.frequencies(x[:, :2], x[:, 2:])
-        off = np.abs(hz / exact(model, x, (1,)) - 1.0)
-        assert off.max() <= chosen.stated <= 1e-5

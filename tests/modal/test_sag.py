@@ -1,7 +1,5 @@
 """What sag does to frequencies, measured by the mechanism as it is bent, against one that is."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 from typing import Any

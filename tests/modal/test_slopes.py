@@ -1,12 +1,11 @@
 """Slopes of eigenvalues and of the coefficient functions are what they say."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from calibration import Floats
 from redesigned_arms import (
     extrapolated,
     five_bar,
@@ -16,12 +15,17 @@ from redesigned_arms import (
     three_links,
     two_link_lengths,
 )
+from rungs import derivative, residual
 from scenes import SHIPPED, scene_of
+from weighed_draws import weighed
 
 from eigassign import Case, load_case
 from eigassign.modal import NearestExpansion, eigenvalues, exact_slopes, expand, reduce
 from eigassign.series import total_degree
 from eigassign.study import Scene
+
+# --- Slopes of eigenvalues and of the coefficient functions are what they say
+
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -132,3 +136,36 @@ def test_slopes_of_whatever_answers_frequencies_are_those_of_its_differences(
         up, down = (made.frequencies(*np.split(x + s * step, [2], axis=1)) for s in (1.0, -1.0))
         off = (2.0 * np.pi) ** 2 * (up**2 - down**2) / 2e-4
         np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-4, atol=1e-6 * lam.max())
+
+
+# --- Slopes of eigenvalues and the recursion under weight, up to all but buckling
+
+
+APART = 1e-3  # of λ: nearer modes have no slopes of their own that differences could tell
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_slopes_under_weight_are_those_of_finite_differences(seed: int) -> None:
+    """Of every coordinate and parameter, with what swings free, loops and springs."""
+    drawn = weighed(seed, 1)
+    if drawn is None:
+        pytest.skip("falls either way")
+    pencil, x = drawn.model.pencil, drawn.model.x(drawn.q0, drawn.y0)[0]
+    span = 1e-3 * np.where(np.arange(len(x)) < pencil.n_q, 1.0, np.abs(x))
+    span[span == 0.0] = 1e-6
+    count = min(3, len(pencil.elastic) - 1)
+    lam, slopes, _ = exact_slopes(pencil, x[None], count, np.ones(len(x)), 1)
+    lam = lam[0]
+
+    def at(w: Floats) -> Floats:
+        return np.asarray(eigenvalues(pencil, (x + w * span)[None], count)[0])
+
+    single = [
+        k for k in range(count)
+        if np.abs(np.delete(lam, k) / lam[k] - 1.0).min(initial=1.0) > APART
+    ]  # fmt: skip
+    for j in range(len(x)):
+        expected = derivative(at, np.eye(len(x))[[j]], lam[:count])[single]
+        found = slopes[0, single, j] * span[j]
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * lam[single].max())
+    assert residual(pencil, x, span, 2, (1,)).max() < 1e-10

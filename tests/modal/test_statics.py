@@ -1,7 +1,5 @@
 """What gives way under forces at nodes and the weight, against dense solves and differences."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What reduced links change: stated as against the whole links, and kept within its share."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -3,11 +3,9 @@
     J(y) = Σ_g w_g Σ_k ω_k (f(t_k, y) / f_d(t_k) − 1)² / Σ_g w_g Σ_k ω_k
 
 over the bounds and linear constraints of a case, with g its targets and ω_k trapezoidal weights,
-each trajectory for itself; and the worst case, min max_k,g w_g |f / f_d − 1|. Only the exact modes
-are the package's. Slopes follow from the modes: ∂f/∂y = φᵀ (K_y − λ M_y) φ / (8 π² f).
+each trajectory for itself. Only the exact modes are the package's. Slopes follow from the modes:
+∂f/∂y = φᵀ (K_y − λ M_y) φ / (8 π² f).
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Iterator
@@ -30,7 +28,6 @@ class ExactAssignment:
     model: Any
     q: Floats
     targets: list[tuple[slice, int, Floats, Floats]]  # rows, column of the mode, f_d, share of J
-    weights: list[float]  # of the targets
     initial: Floats
     lower: Floats
     upper: Floats
@@ -93,12 +90,6 @@ class ExactAssignment:
         """√ of the weight of each error in J."""
         return np.sqrt(np.concatenate([weights for *_, weights in self.targets]))
 
-    @property
-    def scales(self) -> Floats:
-        """w of each error, for the worst case."""
-        sizes = [len(wanted) for _, _, wanted, _ in self.targets]
-        return np.repeat(self.weights, sizes)
-
     def gradient(self, y: Floats) -> Floats:
         """∂J/∂y."""
         return 2.0 * (self.roots**2 * self.errors(y)) @ self.error_slopes(y)
@@ -134,7 +125,7 @@ class Found:
     """The best feasible end of several searches, and what each start led to."""
 
     y: Floats
-    value: float  # rms, or the largest error
+    value: float  # rms
     ends: tuple[float, ...]  # value of each start's end; infinite where it is not feasible
     evaluations: tuple[int, ...]
     seconds: tuple[float, ...]
@@ -160,7 +151,6 @@ def of_case(case: Any) -> ExactAssignment:
             (rows, target.mode - 1, wanted, target.weight * omega[rows] / total)
             for target, rows, wanted in goals
         ],
-        weights=[target.weight for target, *_ in goals],
         initial=case.initial_design,
         lower=np.array([p.min for p in file.design.parameters.values()], dtype=float),
         upper=np.array([p.max for p in file.design.parameters.values()], dtype=float),
@@ -220,15 +210,18 @@ class _Unit:
     def slopes(self, v: Floats) -> Floats:
         return self.problem.error_slopes(self.y(v)) * self.problem.width
 
-    def limits(self, more: int = 0) -> list[LinearConstraint]:
-        """The linear constraints over v, with ``more`` unknowns behind it."""
+    def limits(self) -> list[LinearConstraint]:
+        """The linear constraints over v."""
         p = self.problem
         if not len(p.C):
             return []
         C, offset = p.C * p.width, p.C @ (p.lower - p.width)
         size = np.abs(C).sum(axis=1)  # each row relative to its range in the box
-        C = np.hstack([C, np.zeros((len(C), more))]) / size[:, None]
-        return [LinearConstraint(C, (p.c_lower - offset) / size, (p.c_upper - offset) / size)]
+        return [
+            LinearConstraint(
+                C / size[:, None], (p.c_lower - offset) / size, (p.c_upper - offset) / size
+            )
+        ]
 
 
 def _least_squares(problem: ExactAssignment, start: Floats) -> Floats:
@@ -260,27 +253,6 @@ def _slsqp(problem: ExactAssignment, start: Floats) -> Floats:
             break
         value = found.fun
     return unit.y(v)
-
-
-def _epigraph_from(unit: _Unit, v: Floats, size: float) -> Floats:
-    scales = unit.problem.scales
-
-    def above(x: Floats) -> Floats:
-        e = scales * unit.errors(x[:-1]) / size
-        return np.concatenate([x[-1] - e, x[-1] + e])
-
-    def slope(x: Floats) -> Floats:
-        d = scales[:, None] * unit.slopes(x[:-1]) / size
-        one = np.ones((len(d), 1))
-        return np.vstack([np.hstack([-d, one]), np.hstack([d, one])])
-
-    found = minimize(
-        lambda x: x[-1], np.append(v, 1.0), jac=lambda x: np.append(0.0 * x[:-1], 1.0),
-        method="SLSQP", bounds=[*zip(unit.low, unit.high, strict=True), (0.0, None)],
-        constraints=[{"type": "ineq", "fun": above, "jac": slope}, *unit.limits(1)],
-        options={"ftol": 1e-14, "maxiter": 200},
-    )  # fmt: skip
-    return np.asarray(found.x[:-1])
 
 
 def _trapezoidal(t: Floats) -> Floats:

@@ -5,8 +5,6 @@ against another while the frame finds its rest, then gives as a spring. An eleme
 linear in its stretch and in the turns of its ends against its chord.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -5,8 +5,6 @@ rigidly. Poses come from `spatial_oracle`, their velocities, accelerations and p
 from differences of fourth order.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -7,8 +7,6 @@ that a design may have, a catalogue for every choice. Only exact modes and the m
 package's. Rows of the next mode are added where they say less: SLSQP sees both where modes meet.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -95,7 +93,7 @@ def of_case(case: Any, instants: int = 0) -> Aimed:
     names, parameters = list(file.design.parameters), file.design.parameters.values()
     limits = list(file.design.constraints.values())
     exact = ExactAssignment(
-        model=case.model(), q=q, targets=[], weights=[], initial=case.initial_design,
+        model=case.model(), q=q, targets=[], initial=case.initial_design,
         lower=np.array([p.min for p in parameters], dtype=float),
         upper=np.array([p.max for p in parameters], dtype=float),
         C=np.array([[c.terms.get(n, 0.0) for n in names] for c in limits]).reshape(-1, len(names)),

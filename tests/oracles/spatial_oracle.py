@@ -10,8 +10,6 @@ the pencil is projected on the null space of all rows. Closed loops are posed by
 its own with differenced rotation vectors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

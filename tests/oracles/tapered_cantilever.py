@@ -6,8 +6,6 @@ from two unit loads at the root (w = θ = 0). λ = ω² is an eigenvalue where a
 leaves no moment and no force at the tip. Without shear 1/κGA = ρI = 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

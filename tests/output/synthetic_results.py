@@ -1,7 +1,5 @@
 """Run results that no mechanics produced: shapes, names and magnitudes of every kind to draw."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

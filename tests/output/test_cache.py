@@ -1,12 +1,9 @@
 """A cache hit is bit for bit what was stored, or it is no hit."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import logging
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -187,29 +184,6 @@ def test_the_directory_follows_the_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setattr(sys, "platform", "linux")
     assert default_directory() == tmp_path / "home" / ".cache" / "eigassign"
-
-
-WRITER = """
-import sys
-from pathlib import Path
-import numpy as np
-from eigassign.output import Cache
-cache, key = Cache(Path(sys.argv[1])), "0" * 64
-for turn in range(40):
-    loaded = cache.load(key)
-    assert loaded is None or (loaded["a"] == loaded["a"][0]).all()
-    cache.store(key, {"a": np.full(2000, float(turn))})
-"""
-
-
-def test_concurrent_processes_always_read_a_whole_file(tmp_path):
-    environment = dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path))
-    command = [sys.executable, "-W", "error", "-c", WRITER, str(tmp_path / "cache")]
-    writers = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) for _ in range(3)]
-    outcomes = [(writer.communicate()[1], writer.returncode) for writer in writers]
-    assert outcomes == [(b"", 0)] * 3
-    (path,) = (tmp_path / "cache").iterdir()
-    assert path.suffix == ".arrays"
 
 
 def test_what_a_killed_writer_of_a_file_left_is_swept_by_the_next_writer_of_it(tmp_path):

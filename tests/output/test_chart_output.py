@@ -1,7 +1,5 @@
 """What a chart leaves: figures, tables, a page and JSON, all from the same numbers."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

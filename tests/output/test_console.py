@@ -1,7 +1,5 @@
 """Results reach any terminal, pipe or log whole and unchanged."""
 
-from __future__ import annotations
-
 import io
 import math
 

@@ -1,7 +1,5 @@
 """Figures show what the results say, the same every time, whatever the mechanism is like."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 import unicodedata

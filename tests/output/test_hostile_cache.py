@@ -1,7 +1,5 @@
 """Whatever stands in the place of a cache file costs one warning, and never the run."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Callable

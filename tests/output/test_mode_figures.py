@@ -1,7 +1,5 @@
 """Pictures of modes."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What has moved since an earlier result: frequencies, and how a case ended."""
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import replace

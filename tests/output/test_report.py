@@ -1,7 +1,5 @@
 """report.html needs nothing but itself and believes no text it shows."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

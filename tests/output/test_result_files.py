@@ -1,7 +1,5 @@
 """results.json keeps the names and numbers that programs rely on."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

@@ -1,12 +1,9 @@
 """A run folder appears whole or not at all, and replaces only earlier runs of its own case."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os
 import stat
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -173,18 +170,6 @@ def test_an_interrupt_in_the_middle_leaves_the_earlier_run_and_no_litter(target,
     assert hidden(target) == []
 
 
-def test_a_full_disk_is_a_storage_error_and_leaves_the_earlier_run(target, case):
-    write(target, case, "one")
-
-    def full(folder: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with pytest.raises(StorageError, match="No space left"):
-        fill(target, case, full)
-    assert (target / "results.json").read_text() == "one"
-    assert hidden(target) == []
-
-
 def failing(call: Callable[..., object], ours: Callable[..., bool]) -> Callable[..., object]:
     """A function of the system that fails where it is called so by us."""
 
@@ -282,24 +267,3 @@ def test_what_a_killed_swap_had_moved_away_comes_back(target, case):
         fill(target, case, stop)
     assert (target / "results.json").read_text() == "one"
     assert hidden(target) == []
-
-
-WRITER = """
-import sys
-from pathlib import Path
-from eigassign.output import run_folder
-target, case, me = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
-for turn in range(20):
-    with run_folder(target, case_path=case, key="a") as folder:
-        for number in range(5):
-            (folder / f"{number}.txt").write_text(f"{me} {turn}")
-"""
-
-
-def test_of_simultaneous_writers_the_last_one_wins_whole(target, case):
-    arguments = [sys.executable, "-c", WRITER, str(target), str(case)]
-    environment = dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path))
-    writers = [subprocess.Popen([*arguments, name], env=environment) for name in "ab"]
-    assert [writer.wait() for writer in writers] == [0, 0]
-    assert len({(target / f"{number}.txt").read_text() for number in range(5)}) == 1
-    assert [p.name for p in target.parent.iterdir()] == ["arm"]

@@ -1,7 +1,5 @@
 """What a run folder says about itself: whether it is finished, and as its run wrote it."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """CSV files of a run read back to the last bit."""
 
-from __future__ import annotations
-
 import csv
 import io
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Files of results are as their JSON Schema says, and every fact in that has words."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace

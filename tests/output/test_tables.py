@@ -1,7 +1,5 @@
 """Tables of what only some runs have: bands, catalogues, limits."""
 
-from __future__ import annotations
-
 import io
 import math
 from dataclasses import replace

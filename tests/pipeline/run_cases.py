@@ -1,7 +1,5 @@
 """Case files made from the shipped one, and chains of any length."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eigassign import Case, load_case

@@ -1,7 +1,5 @@
 """Mesh, order and expansion points left to auto meet the accuracy asked for, and say why."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Limits hold between samples too, and what a search finds hardly hangs on where it starts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

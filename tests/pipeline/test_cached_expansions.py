@@ -1,7 +1,5 @@
 """What comes from the cache is what would be computed, bit for bit, and only what takes long."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the drives of the paper's arm carry under its weight, and limits of it."""
 
-from __future__ import annotations
-
 import csv
 import io
 from itertools import product

@@ -1,7 +1,5 @@
 """What a chart says at its end, before any of it is written."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +13,6 @@ from eigassign import load_case
 from eigassign.chart import Request
 from eigassign.pipeline import Options, chart_case
 
-SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 FEW = replace(TINY, half_orders=(), expansion_points=(1,), factors=(1.0,), objectives=3)
 
 

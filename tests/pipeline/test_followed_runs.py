@@ -1,7 +1,5 @@
 """Whole runs with modes that are followed by their shape, against each decoupled half by itself."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

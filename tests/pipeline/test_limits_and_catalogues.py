@@ -1,7 +1,5 @@
 """The paper's arm with a limited mass, with catalogues, and with limits that contradict."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

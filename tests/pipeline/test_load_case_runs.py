@@ -1,7 +1,5 @@
 """Runs of cases whose trajectories set properties: folders, questions, and mistakes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

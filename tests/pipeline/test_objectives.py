@@ -1,7 +1,5 @@
 """Objectives that are no error: the lightest design, the highest mode, the widest room."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -15,7 +13,6 @@ from eigassign.pipeline import Options, solve_case
 from eigassign.study import AimRow, AssignmentRow
 
 CASES = Path(__file__).parents[2] / "cases"
-NO_FREQUENCY = {"targets": None}
 
 
 def solved(

@@ -1,7 +1,5 @@
 """The paper's one shot may ask for lengths that cannot follow the tip path: it is only a start."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from run_cases import UNCACHED, written

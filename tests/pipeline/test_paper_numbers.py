@@ -3,8 +3,6 @@
 Limits are the paper's figures widened by what its drawn trajectory leaves open.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from run_cases import ONE_SHOT, SHIPPED, UNCACHED, shipped, solved

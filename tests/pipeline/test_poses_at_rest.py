@@ -1,7 +1,5 @@
 """A pose at rest as a trajectory: alone, beside a motion, and under weight."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Catalogues of random arms, with prices, bands and limits: the same best as trying them all."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from pathlib import Path

@@ -4,8 +4,6 @@ None is violated in random deviations by more than 0.1 %, and few cost more than
 with every corner of the tolerances as a limit.
 """
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 from typing import Any

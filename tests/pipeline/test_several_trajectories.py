@@ -1,7 +1,5 @@
 """Several trajectories in one case: one design for all, and nothing leaks over a seam."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

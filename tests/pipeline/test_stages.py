@@ -1,7 +1,5 @@
 """Stages are timed, and say how far they are while they last."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

@@ -1,7 +1,5 @@
 """Limits of stiffness, compliance and sag: what a run does with them and says of them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

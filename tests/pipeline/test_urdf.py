@@ -1,7 +1,5 @@
 """A robot from URDF has the frequencies that its XML says, found here without eigassign."""
 
-from __future__ import annotations
-
 import math
 import re
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """Sentences of a run that claim something, each held against what makes it true."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Words of the verdict where limits, bands, load cases and coarse trajectories meet."""
 
-from __future__ import annotations
-
 import itertools
 import re
 import shutil

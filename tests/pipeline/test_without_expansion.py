@@ -1,7 +1,5 @@
 """An answer that does without the Taylor expansion is found where no expansion will do."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -5,8 +5,6 @@ paper prints; its own figure stands beside each. The trajectory is only drawn th
 cases/two_link.yaml reproduces every number that depends on it.
 """
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

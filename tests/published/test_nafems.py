@@ -6,8 +6,6 @@ modes that shift the centre come out at 17.681 and 57.075 Hz instead of 17.709 a
 is fine enough for the printed digits: cubic elements err by (βh)⁴/720 in λ, here 2e-5 at most.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from large import large

@@ -1,7 +1,5 @@
 """One expression on floats, on samples and on series: the same numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Implicit functions: known closed forms, the branch kept, and dead points refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lower sets and their product tables, by brute force over all small multi-indices."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Prepared polynomials agree with the sum over all monomials."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The algebra of truncated series: identities that hold coefficient by coefficient."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

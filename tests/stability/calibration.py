@@ -1,7 +1,5 @@
 """Random planar mechanisms, each with a design box and poses around one point."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,14 +16,12 @@ Floats = np.ndarray
 class Drawn:
     """One random mechanism with its design box and the poses it is judged at."""
 
-    seed: int
     model: Model
     q0: Floats
     y0: Floats
     q: Floats
     y: Floats
     modes: tuple[int, ...]
-    half_order: int
 
 
 def draw(seed: int, samples: int) -> Drawn | None:
@@ -43,16 +39,7 @@ def draw(seed: int, samples: int) -> Drawn | None:
     q = q0 + rng.uniform(-SPAN, SPAN, (samples, len(q0)))
     elastic = model.n_dof - model.n_rigid
     modes = tuple(range(1, 1 + int(rng.integers(1, min(4, elastic + 1)))))
-    return Drawn(
-        seed,
-        model,
-        q0,
-        y0,
-        q,
-        y,
-        modes[-1:] if rng.random() < 0.5 else modes,
-        int(rng.integers(1, 4)),
-    )
+    return Drawn(model, q0, y0, q, y, modes[-1:] if rng.random() < 0.5 else modes)
 
 
 def with_box(

@@ -4,8 +4,6 @@ Bytes of the file are changed; or numbers in the arrays, which are then packed a
 is, so that only what they say can betray them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The cases of the stress atlas, and what every answer of it has to pass."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A band called clear by a coarse mesh or by reduced links is clear by eight times the elements."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

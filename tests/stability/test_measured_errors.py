@@ -1,7 +1,5 @@
 """Answers at unseen poses and designs beside what is stated for their range."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -4,8 +4,6 @@ M(t), C(t) and K(t), forces of the motion included, are projected on modes of ni
 not vary, and integrated from one mode at rest: the phase of φᵀMu over that of the still frequency.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

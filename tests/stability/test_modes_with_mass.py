@@ -1,7 +1,5 @@
 """As many modes as have mass, whichever solver is asked: no ghosts, and no stiff mode lost."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

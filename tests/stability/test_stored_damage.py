@@ -1,7 +1,5 @@
 """No damaged file is believed; of one whose hash was made anew, shapes and finite numbers are."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Random mechanisms under shares of the weight that buckles them, hanging and standing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 As ``calibration.draw`` for planar trees: a mechanism, a design box, and poses around one point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -119,11 +117,10 @@ def _drawn(
     y = rng.uniform(box[:, 0], box[:, 1], (samples, len(box)))
     q = q0 + rng.uniform(-1.0, 1.0, (samples, len(q0))) * _spans(tree, span)
     modes = _modes(model, rng)
-    half_order = int(rng.integers(1, 4))
     if not (len(q0) or len(y0)) or not _vibrates(model, q0, y0, modes):
         return None
     inside = [_vibrates(model, *at, modes) for at in zip(q, y, strict=True)]
-    return Drawn(seed, model, q0, y0, q[inside], y[inside], modes, half_order)
+    return Drawn(model, q0, y0, q[inside], y[inside], modes)
 
 
 def _modes(model: Model, rng: np.random.Generator) -> tuple[int, ...]:

@@ -1,7 +1,5 @@
 """A geared two-link arm with trajectories that set properties, and the files of each by itself."""
 
-from __future__ import annotations
-
 import copy
 import json
 from typing import Any

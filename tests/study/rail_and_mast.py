@@ -1,7 +1,5 @@
 """A rail with a carriage beside a mast: decoupled, so that each half is an oracle of its own."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scenes of the shipped arm and of its variants, ready to be studied."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eigassign import load_case

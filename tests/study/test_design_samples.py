@@ -1,7 +1,5 @@
 """Where an automatic order is judged: designs at corners of the bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

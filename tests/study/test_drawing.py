@@ -1,7 +1,5 @@
 """What is drawn of a mechanism is where kinematics and modes put it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

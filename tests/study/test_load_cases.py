@@ -1,7 +1,5 @@
 """Trajectories that differ in the mechanism: what holds along each is what its own file says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from load_cases import INERTIA, LOADED, MASS, alone, arm, case

@@ -1,7 +1,5 @@
 """Meshes are judged where they are worst: at mixed corners of the bounds, and at the optimum."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where no frequency depends on any variable, automatic orders are still orders."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eigassign.case import parse

@@ -1,7 +1,5 @@
 """The speed of the motion is judged, and said when it is not slow."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a run says of gravity: what it may change, what links sag by, how near buckling is."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

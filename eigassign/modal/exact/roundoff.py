@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 # No powers of two, beside 1; so many, for some models spread widely at one in ten of them only.
 SCALES = np.array([1.0837, 0.8391, 1.2943, 0.7213, 1.613, 0.9127, 1.4711, 0.6173])
 # Times the spread in frequency: in some 300 chains of fine beams and stiff springs
-# (`tests/stability/roundoff_draws.py`) the true round-off was at most 8.2 times that.
+# (`tests/stability/test_roundoff.py`) the true round-off was at most 8.2 times that.
 SAFETY = 10.0
 
 

@@ -1,7 +1,5 @@
 """Optima at which modes meet: found, and known as optima, though the objective has a kink there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters from measured frequencies: against formulas of linear models, and brute force."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ends of several searches are one optimum where no barrier parts them; how many are not seen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Programs in a row reach the exact optimum, keep limits, and say where they stopped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Bounds within which a section cannot exist are refused at the bound that goes too far."""
 
-from __future__ import annotations
-
 import pytest
 from small_case import edited
 

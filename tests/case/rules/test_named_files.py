@@ -1,7 +1,5 @@
 """Files that a case names lie below its folder and are files, or nothing is read of them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Warnings: slips are caught, real mechanisms are left alone."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Warnings about frames, bodies and spatial parts: slips are caught, real mechanisms left alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

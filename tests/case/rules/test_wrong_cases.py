@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Every mistake has its own message, at its own key, in its own line and column; and only one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

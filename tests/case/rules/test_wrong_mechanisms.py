@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Mistakes in links, joints, springs, loops and spatial parts: each told once, at its place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

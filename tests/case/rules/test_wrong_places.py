@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Mistakes in parameters that are places or several properties, and in what trajectories add."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -12,7 +10,6 @@ from small_case import edited, unmarked
 from eigassign.case import parse
 
 D = "parameter: sections.rod.diameter, min: 20 mm, max: 40 mm"
-M = "m: {parameter: bodies.tool.mass, min: 0, max: 250 g}"
 TIP = "  waypoints: [[0.3, 0.1], [0.2, 0.2]]\n"
 
 

@@ -1,7 +1,5 @@
 """What stands under `design` becomes one vector y, catalogues over its columns, and limits."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

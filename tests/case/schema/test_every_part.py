@@ -1,7 +1,5 @@
 """Every kind of part is read in SI, written out again, described by the schema, and immutable."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from pathlib import Path

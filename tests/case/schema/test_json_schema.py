@@ -1,7 +1,5 @@
 """The JSON Schema describes the same files as the reader accepts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import fields

@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """Every kind of target is read in Hz, comes to requirements by mode, and is written out again."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from pathlib import Path

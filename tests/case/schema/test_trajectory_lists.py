@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (a table)
 """`trajectory:` as a list: read, resolved, and every mistake at its own line and column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -5,8 +5,6 @@ must obey the equations of motion in whatever mesh it is written. The other take
 ½ ∫ ρ |v|² of matter by quadrature along the beam and forms Lagrange's equations by differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Shapes of modes: displacements that carry the modal mass, hang together, and bend as beams do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The effect of a motion on the frequencies, its modes followed: against integration in time."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -75,19 +73,6 @@ def test_the_phase_of_a_mode_turns_as_estimated_to_the_fourth_power_of_the_speed
     assert size[0] / size[1] == pytest.approx(16.0, rel=0.01)
     assert missed[0] / missed[1] > 4.0**3.5  # a term of second order missing would give 16
     assert missed[1] < 0.003 * size[1]
-
-
-def test_from_rest_to_rest_the_whole_phase_is_the_integral_of_the_estimate() -> None:
-    """At rest no other mode follows, so that this phase is that of every unknown."""
-    model = paper_arm()
-    motion = RestToRest(model, *ARM[1:])
-    tau, weights = np.polynomial.legendre.leggauss(16)
-    tau = 0.5 * (tau + 1.0)
-    still = np.sqrt(eigenvalues(model.pencil, motion.x(tau), 1)[:, 0])
-    duration = 24 * 2 * np.pi / still[0]
-    found = still * estimated(motion, tau, duration, 1)
-    total = integrated(motion, duration, 1).total
-    assert 0.5 * duration * weights @ found == pytest.approx(total, rel=3e-3)
 
 
 # What it is made of

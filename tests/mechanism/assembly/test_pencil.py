@@ -1,16 +1,24 @@
-"""The affine ERLS pencil K = Bᵀ k B, M = Bᵀ m B: structure, limits, and what drops out."""
+"""The affine ERLS pencil K = Bᵀ k B, M = Bᵀ m B: structure, limits, mass, inertia of drives."""
 
-from __future__ import annotations
+from math import pi
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from chains import A_PAPER, bar, model_of, random_chain, two_link
-from frame_oracle import frame
+from chains import A_PAPER, Tree, bar, model_of, random_chain, two_link
+from frame_comparison import agree
+from small_case import edited
+from spatial_oracle import world
+from spatial_random import EVERY_TREE, random_closed, random_open
 
-from eigassign import load_case
+from eigassign.case import parse
 from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.modal import Model, rounding_error
 from eigassign.series import Truncated, on_faces, total_degree
+from eigassign.study import BuiltCase, load_case
+
+# --- The affine ERLS pencil K = Bᵀ k B, M = Bᵀ m B: structure, limits, and what drops out
 
 
 def matrices(seed: int) -> tuple[Model, np.ndarray, np.ndarray, np.ndarray]:
@@ -92,7 +100,7 @@ def test_a_design_parameter_at_its_value_is_the_value_written_in_the_file(name: 
         node = node[key]
     node[leaf] = 1.7 * value
     lam = (2.0 * np.pi * model.frequencies(q, [1.7 * value], 4)[0]) ** 2
-    np.testing.assert_allclose(lam, frame(changed, np.array(q)).eigenvalues(4), rtol=1e-9)
+    np.testing.assert_allclose(lam, world(changed, q).spectrum(4), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +130,7 @@ def test_every_measure_of_a_section_can_be_designed(
     model = model_of(designed)
     for at in (0.9 * value, 1.1 * value):
         lam = (2.0 * np.pi * model.frequencies([0.2], [at], 3)[0]) ** 2
-        np.testing.assert_allclose(lam, frame(tree(at), np.array([0.2])).eigenvalues(3), rtol=1e-9)
+        np.testing.assert_allclose(lam, world(tree(at), [0.2]).spectrum(3), rtol=1e-9)
 
 
 def test_matrices_are_for_one_sample() -> None:
@@ -137,22 +145,108 @@ def test_a_link_without_mass_that_moves_freely_is_refused_by_name() -> None:
         model_of(tree).frequencies([0.1, 1.0], [], 1)
 
 
-def test_a_massless_arm_with_point_masses_has_only_the_modes_of_its_masses() -> None:
-    tree = two_link(masses=(0.5, 0.5), design={})
-    tree["mechanism"]["materials"]["al"]["density"] = 0.0
-    model = model_of(tree)
-    lam = (2.0 * np.pi * model.frequencies([0.3, 1.9], [], 2)[0]) ** 2
-    # two masses move in the plane, less two rigid motions: two elastic modes
-    M, K = model.matrices([0.3, 1.9], [])
-    shift = 1e3
-    mu = np.linalg.eigvals(np.linalg.solve(K + shift * M, M)).real
-    np.testing.assert_allclose(np.sort(1 / np.sort(mu)[::-1][2:4] - shift), lam, rtol=1e-6)
-    with pytest.raises(MechanismError, match="only 2 modes whose mass is more"):
-        model.frequencies([0.3, 1.9], [], 8)
-
-
 def test_a_link_carried_by_itself_is_refused() -> None:
     tree = two_link()
     tree["mechanism"]["joints"]["elbow"]["base"] = "fore.end"
     with pytest.raises(CaseError):
         model_of(tree)
+
+
+# --- The inertia that a drive reflects through its gear: ½ J ṡ² with the joint's own rate ṡ
+
+
+def test_the_inertia_may_be_a_design_parameter() -> None:
+    design = {"J": {"parameter": "coordinates.q2.drive.inertia", "min": 0.0, "max": 0.5}}
+    drive = {"stiffness": 300.0, "inertia": 0.1}
+    varied = model_of(two_link(drives=("free", drive), design=design))
+    for J in (0.0, 0.1, 0.37):
+        written = model_of(two_link(drives=("free", {**drive, "inertia": J}), design={}))
+        np.testing.assert_allclose(
+            varied.frequencies([0.3, 1.1], [J], 4),
+            written.frequencies([0.3, 1.1], [], 4),
+            rtol=1e-12,
+        )
+
+
+def geared(tree: Tree, seed: int) -> Tree:
+    """The tree with an inertia on the drive of every coordinate that is not locked."""
+    random = np.random.default_rng(seed)
+    for data in tree["coordinates"].values():
+        given: Any = data.get("drive", "free")
+        if given != "locked":
+            held = given if isinstance(given, dict) else {}
+            data["drive"] = {**held, "inertia": float(10 ** random.uniform(-2, 1))}
+    return tree
+
+
+@pytest.mark.parametrize("drawn", EVERY_TREE, ids=str)
+def test_random_trees_with_geared_drives_have_the_spectrum_of_the_plain_frame(
+    drawn: tuple[int, str, bool],
+) -> None:
+    tree, q = random_open(*drawn)
+    agree(geared(tree, drawn[0]), (q,))
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(8))
+def test_random_loops_with_geared_drives_have_the_spectrum_of_the_plain_frame(
+    seed: int, space: str
+) -> None:
+    tree, *poses = random_closed(seed, space)
+    agree(geared(tree, seed), tuple(poses))
+
+
+# --- The mass of a mechanism is what its parts weigh when they are added up by hand
+
+
+CASES = Path(__file__).parents[3] / "cases"
+
+
+def gantry(depth: float, m: float) -> float:
+    return 7850 * (2 * 0.8 * 0.05 * depth + 1.6 * 0.05 * 0.05) + m
+
+
+def ball_screw(_servo: float, m: float) -> float:
+    return 7850 * 0.6 * pi / 4 * 0.025**2 + m + 1.5
+
+
+def arm_lengths(upper: float, fore: float, m: float) -> float:
+    return 2690.007033 * 7.06317856e-4 * (upper + fore) + m
+
+
+def superelement_arm(m1: float, m2: float) -> float:
+    return 2690.007033 * 7.06317856e-4 * (0.6 + 0.45) + m1 + m2
+
+
+# a clamped portal with a carriage on it; a loop with a nut; lengths; a part given by its matrices
+@pytest.mark.parametrize("by_hand", [gantry, ball_screw, arm_lengths, superelement_arm])
+def test_links_and_bodies_add_up(by_hand) -> None:  # type: ignore[no-untyped-def]
+    case = load_case(CASES / f"{by_hand.__name__}.yaml")
+    model, width = (
+        case.model(),
+        np.ptp([(p.min, p.max) for p in case.file.design.parameters.values()], axis=1),
+    )
+    for share in (0.1, 0.2, 0.3):
+        y = case.initial_design + share * width
+        assert model.mass(y) == pytest.approx(by_hand(*y), rel=1e-9)  # matrices of 10 digits
+        step = 1e-5 * np.eye(len(y))
+        differences = [(by_hand(*(y + h)) - by_hand(*(y - h))) / 2e-5 for h in step]
+        np.testing.assert_allclose(model.total_mass(y)[1], differences, rtol=1e-8, atol=1e-8)
+
+
+def test_the_slope_is_that_of_a_curved_dependence() -> None:
+    text = edited(
+        "parameter: bodies.tool.mass, min", "parameter: coordinates.q2.drive.inertia, min"
+    )
+    text = text.replace("drive: {stiffness: 100}", "drive: {stiffness: 100, inertia: 0.5}")
+    text = text.replace("max: 250 g", "max: 1").replace("max: 200 g", "max: 1")
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
+    model = case.model()
+    pipe, bar = pi / 4 * (0.04**2 - 0.036**2), 7.0632e-4
+    for d in (0.02, 0.035):
+        expected = 2700 * (0.6 * pi / 4 * d**2 + 0.45 * pipe + 0.3 * bar) + 0.1
+        assert model.mass([0.7, d]) == pytest.approx(expected, rel=1e-12)
+        # what a drive reflects is no mass
+        np.testing.assert_allclose(
+            model.total_mass(np.array([0.7, d]))[1], [0.0, 2700 * 0.6 * pi / 2 * d], rtol=1e-12
+        )

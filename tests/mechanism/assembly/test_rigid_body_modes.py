@@ -1,7 +1,5 @@
 """What springs leave free: rigid motions of several coordinates at once, exact or refused."""
 
-from __future__ import annotations
-
 import copy
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Loops that close between rigid links: closed forms, the plain frame, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The velocity terms: spin softening, symmetry, the mass matrix from B, and Coriolis coupling."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -139,12 +137,6 @@ def test_small_and_large_mechanisms_are_treated_alike(make: Any) -> None:
         np.testing.assert_allclose(other[-n:, -n:], rigid, atol=1e-8 * np.abs(rigid).max())
 
 
-def test_a_mechanism_at_rest_has_no_velocity_terms() -> None:
-    C, K_v = at(built(arm3r("free")), [0.3, 0.5, -0.9], np.zeros(3), np.zeros(3))
-    assert np.abs(C).max() < 1e-12
-    assert np.abs(K_v).max() < 1e-12
-
-
 @pytest.mark.parametrize("make", [lambda d: blade(4, drive=d), four_bar])
 def test_starting_from_rest_leaves_only_the_euler_terms(make: Any) -> None:
     """K_v at q̇ = 0 is linear in q̈, C vanishes."""
@@ -154,29 +146,6 @@ def test_starting_from_rest_leaves_only_the_euler_terms(make: Any) -> None:
     assert np.abs(one[0]).max() < 1e-6 * np.abs(one[1]).max()
     assert np.abs(one[1]).max() > 1e-3
     np.testing.assert_allclose(two[1], 2 * one[1], atol=1e-4 * np.abs(one[1]).max())
-
-
-def test_the_euler_term_is_the_limit_of_a_slow_motion() -> None:
-    model = built(blade(4))
-    _, slow = at(model, [0.4], [1e-3], [3.0])
-    _, still = at(model, [0.4], [0.0], [3.0])
-    np.testing.assert_allclose(slow, still, atol=1e-4 * np.abs(still).max())
-
-
-def test_a_whirling_mass_has_its_closed_form() -> None:
-    """A tip mass on a massless square beam: two springs k, k_x in a turning frame."""
-    tree = blade(1)
-    tree["mechanism"]["materials"] = {"m": {**ALLOY, "density": 1e-6}}
-    tree["mechanism"]["bodies"] = {"tip": {"at": "b.end", "mass": 2.0}}
-    spin = 6.0
-    C, K_v = at(built(tree), [0.0], [spin], [1.5])
-    x, y = 0, 1  # the end's unknowns
-    m = 2.0
-    expected = [[-m * spin**2, -m * 1.5], [m * 1.5, -m * spin**2]]
-    np.testing.assert_allclose(K_v[np.ix_([x, y], [x, y])], expected, rtol=1e-5)
-    np.testing.assert_allclose(
-        C[np.ix_([x, y], [x, y])], [[0, -2 * m * spin], [2 * m * spin, 0]], rtol=1e-5, atol=1e-4
-    )
 
 
 def test_a_mass_whirling_about_any_axis_has_its_closed_form() -> None:
@@ -217,10 +186,3 @@ def test_a_motion_that_starts_with_a_jerk_is_measured_too() -> None:
     )
     assert np.isfinite(found.change).all()
     assert found.worst < 0.1
-
-
-def test_a_still_trajectory_changes_nothing() -> None:
-    model = built(arm3r("free"))
-    q = np.tile([0.3, 0.5, -0.9], (5, 1))
-    found = motion_effect(model.pencil, terms(model), timed(np.arange(5.0), q), NONE, (1, 2))
-    assert found.worst < 1e-10

@@ -1,7 +1,5 @@
 """Bars of solid elements, written as gmsh, Abaqus and Nastran write meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Hollow rectangles against the Poisson problems of torsion and shear, and in beams."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace as Shape
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Own links reduced: limits, convergence, rigid motion at every y, velocity terms, refusals."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from typing import Any

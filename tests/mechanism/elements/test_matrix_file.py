@@ -1,7 +1,5 @@
 """A damaged or hostile matrix file is refused by name: no crash, no wait, nothing of it quoted."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -91,13 +89,6 @@ def test_a_matrix_without_rows_is_refused(matrix: Any, tmp_path: Path) -> None:
     assert "K.np" in refusal(file)
     (tmp_path / "K.mtx").write_text("%%MatrixMarket matrix coordinate real general\n0 0 0\n")
     assert "K.mtx" in refusal(tmp_path / "K.mtx")
-
-
-def damaged(data: bytes, rng: np.random.Generator) -> bytes:
-    out = bytearray(data)
-    for _ in range(rng.integers(1, 4)):
-        out[rng.integers(len(out))] = rng.integers(256)
-    return bytes(out)
 
 
 def test_what_unpacks_to_more_than_the_limit_is_refused_packed(

@@ -1,7 +1,5 @@
 """What is stated of twenty meshes of solids, against finer meshes of the same parts."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ import pytest
 from solid_parts import Bar, blocks, case
 
 import eigassign as ea
+from eigassign.modal import Model
 
 MODES = (1, 2, 3, 4)
 TO = 8  # times the fourth frequency of a part: what reduction leaves out is the same in both meshes
@@ -92,7 +91,7 @@ def part_of(name: str, cells: Any, count: int, grading: float = 1.0) -> Bar:
     return made
 
 
-def model_of(folder: Path, name: str, part: Bar) -> ea.Model:
+def model_of(folder: Path, name: str, part: Bar) -> Model:
     given = case(folder, part, reduce_to=TO * FOURTH[name])
     return ea.load_case(given, allow_outside=True).model()
 

@@ -6,8 +6,6 @@ stiffened by such ends. So the castings have a block of 3 000 times the modulus 
 which is a rigid link here: 60 x 60 x 60 and 40 x 20 x 60 mm, 78 500 kg/m3.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

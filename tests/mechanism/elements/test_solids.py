@@ -1,7 +1,5 @@
 """Solid links: closed forms and CalculiX' frequencies, formats, couplings, wrong meshes."""
 
-from __future__ import annotations
-
 import re
 import tracemalloc
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Superelements: an exported beam is the beam again, reduced it converges, wrong ones are named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

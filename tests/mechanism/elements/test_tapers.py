@@ -1,7 +1,5 @@
 """Beams whose section varies, against the equations of motion integrated along them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Shear, torsion and sections against closed forms and exact transfer matrices."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace as Given
 from typing import Any
 

@@ -4,8 +4,6 @@ Of MATLAB's a flipped bit may crash the library that reads them. So may one in a
 which is set aside and solved anew.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import time

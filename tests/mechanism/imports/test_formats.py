@@ -1,7 +1,5 @@
 """A part is the same whichever program wrote it: to the last digit of each format."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import tracemalloc

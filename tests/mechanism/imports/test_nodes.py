@@ -1,7 +1,5 @@
 """Nodes by number, units, and what is said where these or the files are wrong."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Small writers of the formats of other programs, to read what they wrote."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

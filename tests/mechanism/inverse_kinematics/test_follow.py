@@ -1,6 +1,4 @@
-"""Inverse kinematics along paths, against closed forms."""
-
-from __future__ import annotations
+"""Inverse kinematics along paths, against closed forms: arms that turn, and that slide as well."""
 
 import dataclasses
 from typing import Any
@@ -8,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from planar_arms import open_chain_tip, serial_arm, two_link_angles
+from spatial_cases import built
+from tip_paths import chain_of, course
 
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism import (
@@ -16,16 +16,16 @@ from eigassign.mechanism import (
     follow,
     spline,
     straight,
-    timing_law,
 )
+
+# --- Inverse kinematics along paths, against closed forms
+
 
 TAU = 2.0 * np.pi
 UP, DOWN = {"elbow": (0.0, np.pi)}, {"elbow": (np.pi, TAU)}
-PAPER = [(0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.19)]
-PAPER_BRANCH = {"elbow": (np.pi, np.radians(217.0))}
 
 
-def course(path: Any, n: int = 50) -> Course:
+def timed_course(path: Any, n: int = 50) -> Course:
     s = np.linspace(0.0, 1.0, n)
     return Course(path, s, 2.0 * s)
 
@@ -55,32 +55,18 @@ def reachable_path(seed: int, l1: float, l2: float) -> Any:
 def test_two_links_follow_random_paths_as_the_law_of_cosines_says(seed, absolute, branch, sign):
     l1, l2 = np.random.default_rng(seed).uniform(0.3, 1.0, 2)
     arm, path = serial_arm(l1, l2, absolute=absolute), reachable_path(seed, l1, l2)
-    samples = course(path, n=3 + 40 * (seed % 4))
+    samples = timed_course(path, n=3 + 40 * (seed % 4))
     q = follow(arm, samples, branch).q
     relative = q @ arm.relative_map[0].T
     # 1e-10 of the tip over a singular value of at least 0.02: 1e-8 rad
     assert away(relative, two_link_angles(path.point(samples.s), l1, l2, sign)) < 1e-8
 
 
-def test_the_papers_arm_passes_its_expansion_point():
-    """Belotti et al. 2021: absolute angles (1.817, 5.312) rad lie on the path to 0.001 rad."""
-    q0, quintic, path = np.array([1.817, 5.312]), timing_law("quintic"), spline(PAPER)
-    arm = serial_arm(0.6, 0.45)
-    for n, distance in ((152, 1.2e-3), (2000, 1e-3)):  # the nearest of 152 samples is 1.17e-3 off
-        tau = np.linspace(0.0, 1.0, n)
-        followed = follow(arm, Course(path, quintic.position(tau), tau), PAPER_BRANCH)
-        assert np.abs(followed.q - q0).max(axis=1).min() < distance
-        elbow = np.degrees(followed.q[:, 1] - followed.q[:, 0])
-        assert elbow.min() == pytest.approx(192.0, abs=0.1)
-        assert elbow.max() == pytest.approx(216.6, abs=0.1)
-        assert followed.notes == ()
-
-
 @pytest.mark.parametrize("absolute", [True, False])
 def test_angles_do_not_jump_at_half_turns_however_often_the_tip_goes_round(absolute):
     theta = np.linspace(0.3, 0.3 + 3 * TAU, 80)
     path = spline(0.8 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
-    q = follow(serial_arm(0.6, 0.45, absolute=absolute), course(path, 400), UP).q
+    q = follow(serial_arm(0.6, 0.45, absolute=absolute), timed_course(path, 400), UP).q
     turns = [3 * TAU, 3 * TAU] if absolute else [3 * TAU, 0.0]
     np.testing.assert_allclose(q[-1] - q[0], turns, atol=1e-8)
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
@@ -89,12 +75,12 @@ def test_angles_do_not_jump_at_half_turns_however_often_the_tip_goes_round(absol
 def test_two_samples_are_joined_along_the_path_and_not_across_it():
     theta = np.linspace(0.0, 1.4 * np.pi, 40)
     path = spline(0.8 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
-    q = follow(serial_arm(0.6, 0.45), course(path, 2), UP).q
+    q = follow(serial_arm(0.6, 0.45), timed_course(path, 2), UP).q
     np.testing.assert_allclose(q[1] - q[0], 1.4 * np.pi, atol=1e-8)
 
 
 def test_the_first_sample_is_normalised_to_one_turn_or_near_the_start():
-    arm, samples = serial_arm(0.6, 0.45), course(straight([(0.5, -0.4), (0.3, -0.5)]))
+    arm, samples = serial_arm(0.6, 0.45), timed_course(straight([(0.5, -0.4), (0.3, -0.5)]))
     free = follow(arm, samples, UP).q
     assert ((free[0] >= 0.0) & (free[0] < TAU)).all()
     near = follow(arm, samples, UP, start=free[0] - [2 * TAU, TAU] + 0.3).q
@@ -107,13 +93,13 @@ def test_the_first_sample_is_the_solution_nearest_to_any_start():
     for start in np.random.default_rng(3).uniform(-8.0, 8.0, (25, 2)):
         near = [start + (q - start + np.pi) % TAU - np.pi for q in both]
         nearest = min(near, key=lambda q: np.linalg.norm(q - start))
-        q = follow(arm, course(path, 2), start=start).q
+        q = follow(arm, timed_course(path, 2), start=start).q
         np.testing.assert_allclose(q[0], nearest, atol=1e-9)
 
 
 def test_without_branch_or_start_the_elbow_bends_anticlockwise_and_a_note_says_so():
     arm, path = serial_arm(0.6, 0.45, absolute=False), straight([(0.5, 0.2), (0.2, 0.5)])
-    followed = follow(arm, course(path))
+    followed = follow(arm, timed_course(path))
     assert ((followed.q[:, 1] > 0.0) & (followed.q[:, 1] < np.pi)).all()
     assert "2 ways" in followed.notes[0]
 
@@ -123,7 +109,7 @@ def test_another_first_solution_is_tried_if_the_preferred_one_leaves_the_branch(
     path = straight([(0.5, 0.2), (0.9, 0.3)])
     elbow = np.degrees(two_link_angles(path.point([0.0, 1.0]), 0.6, 0.45, 1.0)[:, 1])
     branch = {"elbow": (np.radians(elbow[1] + 5.0), np.radians(360.0 - elbow[1] + 5.0))}
-    q = follow(serial_arm(0.6, 0.45, absolute=False), course(path), branch).q
+    q = follow(serial_arm(0.6, 0.45, absolute=False), timed_course(path), branch).q
     assert (q[:, 1] > np.pi).all()
 
 
@@ -132,7 +118,7 @@ def test_another_first_solution_is_tried_if_the_preferred_one_leaves_the_branch(
 
 def failure(arm: TipChain, path: Any, n: int = 50, **wishes: object) -> TrajectoryError:
     with pytest.raises(TrajectoryError) as error:
-        follow(arm, course(path, n), **wishes)
+        follow(arm, timed_course(path, n), **wishes)
     return error.value
 
 
@@ -192,7 +178,7 @@ def test_a_path_through_full_stretch_is_refused_even_between_samples(angle, bran
 def test_a_path_just_short_of_full_stretch_is_followed_on_its_branch():
     touch = 1.05 - 1e-5
     path = straight([(0.7, 0.0), (touch, 0.0), (0.6, 0.3)])
-    q = follow(serial_arm(0.6, 0.45, absolute=False), course(path, 200), DOWN).q
+    q = follow(serial_arm(0.6, 0.45, absolute=False), timed_course(path, 200), DOWN).q
     expected = two_link_angles(path.point(np.linspace(0, 1, 200)), 0.6, 0.45, -1.0)
     assert away(q, expected) < 1e-7
 
@@ -205,7 +191,7 @@ def test_a_path_just_short_of_full_stretch_is_followed_on_its_branch():
 def test_redundant_arms_follow_random_paths_and_say_so(lengths, seed):
     arm = serial_arm(*lengths, absolute=False)
     path = reachable_path(seed, 0.6, 0.5)
-    samples = course(path, 80)
+    samples = timed_course(path, 80)
     followed = follow(arm, samples)
     tip = arm.evaluate(followed.q).point
     np.testing.assert_allclose(tip, path.point(samples.s), atol=1e-10, rtol=0)
@@ -217,7 +203,7 @@ def test_redundant_arms_follow_random_paths_and_say_so(lengths, seed):
 def test_the_branch_of_a_redundant_arm_holds_at_the_first_sample():
     path = straight([(0.5, 0.3), (0.45, 0.35)])
     branch = {"wrist": (np.radians(200.0), np.radians(300.0))}
-    q = follow(serial_arm(0.5, 0.4, 0.3, absolute=False), course(path), branch).q
+    q = follow(serial_arm(0.5, 0.4, 0.3, absolute=False), timed_course(path), branch).q
     wrist = np.degrees(q[:, 2]) % 360.0
     assert ((wrist >= 200.0) & (wrist <= 300.0)).all()
 
@@ -225,7 +211,7 @@ def test_the_branch_of_a_redundant_arm_holds_at_the_first_sample():
 def test_one_link_follows_a_polyline_if_all_samples_lie_on_its_circle():
     theta = np.linspace(0.2, 1.4, 9)
     path = straight(0.5 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
-    q = follow(serial_arm(0.5), course(path, 9)).q
+    q = follow(serial_arm(0.5), timed_course(path, 9)).q
     np.testing.assert_allclose(q[:, 0], theta, atol=1e-9)
 
 
@@ -239,9 +225,111 @@ def test_a_coordinate_that_does_not_move_the_tip_stays_at_its_start():
 
     arm = dataclasses.replace(whole, evaluate=evaluate)
     theta = np.linspace(0.2, 1.4, 9)
-    samples = course(straight(upper.evaluate(theta[:, None]).point), 9)
+    samples = timed_course(straight(upper.evaluate(theta[:, None]).point), 9)
     q = follow(arm, samples, start=[0.0, 2.5]).q
     np.testing.assert_allclose(q, np.stack([theta, np.full(9, 2.5)], axis=1), atol=1e-9)
     with pytest.raises(MechanismError, match="does not depend on coordinate 2") as error:
         follow(arm, samples)
     assert error.value.path == "trajectory.start"
+
+
+# --- Tip paths of arms that slide as well as turn: metres and radians side by side
+
+
+FAR = [(0.5, 3.0), (2.0, 7.5), (6.0, 5.0)]  # m: far more than 2π, all of it
+
+
+def polar_arm() -> TipChain:
+    """A boom that turns by q1 and slides by q2: the tip is at q2 (cos q1, sin q1)."""
+
+    def evaluate(q):
+        c, s, r = np.cos(q[:, 0]), np.sin(q[:, 0]), q[:, 1]
+        J = np.stack([np.stack([-r * s, c], axis=1), np.stack([r * c, s], axis=1)], axis=1)
+        return open_chain_tip(np.stack([r * c, r * s], axis=1), J)
+
+    return TipChain(evaluate, ("turn", "boom"), (np.eye(2), np.zeros(2)), ("turn", "slide"))
+
+
+def expected(points: np.ndarray, sign: float) -> np.ndarray:
+    x, y = points.T
+    return np.stack([np.arctan2(sign * y, sign * x) % (2 * np.pi), sign * np.hypot(x, y)], axis=1)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_slide_is_no_angle(sign: float) -> None:
+    """A range of 1 to 10 m, and places beyond 2π in it, were once taken modulo 2π."""
+    due = course(FAR, 40, "spline")
+    branch = {"boom": (1.0, 10.0) if sign > 0 else (-10.0, -1.0)}
+    q = follow(polar_arm(), due, branch).q
+    np.testing.assert_allclose(q, expected(due.path.point(due.s), sign), atol=1e-8)
+
+
+def test_a_place_outside_its_range_is_named_in_metres() -> None:
+    due = course([(2.0, 0.0), (9.0, 0.0)], 71)
+    with pytest.raises(TrajectoryError) as error:
+        follow(polar_arm(), due, {"boom": (1.0, 7.0)})  # 9 - 2π would be inside
+    assert (error.value.path, error.value.sample) == ("trajectory.branch.boom", 51)
+    assert "needs joint boom at 7.1 m, outside its range [1, 7] m" in error.value.message
+
+
+def test_a_start_in_metres_is_kept() -> None:
+    due = course([(2.0, 0.0), (9.0, 0.5)], 9)
+    q = follow(polar_arm(), due, start=[2 * np.pi, 9.0]).q
+    np.testing.assert_allclose(q[0], [2 * np.pi, 2.0], atol=1e-9)
+    q = follow(polar_arm(), due, start=[np.pi, -9.0]).q
+    np.testing.assert_allclose(q[0], [np.pi, -2.0], atol=1e-9)
+
+
+RIGID = {"type": "rigid", "mass": 1.0}
+
+
+def spatial(joints: dict, links: dict, coordinates: dict) -> dict:
+    return {
+        "mechanism": {
+            "space": "spatial", "materials": {}, "sections": {}, "joints": joints, "links": links,
+        },
+        "coordinates": coordinates,
+    }  # fmt: skip
+
+
+def link(*end: float) -> dict:
+    return RIGID | {"inertia": [0.1, 0.1, 0.1], "nodes": {"end": list(end)}}
+
+
+def test_a_screw_turns_as_often_as_its_path_is_long() -> None:
+    tree = spatial(
+        {"s": {"type": "screw", "base": "ground", "follower": "table.start", "lead": 0.02}},
+        {"table": link(0, 0, 0.1)},
+        {"q": {"joint": "s"}},
+    )
+    due = course([(0, 0, 0.2), (0, 0, 0.9)], 21)
+    q = follow(chain_of(built(tree), "table.end"), due).q[:, 0]
+    np.testing.assert_allclose(q, (due.path.point(due.s)[:, 2] - 0.1) * 2 * np.pi / 0.02, atol=1e-7)
+
+
+def test_a_spherical_joint_and_a_slide_point_anywhere() -> None:
+    tree = spatial(
+        {
+            "ball": {"type": "spherical", "base": "ground", "follower": "boom.start"},
+            "slide": {"type": "prismatic", "base": "boom.end", "follower": "tip.start",
+                      "axis": [1, 0, 0]},
+        },
+        {"boom": link(0.5, 0, 0), "tip": link(0.1, 0, 0)},
+        {f"b{k}": {"joint": "ball", "component": k} for k in (1, 2, 3)} | {"d": {"joint": "slide"}},
+    )  # fmt: skip
+    model = built(tree)
+    due = course([(0.7, 0.3, 0.2), (0.5, -0.4, 0.5)], 30)
+    followed = follow(chain_of(model, "tip.end"), due, start=[0.0, 0.0, 0.0, 0.1])
+    d = np.linalg.norm(due.path.point(due.s), axis=1) - 0.6
+    np.testing.assert_allclose(followed.q[:, 3], d, atol=1e-9)
+    assert "fixes 3 of 4 coordinates" in followed.notes[0]
+    assert f"a slide of {due.size:.3g} m counting as 1 rad" in followed.notes[0]
+    assert due.size == np.sqrt(0.66)  # m: the second waypoint is the one far away
+
+
+def test_a_mechanism_without_coordinates_follows_nothing() -> None:
+    tree = spatial(
+        {"f": {"type": "fixed", "base": "ground", "follower": "l.start"}}, {"l": link(1, 0, 0)}, {}
+    )
+    with pytest.raises(MechanismError, match="no coordinate moves"):
+        follow(chain_of(built(tree), "l.end"), course([(1, 0, 0), (2, 0, 0)], 3))

@@ -1,7 +1,5 @@
 """Coordinates along a path of the tip as functions of the design, and their slopes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Tip paths of mechanisms with closed loops, against closed-form kinematics."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,12 +1,17 @@
-"""Tip paths: polyline and not-a-knot cubic spline."""
-
-from __future__ import annotations
+"""Tip paths: polyline and not-a-knot cubic spline, and orientations along them."""
 
 import numpy as np
 import pytest
+from planar_arms import serial_arm, two_link_angles
+from scipy.spatial.transform import Rotation
+from spatial_oracle import X, Y, Z, turn
+from tip_paths import course
 
-from eigassign.errors import MechanismError, UsageError
-from eigassign.mechanism import spline, straight
+from eigassign.errors import MechanismError, TrajectoryError, UsageError
+from eigassign.mechanism import follow, spline, straight
+
+# --- Tip paths: polyline and not-a-knot cubic spline
+
 
 S = np.linspace(0.0, 1.0, 301)
 BOTH = pytest.mark.parametrize("path", [straight, spline])
@@ -117,3 +122,120 @@ def test_waypoints_of_the_caller_are_not_frozen_with_the_path():
     assert (path.point([0.0]) != 9.0).all()
     with pytest.raises(ValueError, match="read-only"):
         path.coefficients[0, 0, 0] = 1.0
+
+
+# --- Tip paths with an orientation: how it runs along the path, and that arms keep to it
+
+
+POINTS = [(0.6, 0.2), (0.5, 0.5), (0.2, 0.6), (-0.1, 0.5)]
+SPACE = [(*p, 0.1 * k**2) for k, p in enumerate(POINTS)]
+TRIPLES = [(0.1, -0.2, 0.3), (0.6, 0.1, 0.9), (1.4, -0.3, 0.2), (1.0, 0.4, -0.5)]
+KINDS = pytest.mark.parametrize("kind", ["spline", "straight"])
+
+
+# --- the course ---
+
+
+@KINDS
+def test_each_waypoint_has_its_own_orientation(kind: str) -> None:
+    due = course(SPACE, 5, kind, orientation=TRIPLES)
+    R = due.target(due.path.knots).rotation
+    about = [turn(Z, rz) @ turn(Y, ry) @ turn(X, rx) for rx, ry, rz in TRIPLES]
+    np.testing.assert_allclose(R, about, atol=1e-12)
+    angles = [0.3, 2.0, 7.5, -1.0]  # full turns count
+    due = course(POINTS, 5, kind, angle=angles)
+    R = due.target(due.path.knots).rotation
+    np.testing.assert_allclose(R[:, 0, 0], np.cos(angles), atol=1e-12)
+    assert (due.rates(0.5 * (due.path.knots[1] + due.path.knots[2]))[1][0, 2]) > 10.0  # 5.5 rad up
+
+
+@KINDS
+@pytest.mark.parametrize("wish", [{"orientation": TRIPLES}, {"angle": [0.3, 2.0, 7.5, -1.0]}])
+def test_the_rate_of_turning_is_the_derivative_of_the_orientation(kind: str, wish: dict) -> None:
+    due, h = course(SPACE if "orientation" in wish else POINTS, 5, kind, **wish), 1e-5
+    for s in (0.1, 0.33, 0.5, 0.77, 0.95):
+        a, b = due.target(np.array([s + h, s - h])).rotation
+        expected = Rotation.from_matrix(a @ b.T).as_rotvec() / (2 * h)
+        np.testing.assert_allclose(due.rates(s)[1][0], expected, rtol=1e-6, atol=1e-6)
+
+
+def test_a_spline_turns_smoothly_and_a_straight_path_has_corners() -> None:
+    smooth = course(SPACE, 5, "spline", orientation=TRIPLES)
+    assert len(smooth.corners()) == 0
+    knots = smooth.path.knots
+    for s in knots[1:-1]:
+        before, after = smooth.rates(s - 1e-7)[1], smooth.rates(s + 1e-7)[1]
+        np.testing.assert_allclose(before, after, atol=1e-4)
+    cornered = course([(0, 0, 0), (1, 0, 0), (2, 0, 0)], 5, "straight", orientation=TRIPLES[:3])
+    np.testing.assert_allclose(cornered.corners(), [0.5])  # though the line itself has none
+
+
+def test_a_kept_orientation_does_not_turn() -> None:
+    for due in (
+        course(SPACE, 5, "spline", orientation=TRIPLES[1]),
+        course(POINTS, 5, "spline", angle=0.7),
+    ):
+        assert np.abs(due.rates(0.4)[1]).max() < 1e-12
+        R = due.target(np.linspace(0, 1, 9)).rotation
+        np.testing.assert_allclose(R, np.tile(R[0], (9, 1, 1)), atol=1e-15)
+
+
+def test_half_a_turn_between_waypoints_is_ambiguous() -> None:
+    with pytest.raises(MechanismError, match="half a turn") as error:
+        course(SPACE[:2], 5, orientation=[(0, 0, 0), (np.pi, 0, 0)])
+    assert error.value.path == "trajectory.orientation[1]"
+
+
+# --- arms ---
+
+
+@KINDS
+@pytest.mark.parametrize("angle", [0.4, [0.4, 0.9, 2.4, 2.0]])
+def test_three_links_place_and_turn_the_tip_as_the_law_of_cosines_says(kind, angle) -> None:
+    arm = serial_arm(0.5, 0.4, 0.15, absolute=False, oriented=True)
+    due = course(POINTS, 60, kind, angle=angle)
+    q = follow(arm, due, start=[0.0, 1.2, 0.0]).q
+    target = due.target(due.s)
+    last = np.unwrap(np.arctan2(target.rotation[:, 1, 0], target.rotation[:, 0, 0]))
+    wrist = target.point - 0.15 * np.stack([np.cos(last), np.sin(last)], axis=1)
+    expected = np.unwrap(two_link_angles(wrist, 0.5, 0.4, 1.0), axis=0)
+    np.testing.assert_allclose(q[:, :2], expected, atol=1e-8)
+    np.testing.assert_allclose(q.sum(axis=1), last, atol=1e-8)
+
+
+def test_the_least_motion_does_not_depend_on_the_samples() -> None:
+    arm = serial_arm(0.4, 0.3, 0.2, 0.15, absolute=False)
+    few, many = (follow(arm, course(POINTS, n, "spline")).q for n in (11, 401))
+    np.testing.assert_allclose(few, many[::40], atol=1e-9)
+    # and it is that of dq = J⁺ dp, integrated here by Runge–Kutta steps of 1/400 of the path
+    due, q, h = course(POINTS, 2, "spline"), few[:1], 1.0 / 400
+
+    def slope(q: np.ndarray, s: float) -> np.ndarray:
+        J = arm.evaluate(q).jacobian[0]
+        return (np.linalg.pinv(J) @ due.rates(min(s, 1.0))[0][0])[None]
+
+    for k in range(400):
+        s = k * h
+        k1 = slope(q, s)
+        k2 = slope(q + 0.5 * h * k1, s + 0.5 * h)
+        k3 = slope(q + 0.5 * h * k2, s + 0.5 * h)
+        q = q + h / 6 * (k1 + 2 * k2 + 2 * k3 + slope(q + h * k3, s + h))
+    travelled = np.abs(np.diff(many, axis=0)).sum(axis=0).max()
+    assert np.abs(q[0] - many[-1]).max() < 2e-3 * travelled
+
+
+def test_an_orientation_that_cannot_be_had_is_named_with_what_is_missed() -> None:
+    arm = serial_arm(0.5, 0.4, oriented=True)
+    due = course([(0.5, 0.2), (0.4, 0.4)], 20, angle=0.3)
+    with pytest.raises(TrajectoryError) as error:
+        follow(arm, due)
+    assert (error.value.path, error.value.sample) == ("trajectory.angle", 0)
+    assert "cannot be reached with the angle asked for" in error.value.message
+    assert "move 2 of the 3 components" in error.value.message
+
+
+def test_a_reachable_point_out_of_reach_for_its_orientation_says_both_misses() -> None:
+    arm = serial_arm(0.5, 0.4, 0.3, oriented=True)
+    due = course([(0.6, 0.2), (1.1, 0.2)], 101, angle=[0.0, np.pi / 2])
+    with pytest.raises(TrajectoryError, match=r"misses the point by .* m and the angle by .* deg"):
+        follow(arm, due)

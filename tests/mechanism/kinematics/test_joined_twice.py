@@ -1,7 +1,5 @@
 """Joints that hold what others hold already are told of, and change nothing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

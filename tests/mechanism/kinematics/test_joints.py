@@ -1,21 +1,26 @@
-"""Joints by differences: freedoms from their own motion, twists from world frames."""
+"""Joints by differences: freedoms from their own motion, twists and poses from world frames."""
 
-from __future__ import annotations
-
+import sys
 from types import SimpleNamespace as Given
 from typing import Any
 
 import numpy as np
 import pytest
+from chains import model_of, two_link
+from scipy.spatial.transform import Rotation
 from spatial_cases import Built, built, changed
-from spatial_examples import arm3r, four_bar, gantry
-from spatial_oracle import FREEDOMS, Tree, world
+from spatial_examples import arm3r, four_bar, gantry, slotted_lever
+from spatial_oracle import FREEDOMS, Tree, solve_pose, world
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 
 from eigassign.case import FREEDOMS as KNOWN_FREEDOMS
-from eigassign.errors import MechanismError
-from eigassign.mechanism import all_moving, joint_motion, turned
+from eigassign.errors import MechanismError, TravelError
+from eigassign.mechanism import JointEdge, Placement, all_moving, joint_motion, resting_pose, turned
+from eigassign.modal import eigenvalues
 from eigassign.series import Samples, compile_table
+
+# --- Joints by differences: freedoms from their own motion, twists from world frames
+
 
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
 JOINTS = [
@@ -192,3 +197,102 @@ def test_turning_and_moving_the_whole_mechanism_changes_no_frequency() -> None:
     moved = changed(moved, "joints.yaw.position", [0.3, 2.0, -1.0])
     q = [0.3, 0.5, -0.9]
     np.testing.assert_allclose(built(moved).lam(q, 5), built(tree).lam(q, 5), rtol=1e-9)
+
+
+# --- World poses of the links
+
+
+def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
+    model = model_of(two_link())
+    q = np.array([[0.4, 1.7], [-1.0, 3.0]])
+    tip = model.poses.position(model.x(q, [0.0, 0.0]), "fore", "end")
+    np.testing.assert_allclose(tip[:, 0], 0.6 * np.cos(q[:, 0]) + 0.45 * np.cos(q[:, 1]))
+    np.testing.assert_allclose(tip[:, 1], 0.6 * np.sin(q[:, 0]) + 0.45 * np.sin(q[:, 1]))
+    np.testing.assert_array_equal(tip[:, 2], 0.0)
+
+
+def test_a_designed_length_moves_the_links_it_carries() -> None:
+    design = {"a": {"parameter": "links.upper.length", "min": 0.1, "max": 2.0}}
+    model = model_of(two_link(design=design))
+    for length in (0.3, 1.5):
+        tree = two_link(design={})
+        tree["mechanism"]["links"]["upper"]["length"] = length
+        pose = solve_pose(tree, np.array([0.4, 1.7]))
+        lines = model.poses.lines(model.x([0.4, 1.7], [length]))[0]
+        for line, link in zip(lines, ("upper", "fore"), strict=True):
+            np.testing.assert_allclose(line[1, :2], pose.node(tree, f"{link}.end")[:2])
+
+
+def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:
+    count, length, bend = 2 * sys.getrecursionlimit(), 0.1, 1e-3
+    R = Rotation.from_euler("z", bend).as_matrix().astype(object)
+    none, end = np.array([[0.0] * 3, [length, 0.0, 0.0]], dtype=object)
+    link: Placement | None = None
+    for _ in range(count):
+        foot = none if link is None else end
+        edge = JointEdge("", ("ground", ""), ("", "start"))
+        link = Placement("", edge, R, none, np.zeros((6, 0)), np.zeros((6, 0)), link, foot, none)
+    assert link is not None
+    angles = bend * np.arange(1, count)  # of all links that carry another
+    reached = [length * np.cos(angles).sum(), length * np.sin(angles).sum(), 0.0]
+    np.testing.assert_allclose(link.world_origin.astype(float), reached, rtol=1e-10)
+
+
+# --- Carriages and nuts stay on their beams: refused by name, with the pose and the range
+
+
+FIRST = 6 * 1e-4 * 1.6  # m: six elements of L/10⁴ before the carriage
+
+
+@pytest.mark.parametrize("x", [-0.2, 0.0, 0.99 * FIRST, 1.6 - 0.99 * FIRST, 1.6, 2.0, np.nan])
+def test_a_carriage_beyond_its_beam_is_refused_with_its_range(x: float) -> None:
+    with pytest.raises(TravelError, match=r"from 0.00096 m to 1.59904 m") as caught:
+        built(gantry("free")).lam([x], 1)
+    assert caught.value.path == "mechanism.joints.car"
+    assert f"in the pose x = {x:.6g}" in caught.value.message
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_carriage_near_the_end_keeps_its_digits(mirrored: bool) -> None:
+    """At the last place allowed λ is still what the cubic through places nearby leads to.
+
+    Extrapolated by h = 5 mm of 1.6 m: the error is some (h/L)⁴ = 1e-10 times λ's derivatives.
+    """
+    model = built(gantry("locked"))
+    places = np.array([1.01 * FIRST, 0.005, 0.01, 0.015, 0.02])
+    x = 1.6 - places if mirrored else places
+    lam = np.array([model.lam([v], 1)[0] for v in x])
+    fitted = np.polynomial.Polynomial.fit(places[1:], lam[1:], 3)(places[0])
+    assert lam[0] == pytest.approx(fitted, rel=1e-7)
+
+
+def test_the_first_sample_that_leaves_the_beam_is_named() -> None:
+    model = built(gantry("free"))
+    x = np.array([[0.5], [1.2], [1.7], [-1.0]])
+    with pytest.raises(TravelError, match=r"x = 1.7 \(sample 2\)") as caught:
+        eigenvalues(model.pencil, x, 1)
+    assert caught.value.sample == 2
+
+
+def test_the_length_that_counts_is_the_designs() -> None:
+    tree = gantry("free")
+    tree["mechanism"]["joints"].pop("f4")  # an open portal may change its girder's length
+    tree["design"] = {"L": {"parameter": "links.girder.length", "min": 1.0, "max": 2.0}}
+    model = built(tree)
+    assert eigenvalues(model.pencil, np.array([[1.8, 2.0]]), 1)[0, 0] > 0.0
+    with pytest.raises(TravelError, match=r"to 1.59904 m"):
+        eigenvalues(model.pencil, np.array([[1.8, 1.6]]), 1)
+
+
+def test_a_passive_block_that_leaves_its_lever_is_named_with_the_pose() -> None:
+    tree = slotted_lever("free")
+    tree["mechanism"]["links"]["lever"]["length"] = 0.4
+    model = built(tree)
+    assert model.lam([-1.0], 1)[0] > 0.0
+    with pytest.raises(TravelError, match=r"in the pose th = 1.5") as caught:
+        model.lam([1.5], 1)
+    assert caught.value.path == "mechanism.joints.S"
+
+
+def test_the_pose_to_try_has_its_carriage_in_the_middle() -> None:
+    np.testing.assert_array_equal(resting_pose(built(gantry("free")).case), [0.8])

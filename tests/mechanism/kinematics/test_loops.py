@@ -1,7 +1,5 @@
 """Closed loops: branches kept and named, dead points refused, what cannot be closed or moved."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Values that no mechanism can have are refused, whoever gives them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,9 +1,5 @@
 """q, q̇ and q̈ at any time, against differences of eighth order of q, and at corners."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from planar_arms import serial_arm
@@ -11,7 +7,6 @@ from planar_arms import serial_arm
 from eigassign.case import PointTrajectory, TipTrajectory
 from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates
 
-CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
 LAWS = ("linear", "cubic", "quintic", "trapezoidal")
 
 

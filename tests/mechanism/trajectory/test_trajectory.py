@@ -1,14 +1,180 @@
-"""From the trajectory of a case to q(t)."""
-
-from __future__ import annotations
+"""From the trajectory of a case to q(t): timing laws, point to point, along a path, several."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from planar_arms import serial_arm
 
-from eigassign.case import FileTrajectory, SampledTrajectory, TipTrajectory
-from eigassign.errors import TrajectoryError
-from eigassign.mechanism import TipChain, build_trajectory
+from eigassign.assignment import trapezoidal_weights
+from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.errors import TrajectoryError, UsageError
+from eigassign.mechanism import (
+    NamedTrajectory,
+    TipChain,
+    Trajectories,
+    Trajectory,
+    build_trajectory,
+    timing_law,
+)
+
+# --- Timing laws s(τ)
+
+
+SHARES = (0.05, 1 / 3, 0.5)
+LAWS = [
+    *map(timing_law, ("linear", "cubic", "quintic")),
+    *(timing_law("trapezoidal", share) for share in SHARES),
+]
+EVERY_LAW = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+TAU = np.linspace(0.0, 1.0, 41)
+
+
+@pytest.mark.parametrize(
+    ("name", "formula"),
+    [
+        ("linear", lambda t: t),
+        ("cubic", lambda t: 3 * t**2 - 2 * t**3),
+        ("quintic", lambda t: 10 * t**3 - 15 * t**4 + 6 * t**5),
+    ],
+)
+def test_laws_are_the_polynomials_of_their_names(name, formula):
+    # terms up to 15, hence some 1e-15 of round-off
+    np.testing.assert_allclose(timing_law(name).position(TAU), formula(TAU), rtol=0, atol=1e-14)
+
+
+@EVERY_LAW
+def test_laws_run_from_0_to_1_without_turning_back(law):
+    s = law.position(TAU)
+    assert s[0] == 0.0
+    assert s[-1] == 1.0
+    assert (np.diff(s) > 0.0).all()
+
+
+@EVERY_LAW
+def test_derivatives_agree_with_central_differences(law):
+    h, tau = 1e-4, TAU[1:-1]
+    tau = tau[[all(abs(t - end) > h for end in law.ends) for t in tau]]  # no acceleration there
+    velocity = (law.position(tau + h) - law.position(tau - h)) / (2 * h)
+    acceleration = (law.velocity(tau + h) - law.velocity(tau - h)) / (2 * h)
+    # h²/6 times the third derivative, at most 60 (s''') and 360 (s'''' of the quintic)
+    np.testing.assert_allclose(law.velocity(tau), velocity, atol=h**2 * 11, rtol=0)
+    np.testing.assert_allclose(law.acceleration(tau), acceleration, atol=h**2 * 65, rtol=0)
+
+
+def test_cubic_rests_at_both_ends_and_quintic_is_not_accelerated_there_either():
+    ends = np.array([0.0, 1.0])
+    for name in ("cubic", "quintic"):
+        assert (timing_law(name).velocity(ends) == 0.0).all()
+    assert (timing_law("quintic").acceleration(ends) == 0.0).all()
+    assert (timing_law("cubic").acceleration(ends) == [6.0, -6.0]).all()
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_a_trapezoid_accelerates_travels_and_brakes(share):
+    law, peak = timing_law("trapezoidal", share), 1 / (1 - share)
+    assert law.velocity([0.0, 1.0]) == pytest.approx(0.0, abs=1e-13)
+    inside = np.array([0.5 * share, 1 - 0.5 * share])
+    assert law.velocity(inside) == pytest.approx(0.5 * peak)
+    assert law.velocity(np.linspace(share, 1 - share, 7)) == pytest.approx(peak)
+    assert law.acceleration(inside) == pytest.approx(np.array([1, -1]) * peak / share)
+    assert law.position(0.5) == pytest.approx(0.5)
+    # no jump where the pieces meet: the velocity between two sides moves by the acceleration only
+    for end in law.ends:
+        for quantity, slope in ((law.position, peak), (law.velocity, peak / share)):
+            assert abs(quantity(end) - quantity(end - 1e-9)) <= 1.1e-9 * slope
+
+
+@pytest.mark.parametrize("share", [0.0, -0.1, 0.51, np.nan])
+def test_a_share_that_leaves_no_time_is_refused(share):
+    with pytest.raises(UsageError, match="share"):
+        timing_law("trapezoidal", share)
+
+
+@pytest.mark.parametrize("tau", [-1e-9, 1.0 + 1e-9, np.nan, np.inf])
+def test_laws_are_not_extrapolated(tau):
+    with pytest.raises(UsageError, match="0 <= tau <= 1"):
+        timing_law("quintic").position([0.5, tau])
+
+
+def test_an_unknown_law_is_refused_with_those_there_are():
+    with pytest.raises(UsageError, match=r"'septic'.*linear, cubic, quintic, trapezoidal"):
+        timing_law("septic")
+
+
+# --- Point to point in the joints: from the case file to q(t)
+
+
+TURN_AND_SLIDE = ("q1", "q2")
+POINTS = ((0.0, 0.2), (1.0, 0.2), (0.5, 0.6), (0.5, 0.7))
+
+
+def motion(**changes: object) -> object:
+    def no_chain(node: str, oriented: bool) -> object:
+        raise AssertionError("points in the joints need no kinematics")
+
+    keys = {"points": POINTS, "duration": 4.0, "samples": 401}
+    spec = PointTrajectory.model_construct(**(keys | changes))
+    return build_trajectory(spec, TURN_AND_SLIDE, no_chain, q_units=("rad", "m"))  # type: ignore[arg-type]
+
+
+def test_every_point_is_reached_at_its_time():
+    path = motion(duration=None, times=(1.0, 1.5, 3.0, 5.0))
+    assert (path.time_s[0], path.time_s[-1]) == (1.0, 5.0)
+    for time, point in zip((1.0, 1.5, 3.0, 5.0), POINTS, strict=True):
+        k = int(np.flatnonzero(np.isclose(path.time_s, time))[0])
+        np.testing.assert_allclose(path.q[k], point, atol=1e-12)
+    assert path.tip is None
+    assert path.notes == ()
+
+
+@pytest.mark.parametrize("timing", ["linear", "cubic", "quintic", "trapezoidal"])
+def test_each_segment_runs_by_the_timing_law(timing):
+    path = motion(timing=timing, duration=None, times=(0.0, 1.0, 3.0, 4.0))
+    for k, (start, end) in enumerate([(0.0, 1.0), (1.0, 3.0), (3.0, 4.0)]):
+        inside = (path.time_s >= start) & (path.time_s < end)
+        s = timing_law(timing).position((path.time_s[inside] - start) / (end - start))
+        a, b = np.array(POINTS[k]), np.array(POINTS[k + 1])
+        np.testing.assert_allclose(path.q[inside], a + s[:, None] * (b - a), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("timing", "fastest"), [("cubic", 1.5), ("quintic", 1.875), ("trapezoidal", 1 / (1 - 0.2))]
+)
+def test_it_rests_at_each_point_and_its_peak_velocity_is_the_laws(timing, fastest):
+    h = 1e-3
+    path = motion(
+        timing=timing, acceleration_share=0.2, duration=None, times=(0, 1, 2, 3), samples=3001
+    )
+    rate = np.diff(path.q, axis=0) / h
+    for k in (0, 999, 1000, 1999, 2000, 2999):  # from rest, at most |q''| = 7 times h / 2
+        assert np.abs(rate[k]).max() < 7 * h
+    assert np.abs(rate[:1000, 0]).max() == pytest.approx(fastest, rel=1e-5)
+
+
+def test_time_is_shared_by_the_largest_move_relative_to_its_range():
+    # ranges 1 rad and 0.5 m: shares 1, max(0.5, 0.8), 0.2
+    path = motion(timing="linear", duration=4.0)
+    assert path.notes == (
+        "the points are reached at 0, 2, 3.6, 4 s: time shared in proportion to the largest move "
+        "of a coordinate relative to its range",
+    )
+    np.testing.assert_allclose(path.q[[0, 200, 360, 400]], POINTS, atol=1e-12)
+    metres = [(a, 1000 * b) for a, b in POINTS]  # the measure of a coordinate changes nothing
+    assert motion(points=metres, timing="linear").notes == path.notes
+
+
+def test_two_points_leave_nothing_to_tell():
+    assert motion(points=POINTS[:2]).notes == ()
+
+
+def test_it_waits_where_two_points_are_the_same_and_times_are_given():
+    path = motion(points=(POINTS[0], POINTS[0], POINTS[1]), duration=None, times=(0, 1, 2))
+    np.testing.assert_allclose(path.q[:201], np.tile(POINTS[0], (201, 1)), atol=1e-15)
+
+
+# --- From the trajectory of a case to q(t)
+
 
 Q = ("q1", "q2")
 PAPER = ((0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.19))
@@ -50,33 +216,6 @@ def test_a_tip_path_is_followed_in_equal_steps_of_time():
     np.testing.assert_allclose(trajectory.tip, np.stack([tip.real, tip.imag], 1), atol=1e-13)
     np.testing.assert_allclose(trajectory.tip[[0, -1]], np.array(PAPER)[[0, -1]], atol=1e-12)
     assert np.abs(trajectory.q - [1.817, 5.312]).max(axis=1).min() < 1.2e-3
-
-
-@pytest.mark.parametrize(
-    ("timing", "s"), [("linear", 0.25), ("cubic", 5 / 32), ("quintic", 53 / 512)]
-)
-def test_the_timing_law_says_how_far_the_tip_is(timing, s):
-    line = ((0.5, 0.2), (0.2, 0.5))
-    spec = tip_path(waypoints=line, path="straight", timing=timing, samples=5, branch={})
-    expected = (1 - s) * np.array(line[0]) + s * np.array(line[1])
-    np.testing.assert_allclose(build_trajectory(spec, Q, arm).tip[1], expected, atol=1e-12)
-
-
-def test_straight_and_spline_paths_differ_between_the_same_waypoints():
-    spline = build_trajectory(tip_path(branch={}), Q, arm)
-    straight = build_trajectory(tip_path(branch={}, path="straight"), Q, arm)
-    assert np.abs(spline.tip - straight.tip).max() > 1e-3
-
-
-def test_choices_that_were_made_are_noted():
-    assert build_trajectory(tip_path(), Q, arm).notes == ()
-    assert "2 ways" in build_trajectory(tip_path(branch={}), Q, arm).notes[0]
-
-
-def test_an_unreachable_waypoint_is_an_error_naming_sample_time_and_point():
-    spec = tip_path(waypoints=((0.33, 0.12), (0.9, 0.9)), branch={}, path="straight")
-    with pytest.raises(TrajectoryError, match=r"sample \d+ \(t = 1\.\d+ s, point \(.*out of reach"):
-        build_trajectory(spec, Q, arm)
 
 
 def test_samples_with_times_are_taken_as_they_are():
@@ -138,3 +277,98 @@ def test_arrays_are_frozen(spec):
     trajectory = build_trajectory(spec, Q, arm)
     for array in (trajectory.time_s, trajectory.q, trajectory.tip):
         assert array is None or not array.flags.writeable
+
+
+# --- Several trajectories are stacked, and nothing that is asked of them crosses a seam
+
+
+def one(n: int, start: float = 0.0, notes: tuple[str, ...] = ()) -> Trajectory:
+    time = start + np.cumsum(np.linspace(0.1, 0.2, n))
+    return Trajectory(time, np.column_stack([np.sin(time), 10 + time]), None, notes)
+
+
+def pair(weights: tuple[float, float] = (1.0, 1.0)) -> Trajectories:
+    return Trajectories(
+        (
+            NamedTrajectory("pick", one(4, 5.0), weights[0]),
+            NamedTrajectory("return", one(3), weights[1]),
+        )
+    )
+
+
+def test_samples_stand_one_after_the_other_and_time_starts_anew() -> None:
+    path = pair()
+    np.testing.assert_array_equal(path.q, np.vstack([p.trajectory.q for p in path.parts]))
+    assert path.rows == (slice(0, 4), slice(4, 7))
+    assert path.time_s[4] == path.parts[1].trajectory.time_s[0] < path.time_s[3]
+    assert [path.rows_of(name) for name in ("return", None)] == [slice(4, 7), slice(0, 7)]
+    with pytest.raises(UsageError, match="none called 'place'"):
+        path.rows_of("place")
+
+
+def test_a_single_trajectory_is_itself() -> None:
+    alone = one(5, notes=("q1 jumps",))
+    path = Trajectories((NamedTrajectory("1", alone),))
+    assert path.q is alone.q
+    assert path.time_s is alone.time_s
+    assert path.notes == ("q1 jumps",)
+    assert path.where(2) == f"sample 2 (t = {alone.time_s[2]:.4g} s)"
+
+
+def test_a_sample_is_named_by_its_trajectory_and_counted_there() -> None:
+    path = pair()
+    assert path.sample(3) == "sample 3 of trajectory 'pick'"
+    assert path.where(4) == "sample 0 of trajectory 'return' (t = 0.1 s)"
+    assert (path.name_of(3), path.name_of(4)) == ("pick", "return")
+
+
+def test_notes_say_whose_they_are() -> None:
+    parts = (NamedTrajectory("a", one(2, notes=("x",))), NamedTrajectory("b", one(2, notes=("y",))))
+    assert Trajectories(parts).notes == ("trajectory 'a': x", "trajectory 'b': y")
+
+
+@given(st.tuples(st.floats(0.1, 9), st.floats(0.1, 9)), st.floats(-3, 3), st.floats(-3, 3))
+def test_weights_integrate_each_trajectory_by_itself_and_by_its_weight(
+    weights: tuple[float, float], offset: float, slope: float
+) -> None:
+    path = pair(weights)
+    g = offset + slope * path.time_s
+    expected = 0.0
+    for part, weight in zip(path.parts, weights, strict=True):
+        a, b = part.trajectory.time_s[[0, -1]]
+        expected += weight * (offset * (b - a) + slope * (b**2 - a**2) / 2)
+    assert path.weights(trapezoidal_weights) @ g == pytest.approx(expected, abs=1e-11)
+
+
+def test_the_tip_is_stacked_only_if_all_have_one() -> None:
+    tips = [Trajectory(np.arange(2.0), np.zeros((2, 1)), np.full((2, 2), float(k))) for k in (0, 1)]
+    both = Trajectories(tuple(NamedTrajectory(str(k), t) for k, t in enumerate(tips)))
+    assert both.tip is not None
+    np.testing.assert_array_equal(both.tip[:, 0], [0, 0, 1, 1])
+    bare = Trajectory(np.arange(2.0), np.zeros((2, 1)), None)
+    assert Trajectories((NamedTrajectory("a", tips[0]), NamedTrajectory("b", bare))).tip is None
+
+
+@given(st.lists(st.integers(1, 60), min_size=1, max_size=6), st.integers(1, 80))
+def test_some_samples_are_chosen_with_both_ends_of_every_trajectory(
+    lengths: list[int], count: int
+) -> None:
+    path = Trajectories(tuple(NamedTrajectory(f"t{k}", one(n)) for k, n in enumerate(lengths)))
+    chosen = path.spread(count)
+    assert {e for rows in path.rows for e in (rows.start, rows.stop - 1)} <= set(chosen.tolist())
+    assert len(chosen) <= count + 2 * len(lengths)
+    assert np.all(np.diff(chosen) > 0)
+    few = path.chosen(chosen)
+    np.testing.assert_array_equal(few.q, path.q[chosen])
+    assert [part.name for part in few.parts] == [part.name for part in path.parts]
+
+
+def test_a_single_trajectory_is_thinned_evenly() -> None:
+    path = Trajectories((NamedTrajectory("1", one(152)),))
+    even = np.unique(np.linspace(0, 151, 40).round().astype(int))
+    np.testing.assert_array_equal(path.spread(40), even)
+
+
+def test_no_trajectory_at_all_is_refused() -> None:
+    with pytest.raises(UsageError, match="none given"):
+        Trajectories(())

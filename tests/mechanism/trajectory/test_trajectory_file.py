@@ -1,7 +1,5 @@
 """Joint samples from CSV files, good and bad."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses that fall under their weight, and loads beyond buckling, are errors that say so."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

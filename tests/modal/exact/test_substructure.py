@@ -1,7 +1,5 @@
 """Many samples of a large pencil together: the modes of every sample, and none without proof."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ and every kind of design parameter: section dimensions, modulus, body mass, spri
 stiffness, and a length in an open chain and in a loop, where it moves the passive joints too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property

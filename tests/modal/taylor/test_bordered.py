@@ -1,7 +1,6 @@
-"""The bordered system: dense and sparse solve it alike, and a singular one is refused."""
+"""The bordered system: dense and sparse solve it alike, a singular one is refused, and memory."""
 
-from __future__ import annotations
-
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy.sparse.linalg import splu
 from eigassign.errors import AccuracyError
 from eigassign.mechanism import Pencil, factorise
 from eigassign.modal import (
+    expand,
     factor_dense,
     factor_sparse,
     modes,
@@ -90,3 +90,16 @@ def test_of_a_model_of_one_mode_nothing_is_left_but_the_border() -> None:
     solve = factor_dense(np.zeros((1, 1)), np.array([[2.0]]))
     x, multiplier = solve(np.array([[3.0]]))
     np.testing.assert_allclose([x[0, 0], multiplier[0, 0]], [0.0, -1.5], atol=1e-15)
+
+
+def test_no_array_of_unknowns_times_coefficients_is_ever_stored() -> None:
+    pencil = arm(elements=(500, 400)).pencil
+    expand(pencil, Q0, Y0, (1,), 2)
+    tracemalloc.start()
+    found = expand(pencil, Q0, Y0, (1,), 9)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    vectors = found.clusters[0].vectors.nbytes
+    assert len(found.space) > 6 * len(found.vector_space)
+    assert peak < 6 * vectors
+    assert peak < pencil.n_dof * len(found.space) * 8

@@ -1,7 +1,5 @@
 """Modes expanded together: right through crossings and veerings, where a single one is lost."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The ladder: residual, slope, differences, 2m + 1, subsets, sparse algebra, estimate, oracle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from ladder_scenes import MADE, SHIPPED, Scene, scene

@@ -1,7 +1,5 @@
 """The ladder on random mechanisms: trees and loops, planar and spatial, free, locked and held."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from calibration import Drawn, draw

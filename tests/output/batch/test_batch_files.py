@@ -1,7 +1,5 @@
 """All files of a batch are made of its rows."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """How a case ended, as JSON and back."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

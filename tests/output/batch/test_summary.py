@@ -1,7 +1,5 @@
 """summary.csv, summary.json and junit.xml say how each case of a batch ended."""
 
-from __future__ import annotations
-
 import csv
 import json
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """What targets ask between samples counts, and a band is one along each trajectory."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -13,6 +11,7 @@ from scenes import SHIPPED, changed
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.mechanism import rates
+from eigassign.pipeline import Result
 from eigassign.study import AssignmentRow
 
 BOX = {
@@ -23,7 +22,7 @@ TARGET = "- {mode: 1, frequency: 190 Hz}"
 PEAK = "{time: [0, 0.499, 0.5, 0.501, 1], frequency: [100, 100, 190, 100, 100]}"
 
 
-def assigned(text: str) -> tuple[ea.Case, ea.Result, AssignmentRow]:
+def assigned(text: str) -> tuple[ea.Case, Result, AssignmentRow]:
     case = ea.Case(parse(text.encode(), "case.yaml"))
     result = ea.assign(case)
     row = result.results.assignment
@@ -31,11 +30,11 @@ def assigned(text: str) -> tuple[ea.Case, ea.Result, AssignmentRow]:
     return case, result, row
 
 
-def shipped(target: str) -> tuple[ea.Case, ea.Result, AssignmentRow]:
+def shipped(target: str) -> tuple[ea.Case, Result, AssignmentRow]:
     return assigned(changed((TARGET, f"- {target}")))
 
 
-def loaded(**more: Any) -> tuple[ea.Case, ea.Result, AssignmentRow]:
+def loaded(**more: Any) -> tuple[ea.Case, Result, AssignmentRow]:
     """The arm that picks 3 kg, with mode 1 at 7 Hz, and returns empty, with mode 1 at 17 Hz."""
     band = {"targets": [{"keep_out": [10.0, 14.0]}]}
     return assigned(yaml.safe_dump(arm(*LOADED[:2], design=BOX, title="loads", **band, **more)))
@@ -55,7 +54,7 @@ def test_a_band_is_clear_with_another_number_of_modes_below_it_along_each_trajec
     assert [along.error.exact.max_relative for along in target.along] == [0.0, 0.0]
 
 
-def modes_inside(case: ea.Case, result: ea.Result, at: float, low: float, high: float) -> int:
+def modes_inside(case: ea.Case, result: Result, at: float, low: float, high: float) -> int:
     """How many modes are in a band at an instant."""
     pose = case.trajectory.pose(at, None)[None]
     hz = case.model().frequencies(pose, np.array(list(result.design.values())), 3)

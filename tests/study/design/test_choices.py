@@ -1,7 +1,5 @@
 """Lists beside what is continuous, and bands: one search, against trying every combination."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +7,13 @@ import pytest
 import yaml
 
 import eigassign as ea
+from eigassign.pipeline import Result
 from eigassign.study import AssignmentRow
 
 HERE = Path(__file__).parent
 
 
-def answered(name: str, **changes: object) -> tuple[ea.Case, ea.Result, AssignmentRow]:
+def answered(name: str, **changes: object) -> tuple[ea.Case, Result, AssignmentRow]:
     case = ea.load_case({**yaml.safe_load((HERE / f"{name}.yaml").read_text()), **changes})
     result = ea.assign(case)
     assert result.results.assignment is not None

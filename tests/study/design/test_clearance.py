@@ -1,7 +1,5 @@
 """A band is called clear only where no mode is in it anywhere along the motion."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Followed modes at any design and sample, against each decoupled half by itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Verdicts in words, where the worst error, the mean one and limits disagree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

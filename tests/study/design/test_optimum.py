@@ -1,7 +1,5 @@
 """The search of designs ends when it is told to, and keeps the best until then."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

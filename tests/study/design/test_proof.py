@@ -1,7 +1,5 @@
 """No design is below what is proved: random small problems against fine grids of designs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Parameters are added masses, so that the limit of the mass is linear in them as the others are.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

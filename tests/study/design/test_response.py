@@ -1,7 +1,5 @@
 """Frequencies along the trajectory and their slopes, as the assignment asks for them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

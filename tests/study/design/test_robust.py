@@ -1,7 +1,5 @@
 """Robust designs: what is asked holds for every deviation within the tolerances."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A limit of a drive's torque holds between samples too: one link on a motor, in closed form."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is said to be proved of designs under their weight: against grids of designs."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

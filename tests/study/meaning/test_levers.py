@@ -1,7 +1,5 @@
 """Where modes have their energy, and what properties do to them, against slopes and re-solves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What can be reached within the bounds, and what deviations do: against brute force."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

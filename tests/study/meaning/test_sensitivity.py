@@ -1,7 +1,5 @@
 """What the answer hangs on, against differences of exact frequencies and of answers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

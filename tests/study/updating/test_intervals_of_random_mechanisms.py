@@ -1,7 +1,5 @@
 """Intervals of fits to noisy frequencies of random mechanisms hold as often as they say."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Updating cases by measured frequencies: recovery, intervals, words, and measurements as given."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 from pathlib import Path
