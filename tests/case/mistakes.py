@@ -1,7 +1,8 @@
 """A mistake in a case file, where it must be shown and what must be said of it."""
 
+import json
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -22,3 +23,8 @@ def problems_of(text: str, path: Path) -> list[tuple[int, int, str, str]]:
     with pytest.raises(CaseError) as caught:
         load(path)
     return [(p.line, p.column, p.path, p.message) for p in caught.value.problems]
+
+
+def tables(name: str) -> dict[str, Any]:
+    """The tables of mistakes in ``rules/<name>.json``."""
+    return json.loads((Path(__file__).parent / "rules" / f"{name}.json").read_text("utf-8"))
