@@ -19,10 +19,9 @@ from scipy.linalg import eigh
 from eigassign.chart.question import Bench, Points, timed
 from eigassign.errors import AccuracyError
 from eigassign.modal.exact.condensation import condense
-from eigassign.modal.expansion import NearestExpansion, expand
+from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
-from eigassign.modal.reduced import reduce
-from eigassign.modal.surrogate import Surrogate
+from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.study.pictures.drawing import spread_samples
 from eigassign.study.planning import choose_order
 
@@ -94,7 +93,7 @@ def _call(bench: Bench, function: str, arguments: str, **how: object) -> str:
     return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in named.items())])})"
 
 
-def _answering(made: Surrogate, solves: int) -> Built:
+def _answering(made: Expansion | NearestExpansion | ReducedModel, solves: int) -> Built:
     return Built(lambda points: made.frequencies(points.q, points.y), solves)
 
 

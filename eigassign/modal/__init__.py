@@ -3,7 +3,6 @@
 In reading order:
 
     arguments    samples of (q, y), modes and orders as callers give them, checked
-    surrogate    the interface of what answers frequencies in place of exact solves
     exact        exact elastic modes
     slopes       slopes of exact eigenvalues in coordinates and design
     projection   the pencil's terms projected on a basis
@@ -41,7 +40,6 @@ __all__, __getattr__, __dir__ = face(
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "statics": "Flexibility compliances sags",
         "storage": "expansion_arrays tree_arrays",
-        "surrogate": "Surrogate",
         "under_load": "WeightChanges buckling sag_changes sag_of_nodes strut_error weight_changes",
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.recursion": "expand_subspace",

@@ -333,10 +333,6 @@ class NearestExpansion:
         """f (n_samples, n_modes) in Hz; see `Expansion.frequencies`."""
         return self.pick(q, [part.frequencies(q, y) for part in self.parts])
 
-    def last_degree_share(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n_samples, n_modes), a guide; see `Expansion.last_degree_share`."""
-        return self.pick(q, [part.last_degree_share(q, y) for part in self.parts])
-
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 and l of eq. (9); see `Expansion.linear_in_design`."""
         l0, slopes = self.slopes(q, self.parts[0].y0)

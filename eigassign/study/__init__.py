@@ -27,7 +27,7 @@ __all__, __getattr__, __dir__ = face(
         "checks.slow_motion": "gap_along",
         "build": "build_model",
         "built_case": "BuiltCase load_case",
-        "checks.expansions": "compare stated_error study_expansions unseen_points",
+        "checks.expansions": "compare study_expansions unseen_points",
         "comparison": (
             "BETWEEN COARSE DESIGN_BOX TRAJECTORY grid_over q_grid "
             "reach_warnings study_modes validate_expansions"

@@ -7,14 +7,22 @@ import numpy as np
 from scipy.stats import qmc
 
 from eigassign import Case, load_case
-from eigassign.modal import Model, Surrogate
-from eigassign.study import stated_error
+from eigassign.modal import MARGIN, Expansion, Model, NearestExpansion, ReducedModel
 
+Surrogate = Expansion | NearestExpansion | ReducedModel
 ATLAS = Path(__file__).parents[2] / "cases" / "stress"
 
 
 def case(name: str) -> Case:
     return load_case(ATLAS / f"{name}.yaml")
+
+
+def stated_error(model: Model, answer: Surrogate, x: np.ndarray) -> np.ndarray:
+    """The stated error (n_modes,) of what answers frequencies, judged at x (n, n_x)."""
+    q, y = np.split(x, [len(model.q_names)], axis=1)
+    exact_hz = model.frequencies(q, y, max(answer.modes))[:, np.array(answer.modes) - 1]
+    off = np.abs(answer.frequencies(q, y) / exact_hz - 1.0)
+    return np.asarray(MARGIN * np.where(np.isnan(off), np.inf, off).max(axis=0))
 
 
 def stated(model: Model, approximation: Surrogate, q: object, y: object) -> np.ndarray:

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calibration import Drawn, draw
+from stress import Surrogate, stated_error
 from weighed_draws import weighed
 from wide_draws import FAMILIES
 
 import eigassign as ea
 from eigassign.errors import EigassignError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
-from eigassign.modal import MARGIN, Model, Surrogate, expand, reduce
-from eigassign.study import scattered, stated_error, unseen
+from eigassign.modal import MARGIN, Model, expand, reduce
+from eigassign.study import scattered, unseen
 
 CASES = Path(__file__).parents[2] / "cases"
 SHIPPED = ("two_link", "five_bar", "arm_3r", "gantry", "ball_screw", "arm_6r", "pick_and_place")

@@ -164,9 +164,5 @@ def taylor_vectors(
 def vectors_to_order(pencil: Pencil, x0: Floats, modes: Sequence[int], order: int) -> Floats:
     """φ_γ of ``modes`` and of what lies close to them, |γ| ≤ ``order``, as columns (n_dof, N)."""
     local = local_space(pencil, order, linear_in_y=False, space=None)
-    return as_columns(taylor_vectors(pencil, x0, modes, local, order).vectors)
-
-
-def as_columns(vectors: Sequence[Floats]) -> Floats:
-    """X (N_H, n_dof, r) of several clusters side by side, (n_dof, N)."""
+    vectors = taylor_vectors(pencil, x0, modes, local, order).vectors
     return np.hstack([X.transpose(1, 0, 2).reshape(X.shape[1], -1) for X in vectors])

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from eigassign.facts import percent
 from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.model import Model
-from eigassign.modal.surrogate import Surrogate
 from eigassign.study.planning import SCATTERED, unseen
 from eigassign.study.results import Comparison, frozen
 from eigassign.study.scene import Expansions, Scene
@@ -63,11 +62,3 @@ def expansion_lines(scene: Scene, found: tuple[Comparison, ...]) -> tuple[str, .
         f"solves at {len(one.exact_hz)} poses and designs {where}"
         for mode, one in zip(scene.modes, found, strict=True)
     )
-
-
-def stated_error(model: Model, answer: Surrogate, x: Floats) -> Floats:
-    """The stated error (n_modes,) of anything that answers frequencies, judged at x (n, n_x)."""
-    q, y = np.split(x, [len(model.q_names)], axis=1)
-    exact_hz = model.frequencies(q, y, max(answer.modes))[:, np.array(answer.modes) - 1]
-    off = np.abs(answer.frequencies(q, y) / exact_hz - 1.0)
-    return np.asarray(MARGIN * np.where(np.isnan(off), np.inf, off).max(axis=0))

@@ -2,9 +2,7 @@
 
 They are measured at some instants (`modal.slow_motion`), together with the stiffness by the loads
 −m a of the motion, which stretch and compress links. Where inner dofs have no directions, that
-cannot be done; if all joints turn, (5 Ω²/g³ + |Ω̇|/g)/λ_1 is the order of the relative change of λ:
-Ω is the sum of all joint rates, and g ≤ 1 the relative distance to the next mode, with which modes
-turn by Ω/g and mix by C ~ Ω/g.
+cannot be done.
 """
 
 from __future__ import annotations
@@ -15,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.schema.joints import SLIDING
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
-from eigassign.mechanism.trajectory.trajectory import Rates, rates
+from eigassign.mechanism.trajectory.trajectory import rates
 from eigassign.modal.slow_motion import motion_effect
 from eigassign.study.scene import Scene
 
@@ -47,7 +44,7 @@ class MotionRow:
 
 @dataclass(frozen=True)
 class MotionStudy:
-    """A row a mode, none where only a rough estimate is known, and the words for all."""
+    """A row a mode, none where inner dofs have no directions, and the words for all."""
 
     rows: tuple[MotionRow, ...]
     note: str
@@ -75,8 +72,8 @@ def study_motion(
     modes, limit = sorted({*scene.modes, *asked}), min(scene.file.validation.max_error, MOVED)
     gap = gap_along(hz, modes)
     if names := placeless(scene.file):
-        motions = [motion for motion, _ in timed]
-        return _rough_study(scene, motions, hz[given].min(), gap[given].min(), names, limit)
+        why = f"the directions of inner dofs of {', '.join(names)} are not known"
+        return MotionStudy((), "", f"the effect of the motion's speed is not known, because {why}")
     model, worst = scene.model, dict[int, tuple[float, int]]()
     terms = velocity_terms(model.poses.case, model.poses.parameters, model.motion)
     for motion, own in timed:
@@ -116,28 +113,3 @@ def gap_along(hz: Floats, wanted: Sequence[int]) -> Floats:
     distance = np.diff(hz**2, axis=1) / hz[:, :-1] ** 2
     beside = [k for k in range(distance.shape[1]) if k + 1 in wanted or k + 2 in wanted]
     return np.asarray(np.maximum(distance[:, beside].min(axis=1, initial=1.0), EQUAL))
-
-
-def _rough_study(
-    scene: Scene,
-    motions: Sequence[Rates],
-    hz: float,
-    gap: float,
-    names: Sequence[str],
-    limit: float,
-) -> MotionStudy:
-    """The order of the change alone, from the lowest frequency and the least gap; no row."""
-    why = f"the directions of inner dofs of {', '.join(names)} are not known"
-    if any(joint.type in SLIDING for joint in scene.file.mechanism.joints.values()):
-        return MotionStudy((), "", f"the effect of the motion's speed is not known, because {why}")
-    each = (
-        5.0 * np.abs(motion.rate).sum(axis=1) ** 2 / gap**3
-        + np.abs(motion.acceleration).sum(axis=1) / gap
-        for motion in motions
-    )
-    change = 0.5 * max(float(one.max(initial=0.0)) for one in each) / (2.0 * np.pi * hz) ** 2
-    text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
-    if change <= limit:
-        return MotionStudy((), f"speed of the motion: {text}, a rough estimate: {why}", None)
-    warning = f"the motion may not be slow: {text}, over {100 * limit:g} % (rough: {why})"
-    return MotionStudy((), "", warning)
