@@ -10,7 +10,7 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
-    comparison  how good both expansions are: along the trajectory, over the boxes of q and y
+    comparison  how good expansions are, against exact solves
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
     pictures    what is drawn of a mechanism, as plain lines and numbers
@@ -27,10 +27,10 @@ __all__, __getattr__, __dir__ = face(
         "checks.slow_motion": "gap_along",
         "build": "build_model",
         "built_case": "BuiltCase load_case",
-        "checks.expansions": "compare study_expansions unseen_points",
         "comparison": (
-            "BETWEEN COARSE DESIGN_BOX TRAJECTORY grid_over q_grid "
-            "reach_warnings study_modes validate_expansions"
+            "BETWEEN COARSE DESIGN_BOX TRAJECTORY compare grid_over q_grid "
+            "reach_warnings study_expansions study_modes unseen_points "
+            "validate_expansions"
         ),
         "design.answer": "Answer find_answer",
         "design.clearance": "BandMotion",

@@ -3,7 +3,6 @@
 Reading order:
 
     mesh         what mesh and reduced links change, by twice the elements and by whole links
-    expansions   how far both expansions are off, by exact solves between the samples
     slow_motion  what the motion itself changes, which the frequencies of still poses do not contain
     weight       what gravity changes that is not in the frequencies
     accuracy     what a run states of mesh, reduced links, weight and round-off, side by side
