@@ -5,8 +5,7 @@ Reading order:
     build       from a case file in which every number is given to its model and trajectories
     results     what a run found, as plain numbers and names: all that the output is given to show
     planning    expansion point, order and modes; what is left to auto, and where it is judged
-    settling    chooses elements and reduced links left to auto, and builds the model
-    built_case  a case with its model and trajectories, each built once
+    built_case  a validated case with what is built from it; what it leaves to auto for its links, settled
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
@@ -26,7 +25,7 @@ __all__, __getattr__, __dir__ = face(
     {
         "checks.slow_motion": "gap_along",
         "build": "build_model",
-        "built_case": "BuiltCase load_case",
+        "built_case": "BuiltCase load_case settle_model",
         "comparison": (
             "BETWEEN COARSE DESIGN_BOX TRAJECTORY compare grid_over q_grid "
             "reach_warnings study_expansions study_modes unseen_points "
@@ -56,7 +55,6 @@ __all__, __getattr__, __dir__ = face(
             "TargetStudy ToleranceRows TrajectoryRow ValidationRow"
         ),
         "scene": "Scene",
-        "settling": "settle_model",
         "updating.fit": "UpdateResults solve_update update_problem",
         "updating.measured": "read_measurements",
     },

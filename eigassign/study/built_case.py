@@ -1,26 +1,232 @@
-"""A validated case with what is built from it, each part once and when it is asked for."""
+"""A validated case with what is built from it; what it leaves to auto for its links, settled.
+
+Both are measured at poses of the trajectory and corners of the design's box, against finer meshes
+and whole links, to be within their shares of ``expansion.accuracy`` (`planning`). The order and the
+expansion points are settled later, from the model that is built here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
 from eigassign.case.loading import from_mapping, load
-from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.errors import AccuracyError
+from eigassign.mechanism.assembly.build import (
+    LOWEST,
+    WholeLinks,
+    with_elements,
+    with_reduction,
+)
+from eigassign.mechanism.kinematics.limits import resting_pose
+from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
+from eigassign.modal.arguments import spread
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.finer_meshes import standing_frequencies
 from eigassign.modal.model import Model
-from eigassign.study.build import build_trajectories, located
-from eigassign.study.settling import MeshChoice, ReductionChoice, SettledModel, settle_model
+from eigassign.study.build import build_links, build_model, build_trajectories, located
+from eigassign.study.planning import (
+    SERIES,
+    TRUNCATION,
+    ModesAt,
+    asked_accuracy,
+    at_corners,
+    automatic_elements,
+    corners,
+    far_from_buckling,
+    modes_that_matter,
+    reduced_to,
+    scattered,
+    standing,
+    with_middle_loads,
+)
 
 Floats = NDArray[np.float64]
+
+
+# Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
+# these where they are large half a second
+POSES, FEW_POSES = 6, 2
+FEWEST, MAX_ELEMENTS = 2, 256  # of a link; with more round-off, which grows as n⁴, is larger
+LOOKS = 20, 60  # poses and designs that a mesh is chosen at, and confirmed at
+# Times the highest frequency that matters: where elements are chosen imported parts with
+# `reduce_to: auto` are reduced to that, far beyond what is chosen for them then
+BEYOND = 8.0
+
+
+@dataclass(frozen=True)
+class MeshChoice:
+    """Elements of each link, by how much they raise frequencies, about, and all that was tried."""
+
+    elements: Mapping[str, int]
+    error: float
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReductionChoice:
+    """The frequency in Hz for each link, None where it stays whole; its error; what was tried."""
+
+    frequencies: Mapping[str, float | None]
+    error: float
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SettledModel:
+    """A model with the file it is of: ``file`` has numbers in place of ``auto`` for its links."""
+
+    file: CaseFile
+    model: Model
+    mesh: MeshChoice | None  # the elements chosen; None where all are given
+    reduction: ReductionChoice | None  # the frequencies chosen; None without ``reduce_to: auto``
+
+
+def settle_model(file: CaseFile) -> SettledModel:
+    """Choose elements, then the frequencies that links are reduced to, and build the model.
+
+    Raises AccuracyError where no mesh meets ``expansion.accuracy``, CaseError at the line of what
+    cannot be modelled.
+    """
+    mesh = _chosen_elements(file)
+    meshed = file if mesh is None else with_elements(file, mesh.elements)
+    links = build_links(meshed)
+    reduction = _chosen_reduction(meshed, links)
+    settled = meshed if reduction is None else with_reduction(meshed, reduction.frequencies)
+    return SettledModel(settled, build_model(settled, links), mesh, reduction)
+
+
+def _chosen_elements(file: CaseFile) -> MeshChoice | None:
+    """More elements for the links that leave them to ``auto``, twice at most, until the error fits.
+
+    At poses of the initial design and corners of the bounds, then at more and at random designs.
+    """
+    elements = automatic_elements(file)
+    if None not in elements.values():
+        return None
+    parts = [name for name in _left_to_auto(file) if is_imported(file, name)]
+
+    def meshed(count: int, to_hz: float = LOWEST) -> Model:
+        meshed = with_elements(file, {name: n or count for name, n in elements.items()})
+        return build_model(with_reduction(meshed, dict.fromkeys(parts, to_hz)))
+
+    trial, y = meshed(FEWEST), initial_design(file)
+    path, q0 = _path(file, trial)
+    modes_at = modes_that_matter(file, _bands_hz(file, path))
+    beyond = LOWEST
+    if parts:
+        q = q0 if path is None else path.q[0]
+        highest = max(modes_at(trial, trial.x(q, y)))
+        beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
+    ends = corners(len(y))
+    seen, every = (
+        at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends)))) for poses in LOOKS
+    )
+    every = every.joined(scattered(file, path, q0, LOOKS[0]))
+    seen, every = standing(seen, trial), standing(every, trial)
+    share = 1.0 - SERIES - TRUNCATION * bool(reduced_to(file))
+    accuracy, reasons, count = share * asked_accuracy(file), list[str](), FEWEST
+    while True:
+        model = meshed(count, beyond)
+        lost = rounding_error(model.pencil, seen.x[0], max(modes_at(model, seen.x)))
+        if lost > accuracy:
+            raise AccuracyError(
+                f"round-off is {lost:.1e} with {count} elements, above the accuracy "
+                f"{accuracy:.1e}, and a finer mesh makes it larger: ask for less"
+            )
+        judge = partial(_mesh_error, model, modes_at)
+        errors = judge(seen.x)
+        if errors.max() <= accuracy:
+            errors = judge(every.x)
+        worst = float(errors.max())
+        said = f"about {100.0 * worst:.2g} % too high" if worst < np.inf else "not resolved"
+        reasons.append(f"{count} elements: {said}, at {len(errors)} poses and designs")
+        if worst <= accuracy:
+            chosen = {name: n or count for name, n in elements.items()}
+            return MeshChoice(chosen, worst, tuple(reasons))
+        if count == MAX_ELEMENTS:
+            raise AccuracyError(f"no mesh meets the accuracy {accuracy:.1e}: {reasons[-1]}")
+        most = 2.0 if worst == np.inf else (worst / accuracy) ** 0.25  # the order of bending
+        count = min(max(count + 1, int(np.ceil(count * min(most, 2.0)))), MAX_ELEMENTS)
+
+
+def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
+    """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
+    n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
+    if kept.any():
+        x, modes = x[kept], modes_at(model, x[kept])
+        error[kept] = model.beam_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1)
+    return error
+
+
+def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
+    """Higher and higher frequencies to reduce to, until the error against whole links fits."""
+    names = _left_to_auto(file)
+    if not names:
+        return None
+    whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
+    upright = whole
+    if whole.pencil.weight is not None:  # inside imported parts it changes little
+        at_nodes = {n: LOWEST if is_imported(file, n) else None for n in names}
+        upright = build_model(with_reduction(file, at_nodes), links)
+    path, q0 = _path(file, upright)
+    few = POSES if whole.pencil.is_dense else FEW_POSES
+    x = spread(standing(at_corners(file, path, q0, initial_design(file)), upright).x, few)
+    modes = modes_that_matter(file, _bands_hz(file, path))(whole, x)
+    exact, pick = standing_frequencies(whole.pencil, x, max(modes)), np.array(modes) - 1
+    reasons, size = list[str](), 0
+    for frequency in exact[0].max() / np.pi * 1.5 ** np.arange(16):
+        to_hz = dict.fromkeys(names, float(frequency))
+        model = build_model(with_reduction(file, to_hz), links)
+        tried = f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs"
+        if not model.is_reduced or model.n_dof > 0.5 * whole.n_dof:
+            reasons.append(tried)
+            break
+        if model.n_dof == size:  # no mode in between
+            continue
+        size = model.n_dof
+        hz = standing_frequencies(model.pencil, x, max(modes))
+        worst = float(np.abs(hz / exact - 1.0)[:, pick].max())
+        reasons.append(f"{tried}, {100 * worst:.2g} % too high")
+        if worst <= TRUNCATION * asked_accuracy(file):
+            return ReductionChoice(to_hz, worst, tuple(reasons))
+    reasons.append(f"not reduced, because it saves too little: {', '.join(names)}")
+    return ReductionChoice(dict.fromkeys(names), 0.0, tuple(reasons))
+
+
+def _left_to_auto(file: CaseFile) -> list[str]:
+    """The links with ``reduce_to: auto``."""
+    return [name for name, frequency in reduced_to(file).items() if frequency == "auto"]
+
+
+def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
+    """The highest edges of the bands that every mode shall keep out of, (k,) in Hz."""
+    if path is None:
+        return np.empty(0)
+    bands = (
+        one
+        for w in requirements_of(file, with_instants(file, path))
+        for one in w.bands
+        if not one.modes
+    )
+    return np.array([band.upper.max() for band in bands])
+
+
+def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:
+    """The trajectories, and a pose q where there are none."""
+    path = build_trajectories(file, trial) if file.trajectories else None
+    given = file.expansion.q
+    return path, with_middle_loads(file, resting_pose(file) if given == "auto" else given)
 
 
 @dataclass(frozen=True)
