@@ -34,8 +34,7 @@ from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.stages import new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks.accuracy import digits_lines
-from eigassign.study.checks.mesh import judged_mesh, mesh_lines, truncation_lines
+from eigassign.study.checks.accuracy import digits_lines, judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.checks.weight import GIVEN, study_weight
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives

@@ -5,7 +5,7 @@ Reading order:
     build       from a case file in which every number is given to its model and trajectories
     results     what a run found, as plain numbers and names: all that the output is given to show
     planning    expansion point, order and modes; what is left to auto, and where it is judged
-    built_case  a validated case with what is built from it; what it leaves to auto for its links, settled
+    built_case  a validated case with what is built from it, all left to auto for its links settled
     scene       model, trajectory and expansions of a case in one object
     monotone    parameters in which every frequency is monotone, so that corners bound it
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow

@@ -16,7 +16,7 @@ box of y at q0
     corners of the bounds, and designs all over them, at the expansion point;
 between samples
     corners of the bounds, and points between the samples of the trajectory and all over the bounds
-    (`checks.expansions`): the worst there is stated with its margin.
+    (`unseen_points`): the worst there is stated with its margin.
 
 Errors are in frequency (Hz), relative; a point where a polynomial gives λ < 0 counts as infinitely
 wrong. Where the full set was too large for the order asked for, only the linearised error counts.

@@ -2,8 +2,7 @@
 
 Reading order:
 
-    mesh         what mesh and reduced links change, by twice the elements and by whole links
     slow_motion  what the motion itself changes, which the frequencies of still poses do not contain
     weight       what gravity changes that is not in the frequencies
-    accuracy     what a run states of mesh, reduced links, weight and round-off, side by side
+    accuracy     what mesh and reduced links change, and all errors of a run side by side
 """

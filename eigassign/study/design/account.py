@@ -16,8 +16,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
-from eigassign.study.checks.accuracy import Accuracy
-from eigassign.study.checks.mesh import finer, model_errors, raised_by
+from eigassign.study.checks.accuracy import Accuracy, finer, model_errors, raised_by
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.checks.weight import weight_doubt
 from eigassign.study.design.answer import MAX_ERROR, Answer

@@ -45,7 +45,7 @@ from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.errors import EigassignError
-from eigassign.study.checks.mesh import raised_by
+from eigassign.study.checks.accuracy import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.one_shot import cost
 from eigassign.study.design.search.optimum import Found, can_be_met

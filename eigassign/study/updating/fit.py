@@ -29,7 +29,7 @@ from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import in_hz
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.checks.accuracy import judged_poses
+from eigassign.study.checks.accuracy import WEIGHT_POSES, judged_poses
 from eigassign.study.checks.weight import study_weight
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.search.variants import spread_designs
@@ -276,7 +276,10 @@ def collect_update(
     """Everything that was found, as plain numbers and words."""
     case = problem.case
     directions = tuple(_direction(row, found.y, problem) for row in found.unidentified)
-    q, modes = judged_poses(problem.model, problem.q), {each.mode for each in problem.measured}
+    q, modes = (
+        judged_poses(problem.model, problem.q, WEIGHT_POSES),
+        {each.mode for each in problem.measured},
+    )
     weight = study_weight(case.file, problem.model, sorted(modes), q, found.y, "updated")
     return UpdateResults(
         case=CaseRow.of(case.file),
