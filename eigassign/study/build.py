@@ -1,6 +1,6 @@
 """From a case file in which every number is given to its model and the trajectories it follows.
 
-Nothing is chosen here: what a file leaves to ``auto`` is settled one step further, in `settling`.
+Nothing is chosen here: what a file leaves to ``auto`` is settled one step further, in `built_case`.
 """
 
 from __future__ import annotations

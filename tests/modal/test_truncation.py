@@ -11,11 +11,9 @@ from reduced_links import random_arm, random_x, reduced_tree
 from spatial_cases import built
 
 from eigassign import Case, load_case
-from eigassign.errors import AccuracyError
 from eigassign.mechanism import with_elements, with_reduction
 from eigassign.modal import eigenvalues
 from eigassign.pipeline import Options, check, expand_case, modes
-from eigassign.study import plan_expansion
 
 MODES = (1, 2, 3)
 NOISE = 1e-9  # relative round-off of the exact frequencies compared with, with room
@@ -90,15 +88,6 @@ def test_auto_leaves_small_links_whole_and_says_so(tmp_path: Path) -> None:
     assert not small.model().is_reduced
     assert small.reduction is not None
     assert small.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
-
-
-def test_an_automatic_order_refuses_links_reduced_too_far(tmp_path: Path) -> None:
-    case = automatic(tmp_path, order="auto")
-    coarse = Case(with_reduction(case.file, {"one": 60.0, "two": 60.0}))
-    x = np.array([[0.1, 1.0, 0.2]])
-    assert coarse.model().truncation_error(x[:, :2], x[:, 2:], (1, 2)).max() > 0.25e-4
-    with pytest.raises(AccuracyError, match=r"reduced links have an error .*: raise reduce_to"):
-        plan_expansion(coarse.file, coarse.model(), coarse.trajectory)
 
 
 def test_a_run_states_what_its_reduced_links_leave_out(tmp_path: Path) -> None:
