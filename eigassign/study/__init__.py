@@ -27,7 +27,7 @@ __all__, __getattr__, __dir__ = face(
         "build": "build_model",
         "built_case": "BuiltCase load_case settle_model",
         "comparison": (
-            "BETWEEN COARSE DESIGN_BOX TRAJECTORY compare grid_over q_grid "
+            "BETWEEN DESIGN_BOX TRAJECTORY compare grid_over q_grid "
             "reach_warnings study_expansions study_modes unseen_points "
             "validate_expansions"
         ),

@@ -24,7 +24,7 @@ wrong. Where the full set was too large for the order asked for, only the linear
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -132,28 +132,22 @@ class Grid:
         return x
 
 
-def grid_over(
-    entries: Sequence[int],
-    names: Sequence[str],
-    units: Sequence[str],
-    lower: Floats,
-    upper: Floats,
-    x0: Floats,
-    counts: Mapping[int, int] = AXES,
-) -> Grid | None:
-    """A grid over the first two of ``entries`` of x that have room between their bounds.
+def grid_over(scene: Scene, entries: Sequence[int], lower: Floats, upper: Floats) -> Grid | None:
+    """A grid over the first two of ``entries`` of x that have room between their bounds; or None.
 
-    ``names``, ``units``, ``lower`` and ``upper`` belong to the entries, ``counts`` are points an
-    axis by the number of axes. None without room.
+    The others are as at the expansion point.
     """
+    model, x0 = scene.model, scene.expansions.full.x0
     chosen = [k for k in range(len(entries)) if upper[k] > lower[k]][:2]
     if not chosen:
         return None
-    count = counts[len(chosen)]
+    names = (*model.q_names, *model.y_names)
+    units = (*scene.file.q_units, *scene.file.design_units)
+    count = (AXES if model.pencil.is_dense else COARSE)[len(chosen)]
     return Grid(
         tuple(entries[k] for k in chosen),
-        tuple(names[k] for k in chosen),
-        tuple(units[k] for k in chosen),
+        tuple(names[entries[k]] for k in chosen),
+        tuple(units[entries[k]] for k in chosen),
         tuple(frozen(np.linspace(lower[k], upper[k], count)) for k in chosen),
         x0,
     )
@@ -218,22 +212,10 @@ def _everywhere(scene: Scene) -> tuple[tuple[Comparison, ...], tuple[str, ...]]:
     return found, expansion_lines(scene, found)
 
 
-def _counts(scene: Scene) -> Mapping[int, int]:
-    return AXES if scene.model.pencil.is_dense else COARSE
-
-
 def design_grid(scene: Scene) -> Grid | None:
     """Over the bounds of the first two design parameters, at q0."""
-    names, n_q, (lower, upper) = scene.model.y_names, len(scene.q0), scene.bounds
-    return grid_over(
-        range(n_q, n_q + len(names)),
-        names,
-        scene.file.design_units,
-        lower,
-        upper,
-        scene.expansions.full.x0,
-        _counts(scene),
-    )
+    n_q = len(scene.q0)
+    return grid_over(scene, range(n_q, n_q + len(scene.model.y_names)), *scene.bounds)
 
 
 def q_grid(scene: Scene) -> Grid | None:
@@ -250,16 +232,7 @@ def q_grid(scene: Scene) -> Grid | None:
     ends = np.array([s.min(axis=0), s.max(axis=0)]) - s0
     ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
     lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
-    names, units = scene.model.q_names, scene.file.q_units
-    return grid_over(
-        moved,
-        [names[k] for k in moved],
-        [units[k] for k in moved],
-        lower,
-        upper,
-        scene.expansions.full.x0,
-        _counts(scene),
-    )
+    return grid_over(scene, moved, lower, upper)
 
 
 # --- Validation: is the expansion good enough

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
-from eigassign.study import COARSE, grid_over, q_grid, study_modes
+from eigassign.study import grid_over, q_grid, study_modes
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
@@ -32,14 +32,15 @@ def test_the_map_over_q_moves_the_elbow_over_what_it_travels(tmp_path: Path) -> 
     np.testing.assert_allclose([elbow[0], elbow[-1]], [travelled.min(), travelled.max()])
 
 
-def test_variables_without_room_are_left_out_of_a_map() -> None:
-    low, high, x0 = np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0]), np.array([9.0, 8.0, 7.0])
-    grid = grid_over((0, 1, 2), "abc", "xyz", low, high, x0, COARSE)
+def test_variables_without_room_are_left_out_of_a_map(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    low, high = np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0])
+    grid = grid_over(scene, (0, 1, 3), low, high)
     assert grid is not None
-    assert (grid.names, grid.units, grid.shape) == (("a", "c"), ("x", "z"), (7, 7))
-    assert grid.points()[:, 1].tolist() == [8.0] * 49
-    assert grid.points()[-1].tolist() == [1.0, 8.0, 5.0]
-    assert grid_over((0, 1, 2), "abc", "xyz", low, low, x0) is None
+    assert (grid.names, grid.units, grid.shape) == (("q1", "m2"), ("rad", "kg"), (13, 13))
+    assert grid.points()[:, 1].tolist() == [5.312] * 169
+    assert grid.points()[-1].tolist() == [1.0, 5.312, 0.125, 5.0]
+    assert grid_over(scene, (0, 1, 3), low, low) is None
 
 
 def test_the_expansion_point_is_on_the_map_even_if_the_path_misses_it(tmp_path: Path) -> None:

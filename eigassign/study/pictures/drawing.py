@@ -24,6 +24,7 @@ from eigassign.mechanism.kinematics.parameters import initial_design, link_type
 from eigassign.mechanism.kinematics.rotations import mounting, multiply
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model, ModeShapes
 from eigassign.study.results import (
     DrawnBody,
@@ -145,7 +146,7 @@ def displaced(
     lines = []
     for one, f in zip(found, factors, strict=True):
         whole = (s.places + np.tensordot(f, s.motions, axes=1) for s in one.strands)
-        lines.append(tuple(frozen(line[_spread(len(line), points)]) for line in whole))
+        lines.append(tuple(frozen(spread(line, points or len(line))) for line in whole))
     axes = model.poses.values(x, joint_axes(file, model.poses))
     y = x[0, len(model.q_names) :]
     return DrawnPoses(
@@ -153,11 +154,6 @@ def displaced(
         lines=tuple(lines),
         **_symbols(file, model, y, at, [axis[:, :d] for axis in axes]),
     )
-
-
-def _spread(count: int, most: int | None) -> NDArray[np.intp]:
-    few = count if most is None else min(count, most)
-    return np.unique(np.linspace(0, count - 1, few).round().astype(np.intp))
 
 
 def _posed(
