@@ -7,7 +7,6 @@ Reading order:
     program       build: the program of eqs. (13)–(14), in its units; limits that contradict
     solver        solve: OSQP, then an active-set method that goes to round-off
     exact         the optimum of the exact problem, and parameters from measurements
-    listed        parameters that take listed values
     assign        build, solve, judge: from targets to the optimal design
 """
 

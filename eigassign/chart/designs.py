@@ -23,7 +23,7 @@ from eigassign.chart.question import SEED, Effort, measure
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import NearestExpansion, expand
-from eigassign.study.design.one_shot import assign_design
+from eigassign.study.design.answer import assign_design
 from eigassign.study.design.search.optimum import find_optimum
 from eigassign.study.design.search.variants import Task, variant_of
 from eigassign.study.scene import Expansions, Scene

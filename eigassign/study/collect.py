@@ -17,6 +17,7 @@ from eigassign.study.checks.accuracy import Accuracy
 from eigassign.study.checks.slow_motion import MotionStudy, study_motion
 from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
+from eigassign.study.design.answer import solver_row
 from eigassign.study.design.judgement import (
     crossing_warnings,
     far_off,
@@ -24,7 +25,7 @@ from eigassign.study.design.judgement import (
     soft_drives,
     swap_notes,
 )
-from eigassign.study.design.one_shot import design_rows, solver_row
+from eigassign.study.design.lists import design_rows
 from eigassign.study.given import given
 from eigassign.study.pictures.drawing import draw_poses, rest_pose
 from eigassign.study.results import (

@@ -3,7 +3,7 @@
 Reading order:
 
     followed     modes that targets follow by their shape, at any design
-    one_shot     the paper's answer: one quadratic program about one expansion point
+    lists        lists that parameters take their values from, and what a design costs
     judgement    what a design does to the targets
     clearance    whether a band stays clear of modes all along a trajectory
     search       the design that meets the targets best, from several starts

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
-from eigassign.assignment.listed import KEEP
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
@@ -23,7 +22,7 @@ from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
 from eigassign.study.design.conclusions import Conflict, aim_row, extreme, is_proved
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes
-from eigassign.study.design.one_shot import cost
+from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found, Outcome
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import Assignment
+from eigassign.assignment.assign import Assignment, solve_assignment
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
-from eigassign.assignment.inputs import hz_from_lam
+from eigassign.assignment.inputs import LinearModel, hz_from_lam
+from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.sampling import requirements_of
+from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError
@@ -30,10 +31,9 @@ from eigassign.study.design.conclusions import (
     least_changed,
 )
 from eigassign.study.design.followed import require_one_shape
-from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.robust import robust_optimum
 from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
-from eigassign.study.results import RobustRow
+from eigassign.study.results import RobustRow, SolverRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -112,6 +112,55 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction, robust)
+
+
+def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
+    """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
+
+    Raises InfeasibleError with the names of the constraints that contradict each other.
+    """
+    file, path = scene.file, scene.path
+    l0, slope = scene.expansions.linear_in_design(path)
+    _require_near(scene, l0)
+    column = scene.expansions.column
+    goals = [
+        (own, LinearModel(l0[own.rows, k], slope[own.rows, k]))
+        for own in targets
+        for k in [column(own.mode)]
+    ]
+    return solve_assignment(
+        goals,
+        time_weights(path),
+        scene.expansions.linear.y0,
+        scene.initial,
+        Bounds(*scene.bounds),
+        scene.constraints,
+        tuple(file.design.parameters),
+    )
+
+
+def _require_near(scene: Scene, l0: Floats) -> None:
+    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
+    bad = np.argwhere(~(l0 > 0.0))
+    if len(bad):
+        k, column = (int(i) for i in bad[0])
+        problem = scene.file.problem(
+            "expansion.q",
+            f"gives mode {scene.expansions.modes[column]} a negative λ at {scene.path.where(k)}, "
+            "too far from the motion: give a pose of the trajectory, or auto",
+        )
+        raise AccuracyError(str(problem))
+
+
+def solver_row(assignment: Assignment) -> SolverRow:
+    """The solver's status and residuals, as plain numbers."""
+    return SolverRow(
+        assignment.status,
+        assignment.iterations,
+        assignment.primal_residual,
+        assignment.dual_residual,
+        assignment.gap,
+    )
 
 
 def _between_samples(

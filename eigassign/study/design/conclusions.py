@@ -47,7 +47,7 @@ from eigassign.assignment.requirements.requirement import Frequencies, Requireme
 from eigassign.errors import EigassignError
 from eigassign.study.checks.accuracy import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
-from eigassign.study.design.one_shot import cost
+from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, can_be_met
 from eigassign.study.design.search.response import ENDLESS, Glances
 from eigassign.study.design.search.variants import PosedProblem, lacking

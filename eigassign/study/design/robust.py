@@ -24,7 +24,7 @@ from eigassign.assignment.requirements.requirement import EdgeRows, Requirement
 from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
-from eigassign.study.design.one_shot import cost
+from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, find_optimum
 from eigassign.study.design.search.response import DesignResponse, reduced_models
 from eigassign.study.design.search.variants import variant_of

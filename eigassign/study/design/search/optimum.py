@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, Tally, minimise, worth
 from eigassign.assignment.inputs import frozen
-from eigassign.assignment.listed import KEEP, Rows, every_combination, with_rows
 from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
@@ -38,7 +37,7 @@ from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.clearance import check_band, wanting
-from eigassign.study.design.one_shot import catalogues
+from eigassign.study.design.lists import KEEP, Rows, catalogues, every_combination, with_rows
 from eigassign.study.design.search.response import reduced_models
 from eigassign.study.design.search.starts import (
     SOLVES,

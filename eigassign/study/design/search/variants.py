@@ -30,7 +30,7 @@ from eigassign.assignment.requirements.sampling import requirements_of, time_wei
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, follow_all, followers, unfollowed
-from eigassign.study.design.one_shot import catalogues, price_of_one
+from eigassign.study.design.lists import catalogues, price_of_one
 from eigassign.study.design.search.response import (
     DesignResponse,
     Glances,

@@ -1,53 +1,77 @@
-"""The paper's answer: one quadratic program about one expansion point.
+"""Lists that parameters take their values from, and what a design costs.
 
-The linear model of eq. (9) comes from the partially linearised expansion, the design from the
-quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
+A list has rows; each row sets the columns of the design y that the list owns: one for a list of
+values, several for a list of sections. A row of every list is a combination; the other columns stay
+continuous.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import Assignment, solve_assignment
-from eigassign.assignment.inputs import LinearModel
-from eigassign.assignment.listed import ListedValues
-from eigassign.assignment.program import Bounds
-from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.sampling import time_weights
+from eigassign.assignment.inputs import Floats
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError
-from eigassign.study.results import DesignRow, SolverRow
+from eigassign.study.results import DesignRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
+Rows = tuple[int, ...]  # one row of every list: a combination
+Ints = NDArray[np.intp]
+KEEP = 5  # the combinations that are told of
 
 
-def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
-    """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
+@dataclass(frozen=True)
+class ListedValues:
+    """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns).
 
-    Raises InfeasibleError with the names of the constraints that contradict each other.
+    ``prices`` (n_rows,): what a whole row costs, of F; none where its columns have prices, if any.
     """
-    file, path = scene.file, scene.path
-    l0, slope = scene.expansions.linear_in_design(path)
-    _require_near(scene, l0)
-    column = scene.expansions.column
-    goals = [
-        (own, LinearModel(l0[own.rows, k], slope[own.rows, k]))
-        for own in targets
-        for k in [column(own.mode)]
-    ]
-    return solve_assignment(
-        goals,
-        time_weights(path),
-        scene.expansions.linear.y0,
-        scene.initial,
-        Bounds(*scene.bounds),
-        scene.constraints,
-        tuple(file.design.parameters),
-    )
+
+    name: str
+    columns: tuple[int, ...]
+    rows: Floats
+    labels: tuple[str, ...] = ()
+    prices: tuple[float, ...] = ()
+
+    @property
+    def distinct(self) -> Ints:
+        """The first of all rows that are equal, in the order of the list."""
+        return np.sort(np.unique(self.rows, axis=0, return_index=True)[1])
+
+    def nearest(self, y: Floats) -> Ints:
+        """The rows (...) nearest to designs (..., n_y), in shares of the columns' ranges."""
+        width = np.ptp(self.rows, axis=0)
+        unit = np.where(width > 0.0, width, 1.0)
+        away = (self.rows - y[..., None, list(self.columns)]) / unit
+        return np.asarray(np.linalg.norm(away, axis=-1).argmin(axis=-1))
+
+    def price(self, y: Floats) -> Floats | float:
+        """The prices (...) of the rows nearest to designs (..., n_y)."""
+        return np.array(self.prices)[self.nearest(y)] if self.prices else 0.0
+
+
+def with_rows(listed: Sequence[ListedValues], rows: Ints, y: Floats) -> Floats:
+    """Designs (n, n_y): y (n_y,) with the columns of each combination of rows (n, n_lists)."""
+    designs = np.tile(y, (len(rows), 1))
+    for own, at in zip(listed, rows.T, strict=True):
+        designs[:, own.columns] = own.rows[at]
+    return designs
+
+
+def every_combination(allowed: Sequence[Ints], at_once: int) -> Iterator[Ints]:
+    """Yield all combinations (n, n_lists), so many at a time; the last list varies first."""
+    if not allowed:  # there is one, of nothing
+        yield np.zeros((1, 0), dtype=np.intp)
+        return
+    sizes = tuple(map(len, allowed))
+    for start in range(0, prod(sizes), at_once):
+        places = np.arange(start, min(start + at_once, prod(sizes)))
+        each = zip(allowed, np.unravel_index(places, sizes), strict=True)
+        yield np.stack([np.asarray(rows)[at] for rows, at in each], axis=1)
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
@@ -76,19 +100,6 @@ def price_of_one(file: CaseFile) -> float:
     if not any(target.is_goal for target in file.targets):
         return 1.0
     return 1e2 if aim == "worst_case" else 1e4
-
-
-def _require_near(scene: Scene, l0: Floats) -> None:
-    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
-    bad = np.argwhere(~(l0 > 0.0))
-    if len(bad):
-        k, column = (int(i) for i in bad[0])
-        problem = scene.file.problem(
-            "expansion.q",
-            f"gives mode {scene.expansions.modes[column]} a negative λ at {scene.path.where(k)}, "
-            "too far from the motion: give a pose of the trajectory, or auto",
-        )
-        raise AccuracyError(str(problem))
 
 
 def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
@@ -135,14 +146,3 @@ def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:
     if row is not None:
         for column in catalogue.columns:
             yield column, catalogue.labels[row]
-
-
-def solver_row(assignment: Assignment) -> SolverRow:
-    """The solver's status and residuals, as plain numbers."""
-    return SolverRow(
-        assignment.status,
-        assignment.iterations,
-        assignment.primal_residual,
-        assignment.dual_residual,
-        assignment.gap,
-    )
