@@ -7,7 +7,6 @@ Reading order:
     planning    expansion point, order and modes; what is left to auto, and where it is judged
     built_case  a validated case with what is built from it, all left to auto for its links settled
     scene       model, trajectory and expansions of a case in one object
-    monotone    parameters in which every frequency is monotone, so that corners bound it
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
     comparison  how good expansions are, against exact solves
     design      from the targets to the answer, and the verdict

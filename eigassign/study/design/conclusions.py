@@ -1,6 +1,6 @@
 """What may be said of an optimum, and what an objective that is no error has come to.
 
-Where every parameter raises or lowers each frequency (`monotone`), those at two corners of a box
+Where every parameter raises or lowers each frequency (`response`), those at two corners of a box
 bound each mode at every sample, and with it the limits that no design of the box keeps, and the F
 that none is below (`Requirements.least`). The box of the least bound is halved where it is widest,
 as slopes at the optimum weigh its sides. Where this misses limits, the least violation takes the
@@ -49,9 +49,8 @@ from eigassign.study.checks.accuracy import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, can_be_met
-from eigassign.study.design.search.response import ENDLESS, Glances
+from eigassign.study.design.search.response import ENDLESS, Glances, corners, effects
 from eigassign.study.design.search.variants import PosedProblem, lacking
-from eigassign.study.monotone import corners, effects
 from eigassign.study.results import AimRow, OptimalityRow, ViolationRow
 from eigassign.study.scene import Scene
 

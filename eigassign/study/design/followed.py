@@ -43,12 +43,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class Route:
-    """Samples in the order in which a shape is carried to them, from the pose or a sample."""
-
-    samples: tuple[int, ...]
-    origin: int | None = None  # None: the pose that names the mode
+# Samples in the order in which a shape is carried to them, and the sample that it comes from; None:
+# from the pose that names the mode
+Route = tuple[tuple[int, ...], int | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +68,13 @@ class Follower:
         if not self.needed.any():
             return {}
         found: dict[int | None, FollowedShape] = {None: self._at_pose(y)}
-        for route in self.routes:
-            way = [samples[k] for k in route.samples]
+        for route, origin in self.routes:
             try:
-                shapes = follow(self.model.pencil, found[route.origin], way)
+                shapes = follow(self.model.pencil, found[origin], [samples[k] for k in route])
             except LostModeError as lost:
-                at = self.path.where(route.samples[lost.step])
+                at = self.path.where(route[lost.step])
                 raise self._lost(lost, f"on the way to {at}", y) from None
-            found |= dict(zip(route.samples, shapes, strict=True))
+            found |= dict(zip(route, shapes, strict=True))
         needed = {int(k): found[int(k)] for k in np.flatnonzero(self.needed)}
         for k, shape in needed.items():
             if shape.is_shared:
@@ -131,15 +127,15 @@ class Follower:
         pose, only = self.mode.at, len(self.path.whole.parts) == 1
         if pose.time is not None and (only or pose.trajectory == name):
             after = rows.start + int(np.searchsorted(self.path.time_s[rows], pose.time, "right"))
-            yield Route(tuple(range(after - 1, first - 1, -1)))
-            yield Route(tuple(range(max(after, rows.start), last + 1)))
+            yield tuple(range(after - 1, first - 1, -1)), None
+            yield tuple(range(max(after, rows.start), last + 1)), None
             return
         q = self.path.q
         width = np.ptp(q, axis=0)
         away = (q[needed] - self.pose(self.named_y)) / np.where(width > 0.0, width, 1.0)
         nearest = int(needed[np.argmin(np.linalg.norm(away, axis=1))])
-        yield Route(tuple(range(nearest, first - 1, -1)))
-        yield Route(tuple(range(nearest + 1, last + 1)), nearest)
+        yield tuple(range(nearest, first - 1, -1)), None
+        yield tuple(range(nearest + 1, last + 1)), nearest
 
 
 def named_design(file: CaseFile, followed: FollowedMode) -> Floats:

@@ -26,9 +26,8 @@ from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, find_optimum
-from eigassign.study.design.search.response import DesignResponse, reduced_models
+from eigassign.study.design.search.response import DesignResponse, box_corners, reduced_models
 from eigassign.study.design.search.variants import variant_of
-from eigassign.study.monotone import box_corners
 from eigassign.study.results import RobustRow, RobustTarget
 from eigassign.study.scene import Scene
 

@@ -32,7 +32,6 @@ from eigassign.modal.model import Model
 from eigassign.study.build import build_model
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
 from eigassign.study.meaning.reach import (
     misses,
@@ -241,11 +240,16 @@ def study_meaning(
     reach = () if ranges is None else tuple(reach_rows(wanted, ranges))
     if studies is Studies.NONE:
         return Meaning(unreachable=beyond)
-    found, (asked, seen) = answer.found, _judged(scene, answer, wanted)
-    notes: list[str] = []
+    found, notes = answer.found, list[str]()
+    variant = variant_of(Task(scene, tuple(wanted)), ()) if found is None else found.variant
+    seen = variant.problem.appraise(answer.y) if found is None else found.best.seen
+    relaxed: Iterator[RelaxedRow] = iter(())
+    if found is not None and found.best.seen.violation <= MET:  # else limits are no price
+        active = tuple(active_rows(scene, answer))
+        relaxed = relaxed_limits(scene.file, variant, found.best.objective, active)
     return Meaning(
-        sensitivity=tuple(sensitivities(scene.file, asked, answer.y, seen)),
-        relaxed=() if found is None else tuple(_relaxed(scene, answer, found)),
+        sensitivity=tuple(sensitivities(scene.file, variant.requirements, answer.y, seen)),
+        relaxed=tuple(relaxed),
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
         unreachable=beyond,
@@ -302,21 +306,3 @@ def _tolerance(
     if found is not None:
         notes.append(found.words)
     return found
-
-
-def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:
-    if found.best.seen.violation > MET:  # a limit that is missed is no price of the objective
-        return
-    active = tuple(active_rows(scene, answer))
-    yield from relaxed_limits(scene.file, found.variant, found.best.objective, active)
-
-
-def _judged(
-    scene: Scene, answer: Answer, wanted: Sequence[Requirement]
-) -> tuple[Requirements, Appraisal]:
-    """The studies asked for, with their results; solved only where they were not before."""
-    if answer.found is not None:
-        variant = answer.found.variant
-        return variant.requirements, answer.found.best.seen
-    variant = variant_of(Task(scene, tuple(wanted)), ())
-    return variant.requirements, variant.problem.appraise(answer.y)

@@ -1,12 +1,12 @@
 """What can be reached within the bounds, and what deviations within the tolerances do.
 
-Where all frequencies are monotone in every parameter (`monotone`), two corners of the bounds prove
+Where all frequencies are monotone in every parameter (`response`), two corners of the bounds prove
 between what values each mode stays at every sample. Otherwise the target is searched for at the
 samples where it is missed most, each by itself: a sample at which no design comes near enough, from
 several starts, is out of reach. A target that is missed somewhere but within reach at every sample
 is not called unreachable: there, one design cannot serve all samples.
 
-Where all frequencies are monotone in every parameter that has a tolerance (`monotone`), two
+Where all frequencies are monotone in every parameter that has a tolerance (`response`), two
 corners bound them exactly. The other parameters are drawn from their ranges by a Sobol sequence,
 and taken at corners of these, each time with the monotone ones at both corners. Models of many
 unknowns are evaluated by a reduced model about the answer then; what it is off by at the worst
@@ -33,8 +33,8 @@ from eigassign.modal.adaptive_order import MARGIN
 from eigassign.modal.reduced import reduce
 from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.design.search.optimum import Choices
+from eigassign.study.design.search.response import box_corners, corners, effects
 from eigassign.study.design.search.variants import SPREAD, Designs, Task
-from eigassign.study.monotone import box_corners, corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
 

@@ -36,10 +36,10 @@ from eigassign.study.design.search.response import (
     Glances,
     Outlook,
     ReducedModels,
+    corners,
     outlook_of,
     response_of,
 )
-from eigassign.study.monotone import corners
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
