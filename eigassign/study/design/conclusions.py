@@ -23,7 +23,6 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +39,7 @@ from eigassign.assignment.exact.design_problem import (
 )
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import NOTHING, OPTIMAL, End, Optimum, minimise
-from eigassign.assignment.program import smallest
+from eigassign.assignment.program import can_be_kept, smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
@@ -49,7 +48,7 @@ from eigassign.study.checks.accuracy import raised_by
 from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, can_be_met
-from eigassign.study.design.search.response import ENDLESS, Glances, corners, effects
+from eigassign.study.design.search.response import Outlook
 from eigassign.study.design.search.variants import PosedProblem, lacking
 from eigassign.study.results import AimRow, OptimalityRow, ViolationRow
 from eigassign.study.scene import Scene
@@ -68,9 +67,9 @@ def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
 
     It takes a quarter of the exact solves of the search; if ``thorough`` up to `MOST_SOLVED`.
     """
-    best, problem, file = found.best, found.variant.problem, scene.file
+    best, problem = found.best, found.variant.problem
     missed, lower, upper = best.seen.violation > MET, problem.lower, problem.upper
-    if file.design.catalogues or best.end in (End.SECONDS, End.INTERRUPTED):
+    if found.are_listed or best.end in (End.SECONDS, End.INTERRUPTED):
         return None
     value = best.seen.violation if missed else best.objective
     least = 0.0 if missed else problem.least_value(lower, upper, np.zeros(0))
@@ -78,10 +77,11 @@ def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
     if least < enough:  # else all that has a price is cheapest, or there is no error
         task = found.task
         given = task.scenarios or task.bands or task.followers or scene.path.follows_design
-        if given or not np.all((effects(file) != 0.0) | (lower == upper)):
+        outlook = found.variant.outlook
+        if outlook is None or outlook.levels == 1 or given:
             return None
         most = MOST_SOLVED if thorough else int(SHARE * found.exact_solves / len(scene.path.q))
-        least = min(value, _bound(scene, found, least, enough, most))
+        least = min(value, _bound(found, outlook, least, enough, most))
     gap = (value - least) / (abs(value) + NOTHING)
     kind, words = "proved" if least >= enough else "bounded", _words(scene, found, least, gap)
     if missed:
@@ -102,10 +102,9 @@ def _enough(problem: DesignProblem, value: float) -> float:
     return value - gap
 
 
-def _bound(scene: Scene, found: Found, least: float, enough: float, most: int) -> float:
+def _bound(found: Found, outlook: Outlook, least: float, enough: float, most: int) -> float:
     """What no design is below; it solves about ``most`` of them."""
     variant, seen, number = found.variant, found.best.seen, itertools.count(1)
-    glances = Glances(scene.model, scene.path, variant.requirements.modes)
     width = variant.problem.upper - variant.problem.lower
     weight = np.linalg.norm(np.vstack([seen.slopes, seen.excess_slopes]), axis=0)
     weight += 1e-9 / np.where(width > 0.0, width, 1.0)  # of those without an effect there
@@ -119,7 +118,7 @@ def _bound(scene: Scene, found: Found, least: float, enough: float, most: int) -
         side = np.arange(len(width)) == (weight * (high - low)).argmax(axis=1)[:, None]
         lower = np.concatenate([low, np.where(side, middle, low)])
         upper = np.concatenate([np.where(side, middle, high), high])
-        values = _of_boxes(variant, glances, lower, upper, seen.violation > MET)
+        values = _of_boxes(variant, outlook, lower, upper, seen.violation > MET)
         for before, own, *box in zip(np.tile(known, 2), values, lower, upper, strict=True):
             if own < np.inf:
                 heapq.heappush(open_, (max(before, own), next(number), *box))
@@ -128,27 +127,19 @@ def _bound(scene: Scene, found: Found, least: float, enough: float, most: int) -
 
 
 def _of_boxes(
-    variant: PosedProblem, glances: Glances, lower: Floats, upper: Floats, missed: bool
+    variant: PosedProblem, outlook: Outlook, lower: Floats, upper: Floats, missed: bool
 ) -> Iterator[float]:
     """Yield what no design of each box is below, F or where ``missed`` the violation.
 
     Infinite where none meets the limits.
     """
-    problem, n = variant.problem, len(glances.order)
-    softest, stiffest = corners(variant.task.scene.file, lower, lower, upper)
-    glances.look(np.concatenate([softest, stiffest]), n)
-    for low, high, soft, stiff in zip(lower, upper, softest, stiffest, strict=True):
-        lowest, highest = glances.solved(soft, n, 0.0), glances.solved(stiff, n, ENDLESS)
-        violation, residual = 0.0, np.zeros(0)
-        if lowest is not None and highest is not None:
-            with suppress(EigassignError):  # a property that no mechanism has
-                violation, residual = variant.requirements.least(low, high, lowest, highest)
-        for row in problem.constraints:
-            ends = row.coefficients * low, row.coefficients * high
-            if np.maximum(*ends).sum() < row.lower or np.minimum(*ends).sum() > row.upper:
-                violation = np.inf
+    problem = variant.problem
+    kept = can_be_kept(problem.constraints, lower, upper)
+    known = outlook(outlook.levels - 1, lower, upper)
+    for low, high, met, (violation, residual) in zip(lower, upper, kept, known, strict=True):
+        least = violation if met else np.inf
         value = problem.least_value(low, high, residual)
-        yield violation if missed else value if violation <= MET else np.inf
+        yield least if missed else value if least <= MET else np.inf
 
 
 def _words(scene: Scene, found: Found, least: float, gap: float) -> str:
