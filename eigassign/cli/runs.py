@@ -310,9 +310,10 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
         print_json({"run_folder": str(folder), **vars(made)})
     else:
         from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.reports.chart import headline, to_write
+        from eigassign.output.reports.chart import chart_tables, headline
 
         print_verdict(headline(made) or "")
-        print_tables([to_write(made)])
+        written = "What to write in the case"
+        print_tables(table for table in chart_tables(made) if table.title == written)
         show(_written(folder, made.seconds))
     return 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from eigassign.chart.results import Chart
@@ -19,57 +19,41 @@ def headline(chart: Chart) -> str | None:
 
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
-    """The tables that have rows: what to write, the quickest and all methods, mesh, designs."""
-    names = "asked_for evaluations method worst_relative total_s"
-    caption = "Set-up and all evaluations. Not all of these can be asked for in a case file."
-    quickest = facts_table("The quickest of all methods", chart.advice, names, caption)
-    more = (_methods(chart), _mesh(chart), _designs(chart), _machine(chart))
-    return tuple(table for table in (to_write(chart), quickest, *more) if table.rows)
+    """The tables that have rows."""
+    return tuple(table for table in _tables(chart) if table.rows)
 
 
-def to_write(chart: Chart) -> Table:
-    """What a case can ask for, for each accuracy, beside what ``order: auto`` takes."""
+def _tables(chart: Chart) -> Iterator[Table]:
+    """What to write beside what auto takes, the quickest and all methods, mesh, designs."""
     names = "asked_for key key_relative key_sample_s auto.method auto.worst_relative"
     rows = [a for a in chart.advice if a.evaluations == chart.advice[0].evaluations]
-    both = f"{names} auto.choosing_s auto.refused"
-    return facts_table("What to write in the case", rows, both, "", **{"auto.refused": "refused"})
-
-
-def _methods(chart: Chart) -> Table:
-    """The table of all methods, the most accurate first."""
+    names += " auto.choosing_s auto.refused"
+    refused = {"auto.refused": "refused"}
+    yield facts_table("What to write in the case", rows, names, "", **refused)
+    names = "asked_for evaluations method worst_relative total_s"
+    caption = "Set-up and all evaluations. Not all of these can be asked for in a case file."
+    yield facts_table("The quickest of all methods", chart.advice, names, caption)
     names = (
         "method offline online exact_solves everywhere.worst_hz everywhere.rms_hz "
         "trajectory.worst_hz everywhere.failed break_even use"
     )
-    rows = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
+    points = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
     caption = (
         'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
         "number of evaluations from which it beats exact solves."
     )
-    return facts_table("All methods", rows, names, caption)
-
-
-def _mesh(chart: Chart) -> Table:
-    """Meshes from coarse to fine."""
+    yield facts_table("All methods", points, names, caption)
     names = "elements factor n_dof worst_hz worst_relative order solve"
     caption = "Against the limit extrapolated from the two finest; factor 1 is the case's own mesh."
-    return facts_table("Mesh", chart.mesh, names, caption)
-
-
-def _designs(chart: Chart) -> Table:
-    """Ways to a design, the best objective first."""
+    yield facts_table("Mesh", chart.mesh, names, caption)
     names = "method seconds solves objective excess max_relative rms_relative note"
-    rows = sorted(chart.designs, key=lambda r: r.excess)
+    designs = sorted(chart.designs, key=lambda r: r.excess)
     caption = "Objective and distances to the target by exact solves along the trajectory."
-    return facts_table("Designs", rows, names, caption)
-
-
-def _machine(chart: Chart) -> Table:
-    """The machine and versions that the times are from."""
+    yield facts_table("Designs", designs, names, caption)
     m = dict(chart.machine)
     m["linear algebra"] = f"{m.pop('blas')}, threads: {m.pop('threads')}"
     m["versions"] = ", ".join(f"{name} {version}" for name, version in m["versions"].items())
-    return Table("Machine", ("", ""), tuple((name, str(value)) for name, value in m.items()))
+    yield Table("Machine", ("", ""), tuple((name, str(value)) for name, value in m.items()))
 
 
 def write_chart(

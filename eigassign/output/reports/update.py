@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,16 +19,13 @@ SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
     """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
-    made = {
-        "parameters": (parameters(results), directions(results), minima(results)),
-        "fit": (fit(results), measurements(results, most)),
-    }
-    every = (replace(table, section=key) for key, own in made.items() for table in own)
+    sections = {"parameters": _parameters(results), "fit": _fit(results, most)}
+    every = (replace(table, section=key) for key, own in sections.items() for table in own)
     return tuple(table for table in every if table.rows)
 
 
-def parameters(results: UpdateResults) -> Table:
-    """Parameters before and after, with standard deviations and intervals."""
+def _parameters(results: UpdateResults) -> Iterator[Table]:
+    """Parameters before and after, with intervals; what cannot be told; of several minima all."""
     caption = (
         "Deviation: standard deviation of the linear model. Interval: 95 % by the profile "
         "likelihood, with the other parameters fitted again at each value."
@@ -37,47 +34,33 @@ def parameters(results: UpdateResults) -> Table:
     if held and any(row.deviation is not None for row in results.parameters):
         caption += f" The deviations assume {' and '.join(held)} at the bound."
     names = "name parameter handy initial value deviation low high remark"
-    return facts_table("Parameters", results.parameters, names, caption)
-
-
-def directions(results: UpdateResults) -> Table:
-    """Directions that the measurements cannot tell."""
+    yield facts_table("Parameters", results.parameters, names, caption)
     caption = (
         "Changes from bound to bound, in SI units, that move all measured frequencies together by "
         "less than 1.96 standard deviations."
     )
-    return facts_table("Not identified", results.unidentified, "words change", caption)
-
-
-def minima(results: UpdateResults) -> Table:
-    """The minima of χ² that explain the measurements, where there are several."""
+    yield facts_table("Not identified", results.unidentified, "words change", caption)
     several = results.minima if len(results.minima) > 1 else ()
     caption = "Distinct minima of χ², the best first: the parameters above are those of the first."
-    return facts_table("Explanations", several, "values chi_squared", caption)
+    yield facts_table("Explanations", several, "values chi_squared", caption)
 
 
-def fit(results: UpdateResults) -> Table:
-    """χ² before and after, and the chance of it."""
+def _fit(results: UpdateResults, most: int | None) -> Iterator[Table]:
+    """χ² before and after, and the chance of it; of many measurements the worst explained."""
     names = "initial_chi_squared chi_squared degrees p_value steps ended"
     caption = (
         "χ²: sum of the squared residuals in standard deviations. p: the chance of a χ² this large "
         "if the model and the stated deviations are right."
     )
-    return facts_table("Fit", [results.fit], names, caption)
-
-
-def measurements(results: UpdateResults, most: int | None) -> Table:
-    """Measurements with their residuals; of many those that are worst explained."""
+    yield facts_table("Fit", [results.fit], names, caption)
     shown = list(results.measurements)
-    more = most is not None and len(shown) > most
-    if more:
+    caption = "Residuals after updating, in standard deviations of the measurement."
+    if most is not None and len(shown) > most:
         worst = sorted(shown, key=lambda row: -abs(row.residual))[:most]
+        caption += f" The {most} worst of {len(shown)}."
         shown = [row for row in shown if row in worst]
     names = "label mode measured_hz deviation_hz initial_hz updated_hz residual is_outlier"
-    caption = "Residuals after updating, in standard deviations of the measurement."
-    if more:
-        caption += f" The {len(shown)} worst of {len(results.measurements)}."
-    return facts_table("Measurements", shown, names, caption)
+    yield facts_table("Measurements", shown, names, caption)
 
 
 # --- The files
