@@ -116,12 +116,7 @@ def _assigned(results: RunResults) -> Iterator[Column]:
 def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
     """The edges, and the modes before and after, of each target; by what they are called."""
     found: dict[str, list[Floats | None]] = {
-        name: [
-            # a curve of a target, or an edge of what it asks
-            getattr(target, field) if hasattr(target, field) else getattr(target.asked, name)
-            for field in [f"{name.replace(' ', '_')}_hz"]
-            for target in targets
-        ]
+        name: [getattr(one.frequencies, f"{name.replace(' ', '_')}_hz") for one in targets]
         for name in targets[0].asked.columns
     }
     for mode in sorted({mode for t in targets if t.near for mode in t.near.modes}):

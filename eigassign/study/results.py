@@ -1234,9 +1234,8 @@ class RunResults(Origin):
 
         Where none is wanted, over the violations of all limits; None without either.
         """
-        if not self.counted:
-            return None
-        return over_all([(target.error, target.weight_s) for target in self.counted])
+        found = [(target.error, target.weight_s) for target in counted_of(self.targets)]
+        return over_all(found) if found else None
 
     @property
     def violation(
@@ -1255,14 +1254,9 @@ class RunResults(Origin):
             priced.append(self.mass.cost)
         return sum(priced) if priced else None
 
-    @property
-    def counted(self) -> tuple[TargetStudy, ...]:
-        """The targets that ``error`` is of: wanted frequencies, or else all that may be missed."""
-        return counted_of(self.targets)
-
 
 def counted_of(targets: tuple[TargetStudy, ...]) -> tuple[TargetStudy, ...]:
-    """The targets of wanted frequencies, or else all that may be missed."""
+    """The targets that errors are of: wanted frequencies, or else all that may be missed."""
     wanted = tuple(target for target in targets if target.asked.is_goal)
     return wanted or tuple(target for target in targets if not target.asked.is_aim)
 
@@ -1335,17 +1329,23 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         targets=tuple(target for target in targets if target is not None),
         others=_part(results.others, rows),
         spectrum=_part(results.spectrum, rows),
-        drives=tuple(_part(drive, rows) for drive in results.drives),
-        statics=tuple(_part(static, rows) for static in results.statics),
+        drives=_part(results.drives, rows),
+        statics=_part(results.statics, rows),
     )
 
 
+_OF_SAMPLES = (Comparison, OtherModes, FollowedRow, DriveRow, StaticRow, TargetStudy)
+
+
 def _part(row: Row, rows: slice) -> Row:
-    """The same row at some of the samples: of each array those; None of None."""
-    if row is None:
-        return row
-    arrays = {k: v[rows] for k, v in vars(row).items() if isinstance(v, np.ndarray)}
-    return replace(row, **arrays)  # type: ignore[type-var]
+    """The same at some of the samples: of each array of rows of samples those."""
+    if isinstance(row, np.ndarray):
+        return row[rows]  # type: ignore[return-value]
+    if isinstance(row, tuple):
+        return type(row)(_part(one, rows) for one in row)
+    if isinstance(row, _OF_SAMPLES):
+        return replace(row, **{k: _part(v, rows) for k, v in vars(row).items()})
+    return row
 
 
 def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
@@ -1359,7 +1359,5 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
         _part(target, rows),
         asked=replace(asked, rows=slice(first, first + length)),
         error=along.error,
-        followed=tuple(_part(row, rows) for row in target.followed),
         along=(replace(along, rows=slice(0, length)),),
-        near=_part(target.near, rows),
     )
