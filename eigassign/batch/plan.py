@@ -24,7 +24,7 @@ from eigassign._version import __version__
 from eigassign.batch.variants import AS_IT_STANDS, OPTION, Variants, variants_of
 from eigassign.case.loading import Unchecked, read
 from eigassign.case.reader import dotted
-from eigassign.case.schema.sweep import text_of
+from eigassign.case.schema.study import text_of
 from eigassign.case.units import NUMBER
 from eigassign.case.values import key_path, short_keys
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
 from eigassign.case.schema.document import validated_part
-from eigassign.case.schema.sweep import MOST, Sweep, text_of
+from eigassign.case.schema.study import MOST, Sweep, text_of
 from eigassign.case.table import read_words
 from eigassign.case.values import key_path, objection
 from eigassign.errors import CaseError, MechanismError, Problem

@@ -27,8 +27,13 @@ from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Part, Quantity
-from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
-from eigassign.case.schema.sweep import Sweep
+from eigassign.case.schema.study import (
+    AssignmentKeys,
+    ExpansionKeys,
+    Measurements,
+    Sweep,
+    ValidationKeys,
+)
 from eigassign.case.schema.targets import AnyTarget, TargetForm
 from eigassign.case.schema.trajectory import Added, TrajectoryForm, named_trajectories
 from eigassign.errors import CaseError, Problem

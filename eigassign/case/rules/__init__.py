@@ -8,10 +8,8 @@ In reading order, each importing only from those above it:
     properties    design parameters: the number that a path names, and its bounds
     files         files that the case names: whether they can be read; choices listed in one
     values        rule: values whose unit another key decides
-    links         rules: links, materials, sections, and what stands on nodes
-    joints        rules: joints between links, coordinates, loops
-    study         rules: trajectory, design, expansion, validation
-    targets       rules: targets, the modes they follow, the method that takes them
+    mechanism     rules: links and what stands on their nodes; joints, coordinates, loops
+    study         rules: trajectory, design, expansion; targets, and the method that takes them
     consistency   the table of all rules
     plausibility  warnings: what is allowed but looks like a slip
 """

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from eigassign.case.reader import Finding, KeyPath, Tree, items
-from eigassign.case.rules import joints, links, properties, study, targets, values
+from eigassign.case.rules import mechanism, properties, study, values
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.mechanism import Mechanism
 
@@ -31,23 +31,23 @@ def reserved_names_are_not_used(document: Document) -> Iterator[Finding]:
 
 RULES: tuple[Rule, ...] = (
     reserved_names_are_not_used,
-    links.links_have_known_materials,
-    links.beams_have_known_sections,
-    links.bare_sections_have_the_moments_of_their_space,
-    links.rigid_links_have_one_end,
-    links.frames_hang_together,
-    links.beams_have_no_more_elements_than_can_be_meant,
-    links.superelements_have_rows_of_their_own_for_each_node,
-    links.links_that_a_joint_travels_along_are_not_reduced,
-    links.bodies_and_tips_are_on_nodes,
-    links.springs_join_two_nodes,
-    joints.joints_connect_two_links,
-    joints.beams_carry_one_rider,
-    joints.nuts_are_on_their_shaft,
-    joints.links_are_connected_to_the_ground,
-    joints.coordinates_move_one_freedom_each,
-    joints.assembly_names_coordinates_and_joints,
-    joints.assembly_is_for_loops,
+    mechanism.links_have_known_materials,
+    mechanism.beams_have_known_sections,
+    mechanism.bare_sections_have_the_moments_of_their_space,
+    mechanism.rigid_links_have_one_end,
+    mechanism.frames_hang_together,
+    mechanism.beams_have_no_more_elements_than_can_be_meant,
+    mechanism.superelements_have_rows_of_their_own_for_each_node,
+    mechanism.links_that_a_joint_travels_along_are_not_reduced,
+    mechanism.bodies_and_tips_are_on_nodes,
+    mechanism.springs_join_two_nodes,
+    mechanism.joints_connect_two_links,
+    mechanism.beams_carry_one_rider,
+    mechanism.nuts_are_on_their_shaft,
+    mechanism.links_are_connected_to_the_ground,
+    mechanism.coordinates_move_one_freedom_each,
+    mechanism.assembly_names_coordinates_and_joints,
+    mechanism.assembly_is_for_loops,
     properties.parameters_name_properties,
     properties.properties_of_one_parameter_are_alike,
     properties.load_cases_set_properties,
@@ -59,15 +59,15 @@ RULES: tuple[Rule, ...] = (
     study.parameters_vary_different_properties,
     study.limited_drives_are_of_coordinates,
     study.constraints_are_between_design_parameters,
-    targets.targets_are_on_trajectories,
-    targets.statics_are_of_nodes,
-    targets.a_mode_has_one_frequency_at_a_time,
-    targets.followed_modes_are_at_a_pose,
-    targets.measurements_are_at_poses,
-    targets.one_shot_has_a_quadratic_program,
-    targets.objectives_have_what_they_take,
-    targets.robust_designs_have_tolerances,
-    targets.profiles_cover_their_trajectories,
+    study.targets_are_on_trajectories,
+    study.statics_are_of_nodes,
+    study.a_mode_has_one_frequency_at_a_time,
+    study.followed_modes_are_at_a_pose,
+    study.measurements_are_at_poses,
+    study.one_shot_has_a_quadratic_program,
+    study.objectives_have_what_they_take,
+    study.robust_designs_have_tolerances,
+    study.profiles_cover_their_trajectories,
 )
 LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right
     study.bounds_go_upwards,

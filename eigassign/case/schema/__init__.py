@@ -10,7 +10,6 @@ In reading order, each importing only from those above it:
     trajectory  the key `trajectory`
     design      the key `design`: parameters, catalogues, limits, and the one vector y they make
     targets     the key `targets`
-    study       the keys `assignment`, `expansion`, `validation` and `measurements`
-    sweep       the key `sweep`
+    study       the keys `assignment`, `expansion`, `validation`, `measurements` and `sweep`
     document    the whole case file, its errors as readable findings, its JSON Schema
 """

@@ -20,8 +20,13 @@ from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, must
 from eigassign.case.schema.sections import SHAPES
-from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
-from eigassign.case.schema.sweep import Sweep
+from eigassign.case.schema.study import (
+    AssignmentKeys,
+    ExpansionKeys,
+    Measurements,
+    Sweep,
+    ValidationKeys,
+)
 from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm, kinds_of
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
