@@ -8,8 +8,7 @@ In reading order, each importing only from those above it:
     table        a table in a CSV file → columns in SI
     schema       what each key may hold: one pydantic model for each part of a case file
     rules        what keys must have in common once each is right; what looks like a slip
-    canonical    content of a case → canonical YAML text that reads back equal
-    case_file    the validated case as the rest of the program sees it
+    case_file    the validated case as the rest of the program sees it; canonical YAML of it
     values       other values of some keys
     loading      path or mapping → CaseFile, or all problems of the file at once
 """
@@ -19,8 +18,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "canonical": "plain to_yaml",
-        "case_file": "CaseFile",
+        "case_file": "CaseFile plain to_yaml",
         "loading": "checked from_mapping load parse read",
         "reader": "read_yaml",
         "schema.design": "Tolerance",
