@@ -8,9 +8,7 @@ with the mass, centre and inertia of its ``inertial``, or a beam to the next joi
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -28,18 +26,11 @@ from eigassign.files import CASE, printable, read_bytes
 
 Floats = NDArray[np.float64]
 Number = float | str
+Inertial = tuple[float, Floats, Floats]  # mass, its centre, inertia about it, in the link's axes
 _MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 _TAKEN = {"ground", "start", "end"}
 _NOTHING = 1e-15  # kg m²: zeros of icub.urdf have products of up to 4e-18, which turns no body
 _LEVEL = 1e-9  # m: a joint this near to another one is at its place
-
-
-@dataclass(frozen=True)
-class _Frame:
-    """A link's frame where it differs from the URDF's: a beam runs along its own x axis."""
-
-    turn: Floats  # (3, 3), from the case's axes of the link to those of the URDF
-    end: str | None = None  # the joint at the end of the beam
 
 
 def urdf_mapping(
@@ -64,24 +55,37 @@ def urdf_mapping(
         raise UsageError(f"{path}: no link {', '.join(unknown)}; there are {', '.join(links)}")
     names = _identifiers(links, path)
     own = _identifiers([joint.name for joint in joints], path)
-    carried = {name: [j for j in joints if j.parent == name] for name in links}
-    frames = {n: _beam_frame(n, carried[n], path) if n in beams else _RIGID for n in links}
+    written: dict[str, Any] = {}
+    for name, inertial in links.items():
+        carried = {own[joint.name]: joint.place for joint in joints if joint.parent == name}
+        nodes = {"start": [0.0, 0.0, 0.0], **{key: at.tolist() for key, at in carried.items()}}
+        written[names[name]] = {"type": "rigid", "nodes": nodes, **_mass(inertial)}
+        if name in beams:
+            if len(carried) != 1 or min(map(np.linalg.norm, carried.values())) < _LEVEL:
+                what = "it has to carry one joint away from its own"
+                raise UsageError(f"{path}: link {name} cannot be a beam: {what}")
+            beam = {"from": "start", "to": next(iter(carried)), **beams[name]}
+            written[names[name]] = {"type": "frame", "nodes": nodes, "beams": {"beam": beam}}
     (root,) = set(links) - {joint.child for joint in joints}
-    written: dict[str, Any] = {
-        names[name]: {
-            "type": "beam",
-            "length": float(np.linalg.norm(_place(carried[name][0]))),
-            **beams[name],
+    ways: dict[str, Any] = {"ground": {"type": "fixed", "base": "ground"}}
+    ways["ground"] |= {"follower": f"{names[root]}.start", "position": [0.0, 0.0, 0.0]}
+    for joint in joints:
+        ways[own[joint.name]] = {
+            "type": _MOVING.get(joint.type, "fixed"),
+            "base": f"{names[joint.parent]}.{own[joint.name]}",
+            "follower": f"{names[joint.child]}.start",
+            **({"orientation": joint.turn.tolist()} if joint.turn.any() else {}),
+            **({"axis": joint.axis.tolist()} if joint.type in _MOVING else {}),
         }
-        if name in beams
-        else _rigid(link, carried[name], own)
-        for name, link in links.items()
-    }
-    mounting: dict[str, Any] = {"type": "fixed", "base": "ground"}
-    mounting |= {"follower": f"{names[root]}.start", "position": [0.0, 0.0, 0.0]}
-    mounting["orientation"] = _angles(frames[root].turn)
-    ways = {own[j.name]: _joint(j, frames, names, own) for j in joints}
-    moving = {own[j.name]: _drive(j, stiffness, path) for j in joints if j.type in _MOVING}
+    drives: dict[str, Any] = {}
+    for joint in joints:
+        if joint.type in _MOVING:
+            given = stiffness
+            if isinstance(stiffness, Mapping):
+                if joint.name not in stiffness:
+                    raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
+                given = stiffness[joint.name]
+            drives[own[joint.name]] = "free" if given is None else {"stiffness": given}
     named = {"sections": dict(sections or {}), "materials": dict(materials or {})}
     return {
         "title": title,
@@ -89,13 +93,21 @@ def urdf_mapping(
             "space": "spatial",
             **{key: value for key, value in named.items() if value},
             "links": written,
-            "joints": {"ground": mounting, **ways},
+            "joints": ways,
         },
-        "coordinates": {name: {"joint": name, "drive": drive} for name, drive in moving.items()},
+        "coordinates": {name: {"joint": name, "drive": drive} for name, drive in drives.items()},
     }
 
 
-_RIGID = _Frame(np.eye(3))
+def _mass(inertial: Inertial | None) -> dict[str, Any]:
+    """The keys of a rigid link for its mass."""
+    if inertial is None:
+        return {}
+    mass, center, I = inertial  # noqa: E741
+    tensor = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+    return {"mass": mass, "center": center.tolist(), "inertia": [float(value) for value in tensor]}
+
+
 STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
 OUTLOOK = """
 # A link that gives is a beam or a solid part in place of `type: rigid`: "eigassign docs own-arm",
@@ -119,17 +131,16 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
     content = urdf_mapping(path, {key: STANDING[joint.type] for key, joint in moving.items()})
     if not moving:
         raise UsageError(f"{path}: no joint moves: a robot of fixed joints has no coordinate")
-    notes: dict[int, str] = {}
-    steps = []
-    for k, joint in enumerate(moving.values()):
-        carried = [links[each].inertial for each in _beyond(joint.child, joints=joints)]
+    asked, steps = [], []
+    for joint, coordinate in zip(moving.values(), content["coordinates"].values(), strict=True):
+        carried = [links[each] for each in _beyond(joint.child, joints=joints)]
         if all(each is None or each[0] == 0.0 == np.abs(each[2]).max() for each in carried):
-            [*content["coordinates"].values()][k]["drive"] = "locked"
-            notes[k] = f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked"
+            coordinate["drive"] = "locked"
+            asked.append(f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked")
             steps.append((0.0, 0.0))
             continue
-        stands = STANDING[joint.type]
-        notes[k] = f"stiffness of the drive of {joint.name}: URDF has none; {stands} stands there"
+        unknown = f"stiffness of the drive of {joint.name}: URDF has none"
+        asked.append(f"{unknown}; {STANDING[joint.type]} stands there")
         lower, upper = joint.limits
         start = float(np.clip(0.0, lower, upper))
         step = 0.1 if joint.type == "prismatic" else 0.5
@@ -137,40 +148,34 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
         steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
     if not np.any(steps):
         raise UsageError(f"{path}: no joint moves a mass: give its links <inertial>")
-    for joint in content["mechanism"]["joints"].values():
-        if not any(joint["orientation"]):
-            del joint["orientation"]
     points = [[round(at, 6) for at in pose] for pose in zip(*steps, strict=True)]
     content["trajectory"] = {"points": points, "duration": "2 s"}
     first = f"# From {path.name}: masses, places and axes. What URDF does not know: # fill in\n"
     lines = (first + to_yaml(content)).splitlines()
-    below, asked = lines.index("coordinates:"), []
+    below = lines.index("coordinates:")
     rigid = [n for n in range(lines.index("  links:"), below) if "type: rigid" in lines[n]]
-    long = {joint.parent for joint in joints if np.linalg.norm(_place(joint)) > _LEVEL}
+    long = {joint.parent for joint in joints if np.linalg.norm(joint.place) > _LEVEL}
     wanted = [
         (n, f"flexibility of link {link}: URDF has none; rigid stands there")
         for n, link in zip(rigid, links, strict=True)
         if link in long
     ]
     places = [n for n in range(below, len(lines)) if re.search(r"\bdrive: [{l]", lines[n])]
-    motion = next(n for n, line in enumerate(lines) if line.startswith("trajectory:"))
-    wanted += zip(places, notes.values(), strict=True)
-    wanted.append(
-        (motion, "trajectory: poses between which the joints move; small steps stand there")
-    )
-    for n, note in wanted:
+    places.append(next(n for n, line in enumerate(lines) if line.startswith("trajectory:")))
+    asked.append("trajectory: poses between which the joints move; small steps stand there")
+    wanted += zip(places, asked, strict=True)
+    for n, _ in wanted:
         lines[n] += "  # fill in"
-        asked.append(f"{name}:{n + 1}: {note}")
-    name, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
+    coordinate, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
     unit = STANDING[joint.type].partition(" ")[2]
-    outlook = OUTLOOK.format(joint=name, low=f"5 {unit}", high=f"50 {unit}")
+    outlook = OUTLOOK.format(joint=coordinate, low=f"5 {unit}", high=f"50 {unit}")
     text = "\n".join(lines) + "\n" + outlook
     try:
         parse(text.encode(), path.with_suffix(".yaml"))
     except CaseError as error:
         problem = error.problems[0]
         raise UsageError(f"{path}: gives no case: {problem.path}: {problem.message}") from error
-    return text, asked
+    return text, [f"{name}:{n + 1}: {note}" for n, note in wanted]
 
 
 class _Joint(NamedTuple):
@@ -178,15 +183,10 @@ class _Joint(NamedTuple):
     type: str
     parent: str
     child: str
-    origin: Floats  # (4, 4)
+    place: Floats  # (3,)
+    turn: Floats  # (3,): roll, pitch and yaw
     axis: Floats  # (3,)
     limits: Floats  # lower and upper, infinite where there is none
-
-
-class _Link(NamedTuple):
-    """Mass, centre of mass and inertia about it in the link's axes; None without ``inertial``."""
-
-    inertial: tuple[float, Floats, Floats] | None
 
 
 class _Tree(ElementTree.TreeBuilder):
@@ -197,7 +197,7 @@ class _Tree(ElementTree.TreeBuilder):
         raise ValueError("a URDF file has no document type and no entities")
 
 
-def _parsed(path: Path) -> tuple[str, dict[str, _Link], list[_Joint]]:
+def _parsed(path: Path) -> tuple[str, dict[str, Inertial | None], list[_Joint]]:
     """Name, links and joints of a file without its meshes; raises UsageError, StorageError."""
     try:
         data = read_bytes(path, CASE)
@@ -246,18 +246,16 @@ def _numbers(element: ElementTree.Element | None, key: str, default: Sequence[fl
     return found
 
 
-def _origin(element: ElementTree.Element) -> Floats:
-    T, origin = np.eye(4), element.find("origin")
-    T[:3, 3] = _numbers(origin, "xyz", [0.0] * 3)
-    turn = Rotation.from_euler("xyz", _numbers(origin, "rpy", [0.0] * 3))
-    T[:3, :3] = turn.as_matrix()
-    return T
+def _origin(element: ElementTree.Element) -> tuple[Floats, Floats]:
+    """Its place (3,), and roll, pitch and yaw (3,)."""
+    origin = element.find("origin")
+    return _numbers(origin, "xyz", [0.0] * 3), _numbers(origin, "rpy", [0.0] * 3)
 
 
-def _link(element: ElementTree.Element) -> _Link:
+def _link(element: ElementTree.Element) -> Inertial | None:
     inertial = element.find("inertial")
     if inertial is None:
-        return _Link(None)
+        return None
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or inertia is None:
         raise ValueError(f"link {element.get('name')}: inertial needs mass and inertia")
@@ -267,9 +265,9 @@ def _link(element: ElementTree.Element) -> _Link:
     )
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     own *= np.abs(own).max() > _NOTHING
-    T = _origin(inertial)
-    of_link = T[:3, :3] @ own @ T[:3, :3].T
-    return _Link((float(_numbers(mass, "value", [0.0])[0]), T[:3, 3], of_link))
+    center, turn = _origin(inertial)
+    R = Rotation.from_euler("xyz", turn).as_matrix()
+    return float(_numbers(mass, "value", [0.0])[0]), center, R @ own @ R.T
 
 
 def _read_joint(element: ElementTree.Element) -> _Joint:
@@ -294,10 +292,10 @@ def _read_joint(element: ElementTree.Element) -> _Joint:
     if not lower < upper:  # as it is written where there are no limits: 0 and 0
         lower, upper = -np.inf, np.inf
     parent, child = (_text(element, key, "link") for key in ("parent", "child"))
-    return _Joint(name, kind, parent, child, _origin(element), axis, np.array([lower, upper]))
+    return _Joint(name, kind, parent, child, *_origin(element), axis, np.array([lower, upper]))
 
 
-def _require_tree(links: Mapping[str, _Link], joints: Sequence[_Joint], count: int) -> None:
+def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) -> None:
     """Raises ValueError for what is not one tree of joints that a case can have."""
     if len(links) != count or len({joint.name for joint in joints}) != len(joints):
         raise ValueError("two links or two joints have one name")
@@ -328,65 +326,3 @@ def _identifiers(names: Iterable[str], path: str | Path) -> dict[str, str]:
             f"rename {listed(twice)}"
         )
     return found
-
-
-def _beam_frame(name: str, carried: list[_Joint], path: str | Path) -> _Frame:
-    """Its x axis points at the one joint that the link carries; raises UsageError."""
-    if len(carried) != 1 or np.linalg.norm(_place(carried[0])) < _LEVEL:
-        raise UsageError(
-            f"{path}: link {name} cannot be a beam: it has to carry one joint away from its own"
-        )
-    x = _place(carried[0]) / np.linalg.norm(_place(carried[0]))
-    other = np.eye(3)[int(np.argmin(np.abs(x)))]
-    z = np.cross(x, other) / np.linalg.norm(np.cross(x, other))
-    return _Frame(np.column_stack([x, np.cross(z, x), z]), carried[0].name)
-
-
-def _rigid(link: _Link, carried: list[_Joint], joints: Mapping[str, str]) -> dict[str, Any]:
-    """A rigid link with a node for every joint that it carries."""
-    nodes = {joints[joint.name]: _place(joint).tolist() for joint in carried}
-    found: dict[str, Any] = {"type": "rigid", "nodes": {"start": [0.0, 0.0, 0.0], **nodes}}
-    if link.inertial is None:
-        return found
-    mass, center, I = link.inertial  # noqa: E741
-    tensor = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
-    inertia = [float(value) for value in tensor]
-    return {**found, "mass": mass, "center": center.tolist(), "inertia": inertia}
-
-
-def _joint(
-    joint: _Joint, frames: Mapping[str, _Frame], names: Mapping[str, str], own: Mapping[str, str]
-) -> dict[str, Any]:
-    """A joint between the frames that the case gives both links."""
-    base, follower = frames[joint.parent], frames[joint.child]
-    node = "end" if base.end is not None else own[joint.name]
-    turn = base.turn.T @ joint.origin[:3, :3] @ follower.turn
-    found = {
-        "type": _MOVING.get(joint.type, "fixed"),
-        "base": f"{names[joint.parent]}.{node}",
-        "follower": f"{names[joint.child]}.start",
-        "orientation": _angles(turn),
-    }
-    if joint.type in _MOVING:
-        found["axis"] = (follower.turn.T @ joint.axis).tolist()
-    return found
-
-
-def _drive(joint: _Joint, stiffness: Number | Mapping[str, Number | None], path: str | Path) -> Any:
-    if not isinstance(stiffness, Mapping):
-        return {"stiffness": stiffness}
-    if joint.name not in stiffness:
-        raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
-    given = stiffness[joint.name]
-    return "free" if given is None else {"stiffness": given}
-
-
-def _place(joint: _Joint) -> Floats:
-    return joint.origin[:3, 3]
-
-
-def _angles(turn: Floats) -> list[float]:
-    """[rx, ry, rz] in rad of Rz Ry Rx."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of upright axes, whose angles are not unique
-        return [float(a) for a in Rotation.from_matrix(turn).as_euler("xyz")]
