@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,6 @@ from eigassign.errors import EigassignError
 from eigassign.facts import number
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
-from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.run import run_figures
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
@@ -50,6 +48,9 @@ from eigassign.study.pictures.drawing import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import Motion, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
+
+if TYPE_CHECKING:
+    from eigassign.output.figures.graph import FigurePlan
 
 Floats = NDArray[np.float64]
 SHOWN = 6  # modes of which a page shows the shapes
@@ -107,6 +108,8 @@ class Result(Pictured):
 
     def plans(self) -> dict[str, FigurePlan]:
         """The figures of the report; that of the first target along the trajectory is the first."""
+        from eigassign.output.figures.run import run_figures
+
         plans = {plan.name: plan for plan in run_figures(self.results)}
         first = next((name for name in plans if name.startswith("assignment")), None)
         return plans if first is None else {first: plans[first], **plans}

@@ -21,7 +21,8 @@ from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import folder_name, printable
-from eigassign.output.reports import page as report
+from eigassign.output.documents import to_json
+from eigassign.output.result_files import sample_files
 from eigassign.output.store.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
 
@@ -96,8 +97,14 @@ class RunFolder:
         extra: Mapping[str, bytes] | None = None,
     ) -> None:
         """Results, report of this kind, figures in these formats; log; ``extra`` by name."""
-        report.write_run(results, self.hidden, formats, kind)
-        for name, data in {"log.txt": log_text(results).encode(), **(extra or {})}.items():
+        files = {"log.txt": log_text(results).encode(), **(extra or {})}
+        if formats or kind != "none":
+            from eigassign.output.reports.page import write_run
+
+            write_run(results, self.hidden, formats, kind)
+        else:  # without what draws
+            files |= {**sample_files(results), "results.json": to_json(results)}
+        for name, data in files.items():
             (self.hidden / name).write_bytes(data)
 
 

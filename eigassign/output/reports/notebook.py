@@ -8,17 +8,19 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from eigassign.errors import UsageError
-from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.paper import draw, render
-from eigassign.output.figures.style import applied, encoded
 from eigassign.output.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from eigassign.output.figures.graph import FigurePlan
+
 
 def drawn(plan: FigurePlan) -> Figure:
     """The figure of a plan; a notebook shows it, though pyplot never hears of it."""
+    from eigassign.output.figures.paper import draw
+    from eigassign.output.figures.style import applied, encoded
+
     figure = draw(plan)
 
     def png() -> bytes:
@@ -63,6 +65,8 @@ def html(lines: Sequence[str], tables: Sequence[Table] = (), plan: FigurePlan | 
     parts = [f"<p>{escape(line)}</p>" for line in lines]
     parts += [_table(table) for table in tables if table.rows]
     if plan is not None:
+        from eigassign.output.figures.paper import render
+
         image = base64.b64encode(render([plan])[f"{plan.name}.png"]).decode()
         parts.append(f'<img src="data:image/png;base64,{image}" alt="{escape(plan.alt)}">')
     return "\n".join(parts)
