@@ -31,7 +31,6 @@ from eigassign.mechanism.elements.sections import (
     beam_values,
     each_element,
 )
-from eigassign.mechanism.elements.superelement import solid_mesh, superelement_mesh
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology
@@ -49,8 +48,12 @@ def link_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name:
         case "frame":
             return _frame(case, parameters, name)
         case "superelement":
+            from eigassign.mechanism.elements.superelement import superelement_mesh
+
             return superelement_mesh(case, parameters, name)
         case "solid":
+            from eigassign.mechanism.elements.superelement import solid_mesh
+
             return solid_mesh(case, parameters, name)
     return _beam(case, parameters, tree, name)
 

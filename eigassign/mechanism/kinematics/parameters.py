@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
-from eigassign.mechanism.imports.parts import imported_part
 from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree, coordinates
-from eigassign.mechanism.solids.part import couplings
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, Scalar
 
@@ -204,10 +202,15 @@ def node_position(
     if name in named:
         given = named[name]
         place = getattr(given, "position", given)
-        if place is None and link_type(case, link) == "solid":  # the centre of its surface
+        if place is None and link_type(case, link) == "solid":
+            from eigassign.mechanism.solids.part import couplings
+
+            # the centre of its surface
             centre = couplings(data, f"mechanism.links.{link}")[1][name].place
             place = centre[: 2 if case.mechanism.space == "planar" else 3].tolist()
         elif place is None:
+            from eigassign.mechanism.imports.parts import imported_part
+
             place = imported_part(case, link).places[name]
         return parameters.vector(f"links.{link}.nodes.{name}", place)
     if name == "end":

@@ -55,7 +55,6 @@ from eigassign.mechanism.elements.beam import (
 )
 from eigassign.mechanism.elements.mesh import Entries, Strand
 from eigassign.mechanism.elements.sections import SHARES, STATIONS, BeamValues, Profile
-from eigassign.mechanism.elements.solid_stress import PAIRS
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -400,6 +399,8 @@ class _Acting:
         if self.spin is not None:
             for own, name, rho in zip(turned, model.solids, now.densities, strict=True):
                 w = _crossed(self.spin[model.names.index(name)])
+                from eigassign.mechanism.elements.solid_stress import PAIRS
+
                 own[:, 0] = [rho * (w @ w)[pair] for pair in PAIRS]
         stretched = np.asarray(self.pose.springs @ self.x).reshape(-1, 6, self.x.shape[1])
         springs = zip(now.spring_stiffness, stretched, strict=True)
