@@ -80,11 +80,10 @@ def urdf_mapping(
     drives: dict[str, Any] = {}
     for joint in joints:
         if joint.type in _MOVING:
-            given = stiffness
-            if isinstance(stiffness, Mapping):
-                if joint.name not in stiffness:
-                    raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
-                given = stiffness[joint.name]
+            by_joint = stiffness if isinstance(stiffness, Mapping) else {joint.name: stiffness}
+            if joint.name not in by_joint:
+                raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
+            given = by_joint[joint.name]
             drives[own[joint.name]] = "free" if given is None else {"stiffness": given}
     named = {"sections": dict(sections or {}), "materials": dict(materials or {})}
     return {
