@@ -81,7 +81,7 @@ class Case(built_case.BuiltCase):
     ) -> ModePictures:
         if mode < 1:
             raise UsageError(f"modes are numbered from 1, got {mode}")
-        at = queries.pose_and_design(self, q, y, beyond=True)
+        at = queries.pose_and_design(self, q, y)
         with self.located():
             return drawing.draw_modes(self.file, self.model(), *at, mode)
 

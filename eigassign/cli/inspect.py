@@ -122,7 +122,6 @@ def _described(name: str, answer: CheckAnswer) -> list[str]:
 )
 @arguments.case
 @arguments.pose
-@click.option("--beyond-bounds", is_flag=True, help="Accept a design outside its bounds.")
 @click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="How many.")
 @click.option("--draw", is_flag=True, help="Draw the mode shapes.")
 @arguments.out("results/<case>_modes; --out asks for the drawings too")
@@ -134,7 +133,6 @@ def modes(
     case: Path,
     q: str | None,
     y: str | None,
-    beyond_bounds: bool,
     count: int,
     as_json: bool,
     draw: bool,
@@ -152,11 +150,9 @@ def modes(
     draw = draw or how["out"] is not None or given is ParameterSource.COMMANDLINE
     with reporting(how) as reporter:
         if draw:
-            answer, folder = queries.draw_modes(
-                case, q, y, count, beyond_bounds, *(how[key] for key in _DRAWING)
-            )
+            answer, folder = queries.draw_modes(case, q, y, count, *(how[key] for key in _DRAWING))
         else:
-            answer = queries.modes(case, q, y, count, beyond_bounds, how["allow_outside"])
+            answer = queries.modes(case, q, y, count, how["allow_outside"])
         reporter.warn(answer.warnings)
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")

@@ -98,7 +98,6 @@ def modes(
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
     count: int = 3,
-    beyond_bounds: bool = False,
     allow_outside: bool = False,
 ) -> ModesAnswer:
     """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
@@ -106,11 +105,10 @@ def modes(
     Without ``q`` at the expansion point that the case gives, else where its trajectory starts;
     without ``y`` with the design as it is written in the file. Loads that trajectories set may
     stand behind the coordinates in ``q``; without them they are as written in the file. Raises
-    UsageError for wrong lengths or counts, where there is no pose to take, and for a design that
-    is neither within its bounds nor the initial one, unless ``beyond_bounds``.
+    UsageError for wrong lengths or counts, and where there is no pose to take.
     """
     case = load_case(path, allow_outside)
-    at_q, at_y = pose_and_design(case, q, y, beyond_bounds)
+    at_q, at_y = pose_and_design(case, q, y)
     with case.located():
         model = case.model()
         hz = model.frequencies(at_q, at_y, count)[0]
@@ -122,7 +120,6 @@ def draw_modes(
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
     count: int = 3,
-    beyond_bounds: bool = False,
     out: Path | None = None,
     force: bool = False,
     formats: Sequence[str] = ("png",),
@@ -133,7 +130,7 @@ def draw_modes(
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
     case = load_case(path, allow_outside)
-    at_q, at_y = pose_and_design(case, q, y, beyond_bounds)
+    at_q, at_y = pose_and_design(case, q, y)
     with new_run_folder(case.file, out, force, "_modes") as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
@@ -145,7 +142,6 @@ def pose_and_design(
     case: BuiltCase,
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
-    beyond: bool = False,
 ) -> tuple[Floats, Floats]:
     """The q and y of modes that are asked for, in SI; see `modes`. Raises UsageError."""
     q = coordinates(case.file, q) if isinstance(q, str) else q
@@ -155,22 +151,16 @@ def pose_and_design(
     if at_q.shape == (len(case.file.coordinates),):
         at_q = np.append(at_q, written_loads(case.file))
     at_y = np.asarray(case.initial_design if y is None else y, dtype=np.float64)
-    if not beyond and at_y.shape == case.initial_design.shape:
-        _refuse_beyond_bounds(case, at_y)
     return at_q, at_y
 
 
-def _refuse_beyond_bounds(case: BuiltCase, y: Floats) -> None:
+def _beyond_bounds(case: BuiltCase, y: Floats) -> Iterator[str]:
     columns, units = case.file.design.parameters.items(), case.file.design_units
-    for (name, column), unit, value, initial in zip(
-        columns, units, y, case.initial_design, strict=True
-    ):
+    for (name, column), unit, value in zip(columns, units, y, strict=True):
         slack = 1e-9 * max(abs(column.min), abs(column.max))
-        if not column.min - slack <= value <= column.max + slack and value != initial:
-            raise UsageError(
-                f"{name} = {value:g} {unit} is outside its bounds, {column.min:g} to "
-                f"{column.max:g} {unit}: --beyond-bounds allows it (beyond_bounds=True in Python)"
-            )
+        if not column.min - slack <= value <= column.max + slack:
+            bounds = f"{column.min:g} to {column.max:g} {unit}"
+            yield f"{name} = {value:g} {unit} is outside its bounds, {bounds}"
 
 
 def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
@@ -196,7 +186,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         weight.row,
         found,
         (*_between_nodes(case, q, y, len(hz)), *digits_lines(file), *weight.notes),
-        weight.warnings,
+        (*_beyond_bounds(case, y), *weight.warnings),
     )
 
 

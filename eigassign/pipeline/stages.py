@@ -24,7 +24,7 @@ from eigassign.files import folder_name, printable
 from eigassign.output.documents import to_json
 from eigassign.output.result_files import sample_files
 from eigassign.output.store.run_folder import run_folder
-from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
+from eigassign.study.results import RunResults
 
 
 def silent(_line: str) -> None:
@@ -139,7 +139,7 @@ def new_run_folder(
 
 
 def log_text(results: RunResults) -> str:
-    """Lines of what was run, chosen and warned of, and how long it took."""
+    """Lines of what was run, chosen, warned of and found, and how long it took."""
     lines = [
         f"eigassign {results.version}",
         f"case      {results.case.name}: {results.case.title}",
@@ -147,45 +147,7 @@ def log_text(results: RunResults) -> str:
         *(f"sha256    {digest} {name}" for name, digest in results.case.files.items()),
         *(f"note      {note}" for note in results.notes),
         *(f"warning   {warning}" for warning in results.warnings),
-        *_outcome_lines(results),
+        *([f"verdict   {found.verdict}: {found.reason}"] if (found := results.assignment) else []),
         *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
     ]
     return "".join(f"{printable(line)}\n" for line in lines)
-
-
-def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
-    for when in ("initial", "one_shot", "predicted", "exact"):
-        row = getattr(error, when)
-        if row is None:
-            continue
-        figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
-        yield f"distance  {when.replace('_', ' ')}{along}: {figures} from the target"
-
-
-def _outcome_lines(results: RunResults) -> Iterator[str]:
-    for row in results.design:
-        yield f"design    {row.name} = {row.optimal:.9g} {row.unit} (before: {row.initial:.9g})"
-    if results.error is not None:
-        yield from _distances(results.error, "")
-    for own in results.trajectories if len(results.trajectories) > 1 else ():
-        if own.error is not None:
-            yield from _distances(own.error, f" along {own.name!r}")
-    if results.assignment is not None:
-        yield from _assignment_lines(results.assignment)
-    found = results.assignment
-    if results.approximation_error is not None and found and found.method == "one_shot":
-        within = "within" if results.within_tolerance else "OVER"
-        error = f"{100 * results.approximation_error:.4g} %"
-        yield f"accuracy  predicted against exact: {error}, {within} {100 * results.tolerance:g} %"
-
-
-def _assignment_lines(row: AssignmentRow) -> Iterator[str]:
-    yield f"verdict   {row.verdict}: {row.reason}"
-    yield f"method    {row.method}, {row.objective}: {row.optimality.words}"
-    for k, step in enumerate(row.steps, 1):
-        design = ", ".join(f"{value:.9g}" for value in step.y)
-        kept = "taken" if step.taken else "given up"
-        yield (
-            f"step      {k}: objective {step.objective:.9g}, violation {step.violation:.3g}, "
-            f"region {step.radius:.3g}, {kept}, at ({design})"
-        )

@@ -45,11 +45,7 @@ def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
     log = (outcome.folder / "log.txt").read_text()
     for line in (
         "note      expansion point: q1 = 1.817 rad, q2 = 5.312 rad, from the case file",
-        "design    m2 = 0 kg (before: 0)",
-        "distance  initial: max 8.309 %",
         "verdict   reached: ",
-        "distance  one shot: max 1.548 %, rms 1.306 %",
-        "step      1: objective ",
         "time      verification: ",
     ):
         assert line in log
