@@ -5,9 +5,8 @@ Reading order:
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
     work      what a worker does: check a variant, run it, within its time
-    records   what of a batch is done; its lock, its summaries
     workers   where tasks run: this process, processes beside it, or the workers of a dask scheduler
-    runner    all of it together: start there
+    runner    all of it together, and what of a batch is done: start there
 """
 
 from eigassign.faces import face
@@ -16,8 +15,7 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "plan": "Variant cases_in folder_names plan_of variant_problem",
-        "records": "Batch",
-        "runner": "run",
+        "runner": "Batch run",
         "variants": "Variants variants_of",
         "work": "CaseOptions OutOfTimeError limited outcome_of run_case",
         "workers": "Workers process_pool this_machine",

@@ -19,7 +19,7 @@ from typing import Any
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
 from eigassign.case.loading import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
-from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges, to_plain
+from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_record import MARKER, read_record
 from eigassign.pipeline.run import Options, solve_case
 from eigassign.pipeline.stages import new_run_folder

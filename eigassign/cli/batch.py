@@ -16,9 +16,9 @@ from eigassign.files import folder_name
 
 if TYPE_CHECKING:
     from eigassign.batch.plan import BatchPlan
-    from eigassign.batch.records import Batch
+    from eigassign.batch.runner import Batch
     from eigassign.batch.workers import Workers
-    from eigassign.output.batch.outcome import CaseOutcome
+    from eigassign.output.batch.summary import CaseOutcome
     from eigassign.output.previous import EarlierResult
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
@@ -113,7 +113,7 @@ def _workers(scheduler: str | None, jobs: int | None) -> AbstractContextManager[
 
 
 def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
-    from eigassign.batch.records import Batch
+    from eigassign.batch.runner import Batch
     from eigassign.batch.work import CaseOptions
 
     options = CaseOptions(
@@ -178,8 +178,7 @@ def _cases(count: int) -> str:
 
 def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """Count the cases that would run."""
-    from eigassign.batch.records import done
-    from eigassign.batch.runner import require_valid
+    from eigassign.batch.runner import done, require_valid
 
     there = done(batch)
     todo = require_valid(batch, there, workers, reporter.stage)

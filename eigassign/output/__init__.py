@@ -21,8 +21,9 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "batch.index": "index_page write_files",
-        "batch.outcome": "CaseOutcome frequency_ranges from_plain to_plain",
-        "batch.summary": "batch_table summary_json",
+        "batch.summary": (
+            "CaseOutcome batch_table frequency_ranges from_plain summary_json to_plain"
+        ),
         "console": "markdown print_assignment print_tables print_verdict progress",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
         "figures.modes": "mode_figures thumbnail",

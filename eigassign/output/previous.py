@@ -16,7 +16,7 @@ from eigassign.case.schema.targets import TARGETS, HighestTarget
 from eigassign.errors import UsageError
 from eigassign.facts import Fact
 from eigassign.files import TABLE, json_value, read_bytes
-from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
+from eigassign.output.batch.summary import CaseOutcome, Range, from_plain, ranges
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.comparison import TRAJECTORY
 from eigassign.study.results import ValidationRow

@@ -2,7 +2,6 @@
 
 In reading order; each imports from those above it only:
 
-    outcome  how one case ended: a row of every file below
-    summary  summary.csv, summary.json and junit.xml, and the table on the console
+    summary  how one case ended, a row of every file; summary.csv, summary.json and junit.xml
     index    index.html: plots over what was swept, the rows to sort and filter; all files together
 """

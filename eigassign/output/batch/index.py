@@ -18,8 +18,9 @@ from eigassign.brief import cut
 from eigassign.case.units import QuantityError, handy, handy_unit, number_and_unit
 from eigassign.case.values import short_keys
 from eigassign.facts import capital, fact
-from eigassign.output.batch.outcome import NUMBERS, CaseOutcome
 from eigassign.output.batch.summary import (
+    NUMBERS,
+    CaseOutcome,
     Test,
     bare_names,
     quantity,
