@@ -29,7 +29,7 @@ __all__, __getattr__, __dir__ = face(
         "figures.modes": "mode_figures thumbnail",
         "figures.paper": "draw render",
         "figures.run": "run_figures",
-        "figures.screen": "screen_figures",
+        "figures.screen": "screen_figure",
         "previous": "EarlierResult Known",
         "reports.chart": "chart_tables write_chart",
         "reports.page": "page write_modes write_run",

@@ -19,7 +19,7 @@ from eigassign.output import (
     page,
     run_figures,
     run_tables,
-    screen_figures,
+    screen_figure,
     write_run,
 )
 
@@ -101,18 +101,18 @@ def test_every_figure_is_inside_with_its_alternative_text_and_caption():
         assert plan.caption in parsed.text
 
 
-def test_a_full_report_plots_every_description_and_lists_its_numbers():
+def test_a_full_report_plots_every_description_and_saves_its_numbers():
     results = studied(make_results())
     html, parsed, _ = made(results, full=True)
-    plots = [a["data-figure"] for tag, a in parsed.tags if a.get("data-part") == "0"]
+    plots = [a["data-figure"] for tag, a in parsed.tags if a.get("data-figure")]
     plans = [plan for plan in run_figures(results) if not callable(plan.shows)]
     assert plots == [plan.name for plan in plans]
     assert list(island(html, "figures")) == plots
-    assert html.count("<summary>Numbers</summary>") == len(plots)
-    curves = {c["name"]: c["y"] for c in island(html, "figures")["frequencies"][0]["data"]}
+    assert [a["data-csv"] for tag, a in parsed.tags if a.get("data-csv")] == plots
+    curves = {c["name"]: c["y"] for c in island(html, "figures")["frequencies"]["data"]}
     target = results.targets[0]
     assert curves["mode 1 at 190 Hz"][0] == target.target_hz[0]
-    initial = island(html, "figures")["frequencies"][0]["data"]
+    initial = island(html, "figures")["frequencies"]["data"]
     before = next(c for c in initial if c["name"] == "mode 1, initial design")
     assert before["y"][0] == pytest.approx(target.initial_hz[0], rel=1e-6)
     assert before["hovertemplate"].endswith("Hz")
@@ -203,7 +203,7 @@ def test_many_samples_keep_a_report_small_and_their_extremes():
     curve = Curve(y, Look("#000000"), label="measured")
     shade = Shade(y - 1.0, y + 1.0, "#00ff00")
     shown = Graph("measured", "t (s)", t, (Panel("f (Hz)", (shade, curve)),))
-    (figure,) = screen_figures(shown)
+    figure = screen_figure(shown)
     filled, line = figure["data"]
     assert len(line["x"]) == len(line["y"]) <= 600
     assert (min(line["y"]), max(line["y"])) == (-4.0, 5.0)

@@ -2,7 +2,7 @@
 
 In reading order; each imports from those above it only:
 
-    graph          what a graph shows, whoever draws it: curves, shades, bars, maps; its limits
+    graph          what a graph shows, whoever draws it: curves, shades, rules; its limits
     style          matplotlib: the style sheet, an empty figure, file formats
     paper          descriptions drawn with matplotlib, and figures as files
     curves         curves over time: what was asked, coordinates, drives; the steps of the search
@@ -10,7 +10,7 @@ In reading order; each imports from those above it only:
     meaning        sensitivities, reach and tolerance
     scene          the mechanism as parts at places: links as thick as their sections, symbols
     mechanism      the parts drawn with matplotlib; poses along the trajectory
-    screen         descriptions as Plotly's data, their tables; the scene for a page
+    screen         descriptions as Plotly's data; the scene for a page
     modes          mode shapes, and the mechanism by itself
     run            which figures a run has
     update         measured frequencies against the model, parameters with intervals

@@ -1,12 +1,11 @@
 """Expansion against exact frequencies over time and over entries of q or y (the paper's Figure 3).
 
-Over two entries there are maps, else curves: frequency above, errors below.
+Frequency above, errors below; over one of two entries the worst of all values of the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +16,13 @@ from eigassign.output.figures import graph
 from eigassign.output.figures.curves import suffix
 from eigassign.output.figures.graph import (
     Curve,
-    Field,
     FigurePlan,
     Graph,
     Look,
-    Maps,
     Mark,
     Panel,
     Rule,
+    Shade,
     labelled,
     short,
 )
@@ -52,32 +50,26 @@ def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> 
 def over_entries(
     study: ModeStudy, over: DesignMap | None, x0: Floats, names: Sequence[str], kind: str
 ) -> Iterator[FigurePlan]:
-    """The figure over ``over``, if there is something on it.
+    """A figure for each entry of ``over``, if there is something on it.
 
-    ``x0`` is the expansion point in the coordinates ``names``; ``kind`` ends the file's name.
+    ``x0`` is the expansion point in the coordinates ``names``; ``kind`` ends the files' names.
     """
     if over is None or not over.axes or min(axis.size for axis in over.axes) < 2:
         return
-    shown_in = [
-        handy_unit(unit, axis[0], axis[-1])
-        for unit, axis in zip(over.units, over.axes, strict=True)
-    ]
-    sizes = {name: size for name, (_, size) in zip(over.names, shown_in, strict=True)}
-    point = np.array([x0[names.index(n)] / sizes[n] for n in over.names if n in names])
-    over = replace(
-        over,
-        units=tuple(unit for unit, _ in shown_in),
-        axes=tuple(a / size for a, size in zip(over.axes, sizes.values(), strict=True)),
-    )
-    shown = " and ".join(over.names)
-    describe = _over_one if len(over.axes) == 1 else _over_two
-    yield FigurePlan(
-        f"approximation_mode_{study.mode}_{kind}",
-        f"Mode {study.mode}: expansion over {shown}",
-        f"All else at the expansion point. {_errors(over.values)}",
-        f"Exact frequency of mode {study.mode} and expansion errors over {shown}.",
-        describe(study, over, point),
-    )
+    for k, (name, unit, axis) in enumerate(zip(over.names, over.units, over.axes, strict=True)):
+        unit, size = handy_unit(unit, axis[0], axis[-1])
+        point = [x0[names.index(name)] / size] if name in names else []
+        title = f"Mode {study.mode}: expansion against exact over {short(name)}"
+        other = "".join(f", worst over {short(n)}" for n in over.names if n != name)
+        yield FigurePlan(
+            f"approximation_mode_{study.mode}_{kind}{'' if k == 0 else f'_{k + 1}'}",
+            f"Mode {study.mode}: expansion over {name}",
+            f"All else at the expansion point{other}. {_errors(over.values)}",
+            f"Exact frequency of mode {study.mode} and expansion errors over {name}{other}.",
+            _compared(
+                title, labelled(short(name), unit), axis / size, study, over.values, point, k
+            ),
+        )
 
 
 def _errors(comparison: Comparison) -> str:
@@ -88,68 +80,63 @@ def _errors(comparison: Comparison) -> str:
     )
 
 
-def _over_one(study: ModeStudy, over: DesignMap, point: Floats) -> Graph:
-    """Curves over one entry, the expansion point marked."""
-    name = short(over.names[0])
-    title = f"Mode {study.mode}: expansion against exact over {name}"
-    x_label = labelled(name, over.units[0])
-    return _compared(title, x_label, over.axes[0], study, over.values, point)
-
-
 def _compared(
     title: str,
     x_label: str,
     x: Floats,
     study: ModeStudy,
     comparison: Comparison,
-    points: Floats | Sequence[float] = (),
+    points: Sequence[float] = (),
+    along: int = 0,
 ) -> Graph:
-    """Frequency above, magnitude of the relative errors below; ``points`` are upright lines."""
-    taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
-    taylor_label = f"Taylor, order {study.order} (worst {percent(taylor)})"
-    linearised_label = f"linearised in y (worst {percent(linearised)})"
-    uprights = [float(at) for at in points if x.min() <= at <= x.max()]
-    frequencies: tuple[Mark, ...] = (
-        Curve(comparison.exact_hz, EXACT, "exact"),
-        Curve(comparison.taylor_hz, TAYLOR, taylor_label),
-        Curve(comparison.linearised_hz, LINEARISED, linearised_label),
-        *(Rule(at, POINT, "expansion point", upright=True) for at in uprights),
+    """Frequency above, magnitude of the relative errors below; ``points`` are upright lines.
+
+    ``x`` is the axis ``along`` of the comparison; of another one the range and the worst.
+    """
+    exact, *both = (
+        np.moveaxis(values, along, 0).reshape(x.size, -1)
+        for values in (comparison.exact_hz, comparison.taylor_error, comparison.linearised_error)
     )
-    errors: tuple[Mark, ...] = (
-        Curve(100.0 * np.abs(comparison.taylor_error), TAYLOR),
-        Curve(100.0 * np.abs(comparison.linearised_error), LINEARISED),
-        *(Rule(at, POINT, upright=True) for at in uprights),
+    taylor_label = f"Taylor, order {study.order} (worst {percent(comparison.worst_taylor)})"
+    linearised_label = f"linearised in y (worst {percent(comparison.worst_linearised)})"
+    uprights = [float(at) for at in points if x.min() <= at <= x.max()]
+    single = exact.shape[1] == 1
+    frequencies: tuple[Mark, ...] = (
+        (
+            Curve(comparison.exact_hz, EXACT, "exact"),
+            Curve(comparison.taylor_hz, TAYLOR, taylor_label),
+            Curve(comparison.linearised_hz, LINEARISED, linearised_label),
+        )
+        if single
+        else (Shade(*_range(exact), EXACT.colour, "exact", 0.5),)
+    )
+    labels = ("", "") if single else (taylor_label, linearised_label)
+    errors: tuple[Mark, ...] = tuple(
+        Curve(100.0 * _range(np.abs(error))[1], look, label)
+        for error, look, label in zip(both, (TAYLOR, LINEARISED), labels, strict=True)
     )
     panels = (
-        Panel("frequency [Hz]", frequencies, 1.9),
-        Panel("|error| [%]", errors, 1.35, logarithmic=True),
+        Panel(
+            "frequency [Hz]",
+            (*frequencies, *(Rule(at, POINT, "expansion point", upright=True) for at in uprights)),
+            1.9,
+            holds=_range(exact),
+        ),
+        Panel(
+            "|error| [%]",
+            (*errors, *(Rule(at, POINT, upright=True) for at in uprights)),
+            1.35,
+            logarithmic=True,
+        ),
     )
     return Graph(title, x_label, x, panels)
 
 
-def _over_two(study: ModeStudy, over: DesignMap, point: Floats) -> Maps:
-    """Exact frequency and both errors side by side, the expansion point marked on each."""
-    values, names = over.values, " and ".join(short(n, 30) for n in over.names)
-    found = (
-        (f"Taylor, order {study.order}", values.taylor_error, values.worst_taylor),
-        ("linearised in y", values.linearised_error, values.worst_linearised),
+def _range(values: Floats) -> tuple[Floats, Floats]:
+    """The lowest and highest finite value of each row, NaN where there is none."""
+    none = ~np.isfinite(values).any(axis=1)
+    low, high = (
+        np.nanmin(values, axis=1, initial=np.inf),
+        np.nanmax(values, axis=1, initial=-np.inf),
     )
-    x_label, y_label = (labelled(short(over.names[k], 20), over.units[k]) for k in (0, 1))
-    return Maps(
-        title=f"Mode {study.mode}: expansion against exact over {names}",
-        labels=(x_label, y_label),
-        axes=(over.axes[0], over.axes[1]),
-        fields=(
-            Field(("exact", "frequency [Hz]"), values.exact_hz),
-            *(
-                Field(
-                    (what, f"|error| [%], worst {percent(worst)}"),
-                    100.0 * np.abs(error),
-                    holds=(0.0, 1e-10),  # %: a map never zooms in on less
-                )
-                for what, error, worst in found
-            ),
-        ),
-        point=point if point.size == 2 else None,
-        point_label="expansion point",
-    )
+    return np.where(none, np.nan, low), np.where(none, np.nan, high)

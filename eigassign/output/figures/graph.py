@@ -1,4 +1,4 @@
-"""What a graph shows, whoever draws it: curves, shades and points over a common abscissa; maps.
+"""What a graph shows, whoever draws it: curves, shades and points over a common abscissa.
 
 A figure is described once. `paper` draws it with matplotlib as a file, `screen` writes it for a
 browser; what can be read off it, its limits and the words on it are settled here.
@@ -174,50 +174,6 @@ class Graph:
     clock: str | None = None  # the trajectory whose time the abscissa is, "" of a single one
 
 
-@dataclass(frozen=True, eq=False)
-class BarGroup:
-    """Bars of one colour: ``mean`` (n,) with whiskers to ``most`` (n,), NaN where there is none."""
-
-    label: str
-    colour: str
-    mean: Floats
-    most: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Bars:
-    """Lying bars, a group of them at each name, from zero."""
-
-    title: str
-    label: str
-    names: tuple[str, ...]
-    groups: tuple[BarGroup, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """Values (n_1, n_2) over two axes; ``holds`` are values that the scale has to hold."""
-
-    heading: tuple[str, str]
-    values: Floats
-    holds: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Maps:
-    """Fields side by side over the same two axes, one point marked on each."""
-
-    title: str
-    labels: tuple[str, str]
-    axes: tuple[Floats, Floats]
-    fields: tuple[Field, ...]
-    point: Floats | None = None
-    point_label: str = ""
-
-
-Description = Graph | Bars | Maps
-
-
 @dataclass(frozen=True)
 class FigurePlan:
     """One figure: its file's name without ending, heading, caption, alternative text, content.
@@ -230,9 +186,18 @@ class FigurePlan:
     heading: str
     caption: str
     alt: str
-    shows: Description | Callable[[], Figure]
+    shows: Graph | Callable[[], Figure]
     section: str = "appendix"
     title: str = ""
+
+
+def segments(
+    at: Floats, low: Floats, high: Floats, look: Look, label: str = "", lying: bool = False
+) -> Curve:
+    """Lines from low to high, upright or lying."""
+    gap = np.full(at.size, np.nan)
+    ends, places = (np.stack(parts, axis=1).ravel() for parts in ((low, high, gap), (at, at, at)))
+    return Curve(places, look, label, ends) if lying else Curve(ends, look, label, places)
 
 
 # --- Limits and places

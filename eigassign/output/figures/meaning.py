@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from eigassign.facts import capital, percent
 from eigassign.output.figures import graph
-from eigassign.output.figures.curves import OPTIMAL, TARGET
+from eigassign.output.figures.curves import LEVEL, OPTIMAL, TARGET
 from eigassign.output.figures.graph import (
-    BarGroup,
-    Bars,
     Curve,
     FigurePlan,
     Graph,
+    Look,
+    Mark,
     Panel,
+    Rule,
     Shade,
+    segments,
 )
 from eigassign.study.results import (
     RangeRow,
@@ -43,7 +46,7 @@ def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
 
 
 def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePlan:
-    """(y/f) ∂f/∂y of every parameter and target: a group of bars a parameter, one colour a target.
+    """(y/f) ∂f/∂y of every parameter and target: a group of lines a parameter, a colour a target.
 
     Of many parameters the ``most`` with the largest shares, in the order of the design.
     """
@@ -53,30 +56,43 @@ def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePla
         largest[row.parameter] = max(share, largest.get(row.parameter, 0.0))
     chosen = sorted(largest, key=lambda name: -largest[name])[:most]
     names = tuple(name for name in largest if name in chosen)
-    groups = []
-    for k, label in enumerate(dict.fromkeys(row.label for row in rows)):
-        own = {row.parameter: row for row in rows if row.label == label}
-        shares = [
-            (own[n].percent_per_percent, own[n].percent_per_percent_largest)
-            if n in own
-            else (np.nan, np.nan)
-            for n in names
+    labels = list(dict.fromkeys(row.label for row in rows))
+    marks: list[Mark] = [Rule(0.0, LEVEL, upright=True)]
+    for k, label in enumerate(labels):
+        own = [row for row in rows if row.label == label and row.parameter in names]
+        at = (0.4 - 0.8 * (k + 0.5) / len(labels)) - np.array(
+            [names.index(r.parameter) for r in own]
+        )
+        mean = np.array([row.percent_per_percent for row in own])
+        worst = np.array([row.percent_per_percent_largest for row in own])
+        look = graph.series(k)
+        colour = replace(look, dash="solid", width=2.2)
+        dot = Look(look.colour, 0.0, marker="o", size=5.0)
+        marks += [
+            segments(at, mean, worst, LEVEL, lying=True),
+            segments(at, np.zeros(at.size), mean, colour, lying=True),
+            Curve(at, dot, label, mean, names=tuple(f"{row.parameter}, {label}" for row in own)),
         ]
-        mean, worst = np.array(shares).T
-        groups.append(BarGroup(label, graph.SERIES[k % len(graph.SERIES)], mean, worst))
+    low, high = graph.bounds([mark.x for mark in marks if isinstance(mark, Curve)])
+    room = 0.05 * (high - low)
+    tall = float(np.clip(0.16 * len(names) * (len(labels) + 1), 1.2, 6.0))
+    ends = (np.array([0.5, 0.5 - len(names)]),)
+    panel = Panel("", tuple(marks), tall, holds=ends, names=names)
     count = len(largest)
     of_many = "" if count == len(names) else f"; the {len(names)} largest of {count} parameters"
     return FigurePlan(
         "sensitivity",
         "Sensitivity",
-        "By how many % a frequency changes at the answer when a parameter changes by 1 %: bars are "
-        "means over the samples, whiskers reach to the largest"
-        f"{of_many}.",
-        "Bars of the relative sensitivity of each target to each parameter.",
-        Bars("Sensitivity of the frequencies", "% per %", names, tuple(groups)),
+        "By how many % a frequency changes at the answer when a parameter changes by 1 %: dots are "
+        f"means over the samples, thin lines reach to the largest{of_many}.",
+        "Lines as long as the relative sensitivity of each target to each parameter.",
+        Graph(
+            "Sensitivity of the frequencies", "% per %", np.zeros(0), (panel,),
+            x_limits=(low - room, high + room),
+        ),
         "depends",
         "Sensitivity",
-    )
+    )  # fmt: skip
 
 
 def ranges(

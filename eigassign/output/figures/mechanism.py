@@ -315,7 +315,7 @@ def draw_poses(results: RunResults) -> Figure:
     shown, held = results.poses, extent(results.poses)
     spatial, colours = held.view.spatial, _colours(len(shown.lines))
     title = f"{short(results.case.title, 70)}: poses along the trajectory"
-    figure = style.new_figure(title, 4.0, layout=None)
+    figure = style.new_figure(title, 4.0)
     key = figure.legend(handles=_entries(shown, colours), loc="upper left")
     left, foot = (0.2, 0.8) if spatial else (0.75, 0.5)  # inches
     wide = style.WIDTH_IN - left - key.get_window_extent().width / figure.dpi - 0.2

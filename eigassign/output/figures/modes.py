@@ -42,7 +42,7 @@ def _sheet(
     """
     wide = width - 0.6
     height = float(np.clip(wide * held.size[1] / held.size[0], *tall))
-    figure = style.new_figure(title, foot + height + 0.46, width, layout=None)
+    figure = style.new_figure(title, foot + height + 0.46, width)
     drawing = held.drawing(figure, (0.3, foot, wide, height), room)
     drawing.axes.set_axis_off()
     draw_bearings(figure, drawing, 0.1, 0.08)
@@ -137,7 +137,7 @@ def thumbnail(pictures: ModePictures) -> bytes:
     """A small picture of the first mode, for a gallery; PNG."""
     width, height = 3.2, 2.1
     with style.applied():
-        figure = style.new_figure("", height, width, layout=None)
+        figure = style.new_figure("", height, width)
         box = (0.16, 0.42, width - 0.32, height - 0.54)
         _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, 0)
         _note(figure, f"mode 1: {pictures.frequencies_hz[0]:.4g} Hz", 0.06, 0.11)

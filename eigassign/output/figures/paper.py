@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from eigassign.output.figures import graph, style
 from eigassign.output.figures.graph import (
-    BLACK,
-    Bars,
     Curve,
     FigurePlan,
     Graph,
     Look,
-    Maps,
     Panel,
     Rule,
     Shade,
@@ -60,29 +57,26 @@ def draw(plan: FigurePlan) -> Figure:
 
 def _drawn_plan(plan: FigurePlan) -> Figure:
     shown = plan.shows
-    if isinstance(shown, Graph):
-        return _graph(shown)
-    if isinstance(shown, Bars):
-        return _bars(shown)
-    return _maps(shown) if isinstance(shown, Maps) else shown()
+    return _graph(shown) if isinstance(shown, Graph) else shown()
 
 
 # --- Graphs
 
+LEFT, RIGHT, BOTTOM, GAP = 0.8, 0.15, 0.55, 0.15  # inches around the panels, and between them
+ROW, LETTER = 0.18, 0.075  # inches of a line of the legend, and of a letter
+
 
 def _graph(shown: Graph) -> Figure:
     heights = [panel.height for panel in shown.panels]
-    tall = sum(heights) + 0.15 * len(heights) + 1.1
+    labels = [mark.label for panel in shown.panels for mark in panel.marks if mark.label]
+    labels += [name for panel in shown.panels for name, _ in panel.key]
+    rows = 0 if shown.beside else -(-len(labels) // style.columns(labels))
+    above = 0.4 + ROW * rows  # with the title
+    tall = above + sum(heights) + GAP * (len(heights) - 1) + BOTTOM
     if shown.beside:
-        entries = sum(bool(mark.label) for panel in shown.panels for mark in panel.marks)
-        tall = max(4.9, 0.2 * (entries + 3) + 0.4)  # inches; 0.2 a line of the legend
+        tall = max(tall, 0.8 + ROW * (len(labels) + 3))
     figure = style.new_figure(shown.title, tall)
-    found = figure.subplots(
-        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-    )
-    panels = list(found[:, 0])
-    panels[-1].set_xlabel(shown.x_label)
-    figure.align_ylabels()
+    panels = _placed(figure, shown, tall - above)
     for axes, panel in zip(panels, shown.panels, strict=True):
         _ordinate(axes, panel)
     if shown.x_limits is not None:
@@ -97,10 +91,33 @@ def _graph(shown: Graph) -> Figure:
     for axes, panel in zip(panels, shown.panels, strict=True):
         handles += _drawn(axes, panel, shown)
     if shown.beside:
-        _key_beside(figure, handles)
+        _key_beside(figure, panels, handles)
     elif handles:
-        style.legend_above(panels[0], [handle for _, handle in handles])
+        panels[0].legend(
+            handles=[handle for _, handle in handles], loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            ncols=style.columns(labels),
+        )  # fmt: skip
     return figure
+
+
+def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
+    """Axes one below the other from ``top`` inches, with room for names at their sides."""
+    width, tall = figure.get_size_inches()
+    names = [short(name) for panel in shown.panels for name in panel.names]
+    ends = [curve.end for panel in shown.panels for curve in panel.curves]
+    left = max(LEFT, 0.2 + LETTER * max(map(len, names), default=0))
+    wide = width - left - RIGHT - LETTER * max(map(len, ends), default=0)
+    found: list[Axes] = []
+    for panel in shown.panels:
+        box = (left / width, (top - panel.height) / tall, wide / width, panel.height / tall)
+        axes = figure.add_axes(box, sharex=found[0] if found else None)
+        axes.yaxis.set_label_coords((0.2 - left) / wide, 0.5)
+        axes.tick_params(labelbottom=panel is shown.panels[-1])
+        found.append(axes)
+        top -= panel.height + GAP
+    found[-1].set_xlabel(shown.x_label)
+    found[-1].xaxis.set_label_coords(0.5, -0.37 / shown.panels[-1].height)
+    return found
 
 
 def _ordinate(axes: Axes, panel: Panel) -> None:
@@ -182,7 +199,7 @@ def _rule(axes: Axes, rule: Rule) -> Any:
     return line
 
 
-def _key_beside(figure: Figure, handles: Sequence[tuple[str, Any]]) -> None:
+def _key_beside(figure: Figure, panels: Sequence[Axes], handles: Sequence[tuple[str, Any]]) -> None:
     """A legend to the right, its groups headed by their names where there are several.
 
     What lies on top comes first.
@@ -198,9 +215,15 @@ def _key_beside(figure: Figure, handles: Sequence[tuple[str, Any]]) -> None:
             bold.append(len(entries))
             entries.append(Line2D([], [], linestyle="none", label=group))
         entries += own
-    key = figure.legend(handles=entries, loc="outside right upper", handlelength=1.6)
+    width, tall = figure.get_size_inches()
+    at = (1.0 - 0.05 / width, 1.0 - 0.35 / tall)
+    key = figure.legend(handles=entries, loc="upper right", bbox_to_anchor=at, handlelength=1.6)
     for place in bold:
         key.get_texts()[place].set_fontweight("bold")
+    end = key.get_window_extent().x0 / figure.bbox.width - 0.1 / width
+    for axes in panels:
+        box = axes.get_position()
+        axes.set_position((box.x0, box.y0, end - box.x0, box.height))
 
 
 def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bool = False) -> None:
@@ -215,66 +238,3 @@ def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bo
     axis.set_major_formatter(
         FuncFormatter(lambda at, _: ("≤" if cut and at <= low else "") + graph.power(at))
     )
-
-
-# --- Bars
-
-
-def _bars(shown: Bars) -> Figure:
-    """A group of bars a name, one colour a group of them."""
-    height = float(np.clip(0.16 * len(shown.names) * (len(shown.groups) + 1), 1.2, 6.0))
-    figure = style.new_figure(shown.title, height + 1.25)
-    axes = figure.subplots()
-    axes.set_xlabel(shown.label)
-    width = 0.8 / len(shown.groups)
-    for k, group in enumerate(shown.groups):
-        there = np.isfinite(group.mean)
-        at = np.flatnonzero(there) + (k + 0.5) * width - 0.4
-        look: dict[str, Any] = {"color": group.colour, "label": short(group.label, 60)}
-        axes.barh(at, group.mean[there], 0.85 * width, **look)
-        axes.hlines(at, group.mean[there], group.most[there], color=BLACK, linewidth=0.8)
-    axes.axvline(0.0, color=BLACK, linewidth=0.8)
-    axes.set_yticks(range(len(shown.names)), [short(name) for name in shown.names])
-    axes.set_ylim(len(shown.names) - 0.5, -0.5)
-    axes.margins(x=0.05)
-    style.legend_above(axes, axes.get_legend_handles_labels()[0])
-    return figure
-
-
-# --- Maps
-
-
-def _maps(shown: Maps) -> Figure:
-    figure = style.new_figure(shown.title, 3.2)
-    panels = figure.subplots(1, len(shown.fields), sharex=True, sharey=True)
-    for axes, field in zip(panels, shown.fields, strict=True):
-        held = graph.bounds([field.values, np.array(field.holds)])
-        _contours(figure, axes, shown.axes, field.values, held)
-        axes.set_title("\n".join(field.heading))
-        axes.set_xlabel(shown.labels[0], loc="left")  # a power of ten stands at the right
-        if shown.point is not None:
-            (dot,) = axes.plot(
-                *shown.point, "o", markersize=5.5, markerfacecolor="white", markeredgecolor=BLACK,
-                label=shown.point_label,
-            )  # fmt: skip
-        axes.set(xlim=shown.axes[0][[0, -1]], ylim=shown.axes[1][[0, -1]])
-    panels[0].set_ylabel(shown.labels[1])
-    panels[0].locator_params(axis="x", nbins=3)
-    panels[0].ticklabel_format(scilimits=(-2, 4))
-    if shown.point is not None:
-        figure.legend(handles=[dot], loc="outside lower left")
-    return figure
-
-
-def _contours(
-    figure: Figure, axes: Axes, grids: Sequence[Floats], values: Floats, held: tuple[float, float]
-) -> None:
-    """Bands between round levels that enclose ``held``, with a bar that names the levels."""
-    from matplotlib.ticker import MaxNLocator
-
-    levels = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]).tick_values(*held)
-    bands = axes.contourf(*grids, np.ma.masked_invalid(values.T), levels=levels)
-    axes.grid(visible=False)
-    bar = figure.colorbar(bands, ax=axes, aspect=14, pad=0.03, format="{x:g}")
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=0.0, labelsize=style.SMALL_PT)

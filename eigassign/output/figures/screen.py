@@ -1,29 +1,21 @@
 """Descriptions written for a browser: the data and layout of Plotly figures, as plain numbers.
 
-Colours of paper and ink are left to the page, which knows whether it is dark. Of several fields
-each is a figure of its own, so that they stand one below the other on a narrow screen. Beside each
-figure stands a table of some of its numbers.
+Colours of paper and ink are left to the page, which knows whether it is dark.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import repeat
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.facts import number
 from eigassign.output.figures import graph, mechanism, scene
 from eigassign.output.figures.graph import (
-    Bars,
     Curve,
-    Description,
-    Field,
     Graph,
     Look,
-    Maps,
     Panel,
     Rule,
     Shade,
@@ -45,15 +37,6 @@ _DASHES = {
 }
 _NAMED = "%{text}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
 _MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "p": "pentagon"}
-
-
-def screen_figures(shown: Description) -> list[Json]:
-    """``data`` and ``layout`` of each figure that a description is on screen."""
-    if isinstance(shown, Graph):
-        return [_graph(shown)]
-    if isinstance(shown, Bars):
-        return [_bars(shown)]
-    return [_field(shown, field) for field in shown.fields]
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
@@ -82,7 +65,8 @@ def _plotted(*ys: Floats, most: int = 600) -> NDArray[np.intp]:
 # --- Graphs
 
 
-def _graph(shown: Graph) -> Json:
+def screen_figure(shown: Graph) -> Json:
+    """``data`` and ``layout`` of a graph on screen."""
     heights = np.array([panel.height for panel in shown.panels])
     gap = 0.07  # between panels
     free = 1.0 - gap * (len(heights) - 1)
@@ -244,129 +228,6 @@ def _note(rule: Rule, axis: str) -> Iterator[Json]:
             "text": short(rule.note, 60), "x": 0.0, "xref": "paper", "xanchor": "left", "y": at,
             "yref": axis, "yanchor": "bottom", "showarrow": False,
         }  # fmt: skip
-
-
-# --- Bars and maps
-
-
-def _bars(shown: Bars) -> Json:
-    names = [short(name) for name in shown.names]
-    data = []
-    for group in shown.groups:
-        beyond = group.most - group.mean
-        whisker = {
-            "type": "data", "symmetric": False, "array": _numbers(np.maximum(beyond, 0.0)),
-            "arrayminus": _numbers(np.maximum(-beyond, 0.0)), "thickness": 1, "width": 0,
-            "color": graph.BLACK,
-        }  # fmt: skip
-        data.append(
-            {"type": "bar", "orientation": "h", "x": _numbers(group.mean), "y": names,
-             "name": short(group.label, 60), "marker": {"color": group.colour},
-             "error_x": whisker, "hovertemplate": "%{y}: %{x:.4~g}", "showlegend": True}
-        )  # fmt: skip
-    tall = max(100, 22 * len(names) * (len(shown.groups) + 1)) + _ROOM
-    layout = {
-        "barmode": "group",
-        "bargap": 0.5,
-        "xaxis": {"title": {"text": shown.label}, "zeroline": True},
-        "yaxis": {"autorange": "reversed", "automargin": True, "type": "category"},
-        "height": tall,
-    }
-    return {"data": data, "layout": layout}
-
-
-def _field(shown: Maps, field: Field) -> Json:
-    low, high = graph.bounds([field.values, np.array(field.holds)])
-    contour: Json = {
-        "type": "heatmap",
-        "x": _numbers(shown.axes[0]),
-        "y": _numbers(shown.axes[1]),
-        "z": [_numbers(row) for row in field.values.T],
-        "zmin": low,
-        "zmax": high,
-        "colorscale": "Cividis",
-        "colorbar": {"thickness": 12, "outlinewidth": 0},
-        "zsmooth": "best",
-        "name": field.heading[1],
-        "hovertemplate": "%{x:.4~g}, %{y:.4~g}: %{z:.4~g}<extra></extra>",
-    }
-    data = [contour]
-    if shown.point is not None:
-        x, y = _numbers(shown.point)
-        data.append(
-            {"type": "scatter", "mode": "markers", "x": [x], "y": [y], "name": shown.point_label,
-             "marker": {"size": 9, "color": "#ffffff", "line": {"color": "#000000", "width": 1.5}}}
-        )  # fmt: skip
-    layout = {
-        "title": {"text": "<br>".join(field.heading), "font": {"size": 13}},
-        "xaxis": {"title": {"text": shown.labels[0]}, "range": _numbers(shown.axes[0][[0, -1]])},
-        "yaxis": {"title": {"text": shown.labels[1]}, "range": _numbers(shown.axes[1][[0, -1]])},
-        "showlegend": False,
-        "height": 340,
-    }
-    return {"data": data, "layout": layout}
-
-
-# --- Tables
-
-
-def screen_table(shown: Description) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Columns, and some rows of what a description shows, as text."""
-    if isinstance(shown, Graph):
-        return _table_of_graph(shown)
-    if isinstance(shown, Bars):
-        columns = ("", *(group.label for group in shown.groups))
-        means = zip(*(group.mean for group in shown.groups), strict=True)
-        return columns, [
-            (name, *map(number, own)) for name, own in zip(shown.names, means, strict=True)
-        ]
-    x, y = shown.axes
-    columns = (*shown.labels, *(", ".join(field.heading) for field in shown.fields))
-    corners = [(i, j) for i in _some(x.size, 5) for j in _some(y.size, 5)]
-    return columns, [
-        (number(x[i]), number(y[j]), *(number(field.values[i, j]) for field in shown.fields))
-        for i, j in corners
-    ]
-
-
-def _table_of_graph(shown: Graph) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    names = {c.look: c.label for panel in shown.panels for c in panel.curves if c.label}
-    own = [
-        (f"{c.label or c.end or names.get(c.look, '')}, {panel.label}".strip(", "), c)
-        for panel in shown.panels
-        for c in panel.curves
-    ]
-    common = [(label, c.y) for label, c in own if c.x is None]
-    if common:
-        rows = _some(shown.x.size, 25)
-        columns = (shown.x_label, *(label for label, _ in common))
-        return columns, [
-            (number(shown.x[k]), *(number(values[k]) for _, values in common)) for k in rows
-        ]
-    several = len(shown.panels) > 1
-    if shown.panels[0].names:
-        named = [curve for _, curve in own if curve.names]
-        return ("", *(curve.label for curve in named)), [
-            (name, *(number(curve.x[k]) for curve in named if curve.x is not None))
-            for k, name in enumerate(shown.panels[0].names)
-        ]
-    columns = ("", shown.x_label, "value" if several else shown.panels[0].label)
-    return columns, [
-        (name, number(x), number(y))
-        for panel in shown.panels
-        for c in panel.curves
-        if c.names or c.label or several
-        for name, x, y in zip(
-            c.names or repeat(panel.label if several else c.label),
-            c.x if c.x is not None else (),
-            c.y,
-            strict=False,
-        )
-    ]
-
-
-def _some(count: int, most: int) -> list[int]:
-    return [int(k) for k in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
 # --- The mechanism in motion

@@ -64,7 +64,7 @@ def _measurements(results: UpdateResults) -> Graph:
     below: tuple[Mark, ...] = (
         Rule(0.0, LEVEL),
         *(Rule(limit, _OUTLIER) for limit in (-OUTLIER, OUTLIER)),
-        _segments(at, np.zeros(at.size), residual, _STEM),
+        graph.segments(at, np.zeros(at.size), residual, _STEM),
         Curve(residual, _AFTER, names=names),
     )
     room = np.array([-OUTLIER - 0.5, OUTLIER + 0.5])
@@ -82,16 +82,7 @@ def _deviations(at: Floats, bars: Floats) -> Mark:
     label = "measured ± standard deviation"
     if at.size > 150:
         return Shade(-bars, bars, graph.GREY, label, 0.35)
-    return _segments(at, -bars, bars, _DEVIATION, label)
-
-
-def _segments(
-    at: Floats, low: Floats, high: Floats, look: Look, label: str = "", lying: bool = False
-) -> Curve:
-    """Lines from low to high, upright or lying."""
-    gap = np.full(at.size, np.nan)
-    ends, places = (np.stack(parts, axis=1).ravel() for parts in ((low, high, gap), (at, at, at)))
-    return Curve(places, look, label, ends) if lying else Curve(ends, look, label, places)
+    return graph.segments(at, -bars, bars, _DEVIATION, label)
 
 
 def _parameters(results: UpdateResults) -> Graph:
@@ -108,7 +99,7 @@ def _parameters(results: UpdateResults) -> Graph:
         for unit, size in [row.handy]
     )
     curves = (
-        _segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
+        graph.segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
         Curve(at, _BEFORE, "before", initial, names=names),
         Curve(at, _AFTER, "after", value, names=names),
     )

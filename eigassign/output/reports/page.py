@@ -22,7 +22,7 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
-from eigassign.output.figures.screen import motions, screen_figures, screen_table
+from eigassign.output.figures.screen import motions, screen_figure
 from eigassign.output.pages import TEMPLATES, inside, page_of, today
 from eigassign.output.reports.verdict import verdict_of
 from eigassign.output.result_files import sample_files
@@ -40,14 +40,12 @@ _EMBEDDED = {".png": "image/png", ".svg": "image/svg+xml"}  # the first that the
 
 @dataclass(frozen=True)
 class Shown:
-    """One figure on a page: plots of these heights in pixels, or a picture, or the files' names."""
+    """One figure on a page: a plot of this height in pixels, or a picture, or the files' names."""
 
     plan: FigurePlan
-    parts: tuple[int, ...] = ()
+    height: int | None = None
     image: str | None = None
     files: tuple[str, ...] = ()
-    columns: tuple[str, ...] = ()
-    rows: Sequence[tuple[str, ...]] = ()
 
 
 def page(
@@ -72,7 +70,7 @@ def page(
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
-    graphs = {p.name: screen_figures(p.shows) for p in plans if full and not callable(p.shows)}
+    graphs = {p.name: screen_figure(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
     kept = full and len(content) <= 400_000
     figures = list(_shown(plans, graphs, files, 900_000))
@@ -125,19 +123,17 @@ def _plotly() -> str:
 
 def _shown(
     plans: Sequence[FigurePlan],
-    graphs: Mapping[str, list[dict[str, Any]]],
+    graphs: Mapping[str, dict[str, Any]],
     files: Mapping[str, bytes],
     room: int,
 ) -> Iterator[Shown]:
-    """Plots where there are any, with some of their numbers; else pictures while there is room.
+    """Plots where there are any; else pictures while there is room.
 
     Of a figure that was not written nothing is said. ``room`` is in bytes.
     """
     for plan in plans:
-        if plan.name in graphs and not callable(plan.shows):
-            heights = tuple(one["layout"]["height"] for one in graphs[plan.name])
-            columns, rows = screen_table(plan.shows)
-            yield Shown(plan, heights, columns=columns, rows=rows)
+        if plan.name in graphs:
+            yield Shown(plan, graphs[plan.name]["layout"]["height"])
             continue
         own = {Path(name).suffix: name for name in files if Path(name).stem == plan.name}
         kind = next((kind for kind in _EMBEDDED if kind in own), None)

@@ -21,10 +21,9 @@ const eigassign = (function () {
 
   const config = { displaylogo: false, responsive: true, scrollZoom: false,
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  // A small screen has no room for buttons; nor is there any beside a colour bar.
+  // A small screen has no room for buttons.
   const touched = !matchMedia("(hover: hover)").matches || innerWidth < 600;
   if (touched) config.displayModeBar = false;
-  const bare = { ...config, displayModeBar: touched ? false : "hover" };
 
   function themed(figure) {
     const copy = JSON.parse(JSON.stringify(figure).replaceAll("#1a1a1a", css("--ink")).replaceAll("#0072B2", css("--blue")));
@@ -39,17 +38,15 @@ const eigassign = (function () {
       modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") },
       legend: { orientation: "h", yanchor: "bottom", y: 1.01, x: 0, xanchor: "left" },
       hoverlabel: { bgcolor: css("--page"), font: { color: css("--ink") } }, ...copy.layout };
-    if (copy.layout.title) copy.layout.margin.t = 52;
     return copy;
   }
 
   const drawn = new Set();
   function draw(box) {
-    const figure = themed(figures[box.dataset.figure][+box.dataset.part]), meta = figure.layout.meta || {};
-    const mapped = figure.data.some((trace) => trace.type === "heatmap");
+    const figure = themed(figures[box.dataset.figure]), meta = figure.layout.meta || {};
     const again = drawn.has(box);
     drawn.add(box);
-    return Plotly.react(box, figure.data, figure.layout, mapped ? bare : config).then(() => {
+    return Plotly.react(box, figure.data, figure.layout, config).then(() => {
       if (again || meta.clock === undefined) return;
       const line = box.appendChild(document.createElement("div"));
       line.className = "cursor";
@@ -71,7 +68,7 @@ const eigassign = (function () {
   function rest(box, layout, whole) {  // modes that the panels leave out, behind a click
     const axes = Object.keys(whole), inside = (a, b) => a[0] <= b[0] && a[1] >= b[1];
     if (axes.every((axis) => inside(layout[axis].range, whole[axis]))) return;
-    const tools = box.parentNode.insertAdjacentElement("afterend", document.createElement("div"));
+    const tools = box.insertAdjacentElement("afterend", document.createElement("div"));
     tools.className = "tools";
     const button = tools.appendChild(document.createElement("button"));
     button.type = "button"; button.textContent = "All modes"; button.setAttribute("aria-pressed", "false");
@@ -92,7 +89,7 @@ const eigassign = (function () {
     // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels.
     addEventListener("beforeprint", () => open().forEach((box) => {
       if (!drawn.has(box)) draw(box);
-      Plotly.relayout(box, { autosize: false, width: box.parentNode.children.length > 1 ? 340 : 688 });
+      Plotly.relayout(box, { autosize: false, width: 688 });
     }));
     addEventListener("afterprint", () => open().forEach((box) => Plotly.relayout(box, { autosize: true, width: null })));
   }
@@ -118,13 +115,9 @@ const eigassign = (function () {
   }
   const quoted = (text) => '"' + String(text).replaceAll('"', '""') + '"';
   function csv(name) {
-    const rows = ["panel,series,x,y,z"];
-    figures[name].forEach((figure, part) => figure.data.forEach((trace) => {
-      const panel = trace.yaxis || part + 1, label = quoted(trace.name || "");
-      if (trace.z) trace.z.forEach((row, j) => row.forEach((z, i) => rows.push([panel, label, trace.x[i], trace.y[j], z ?? ""].join())));
-      else trace.x.forEach((x, i) => rows.push([panel, label, quoted(x ?? ""), quoted(trace.y[i] ?? ""), ""].join()));
-    }));
-    return rows.join("\n") + "\n";
+    const rows = figures[name].data.flatMap((trace) => trace.x.map((x, i) =>
+      [trace.yaxis, quoted(trace.name || ""), quoted(x ?? ""), quoted(trace.y[i] ?? "")].join()));
+    return ["panel,series,x,y", ...rows].join("\n") + "\n";
   }
   all("button[data-csv]").forEach((button) => button.addEventListener("click",
     () => save(button.dataset.csv + ".csv", csv(button.dataset.csv), "text/csv")));
