@@ -29,8 +29,8 @@ from eigassign.mechanism.elements.superelement import part_lines
 from eigassign.mechanism.kinematics.limits import resting_pose
 from eigassign.mechanism.kinematics.parameters import is_imported, written_loads
 from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.output.figures import mechanism
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.modes import mechanism_plan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.stages import new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
@@ -342,7 +342,7 @@ def picture(case: BuiltCase) -> FigurePlan:
             poses = drawing.rest_pose(file, model, some_pose(case), y)
         else:
             poses = drawing.draw_poses(file, model, case.trajectory, y)
-    return mechanism_plan(file.title, poses)
+    return mechanism.poses(file.title, poses)
 
 
 def some_pose(case: BuiltCase) -> Floats:

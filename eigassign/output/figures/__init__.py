@@ -9,9 +9,9 @@ In reading order; each imports from those above it only:
     approximation  expansion against exact over time and over entries of q or y
     meaning        sensitivities, reach and tolerance
     scene          the mechanism as parts at places: links as thick as their sections, symbols
-    mechanism      the parts drawn with matplotlib; poses along the trajectory
+    mechanism      the parts drawn with matplotlib; poses
     screen         descriptions as Plotly's data; the scene for a page
-    modes          mode shapes, and the mechanism by itself
+    modes          mode shapes
     run            which figures a run has
     update         measured frequencies against the model, parameters with intervals
     front          time against error of a chart's methods

@@ -73,7 +73,7 @@ def sensitivities(rows: tuple[SensitivityRow, ...], most: int = 10) -> FigurePla
             segments(at, np.zeros(at.size), mean, colour, lying=True),
             Curve(at, dot, label, mean, names=tuple(f"{row.parameter}, {label}" for row in own)),
         ]
-    low, high = graph.bounds([mark.x for mark in marks if isinstance(mark, Curve)])
+    low, high = graph.bounds([m.x for m in marks if isinstance(m, Curve) and m.x is not None])
     room = 0.05 * (high - low)
     tall = float(np.clip(0.16 * len(names) * (len(labels) + 1), 1.2, 6.0))
     ends = (np.array([0.5, 0.5 - len(names)]),)

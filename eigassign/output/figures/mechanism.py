@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from eigassign.output.figures import graph, scene, style
 from eigassign.output.figures.graph import BLACK, GREY, FigurePlan, short
 from eigassign.output.figures.scene import Part, Shape
-from eigassign.study.results import DrawnPoses, RunResults
+from eigassign.study.results import DrawnPoses
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -296,26 +296,26 @@ def length_label(length: float) -> str:
 _BODIES = (graph.BLUE, graph.GREEN, graph.PURPLE, graph.SKY)
 
 
-def poses(results: RunResults) -> FigurePlan:
-    """The mechanism at samples of the trajectory, and the path of its tip."""
-    links = ", ".join(results.poses.link_names)
+def poses(title: str, shown: DrawnPoses) -> FigurePlan:
+    """The mechanism at samples of the trajectory, or in one pose, and the path of its tip."""
+    links, count = ", ".join(shown.link_names), len(shown.lines)
+    several = f"{count} poses" if count > 1 else "one pose"
+    tip = "" if shown.tip_path is None else ", and the path of the tip"
     return FigurePlan(
         "mechanism",
         "Mechanism",
-        f"The links ({links}) in {len(results.poses.lines)} poses, and the path of the tip. "
-        f"{scene.scale_words(results.poses)}".strip(),
-        f"Line drawing of the mechanism with links {links} in several poses.",
-        partial(draw_poses, results),
+        f"The links ({links}) in {several}{tip}. {scene.scale_words(shown)}".strip(),
+        f"Line drawing of the mechanism with links {links} in {several}.",
+        partial(_draw_poses, title, shown),
         "answer",
     )
 
 
-def draw_poses(results: RunResults) -> Figure:
+def _draw_poses(title: str, shown: DrawnPoses) -> Figure:
     """Links as lines, coloured by the time of the pose."""
-    shown, held = results.poses, extent(results.poses)
-    spatial, colours = held.view.spatial, _colours(len(shown.lines))
-    title = f"{short(results.case.title, 70)}: poses along the trajectory"
-    figure = style.new_figure(title, 4.0)
+    held, colours = extent(shown), _colours(len(shown.lines))
+    spatial, more = held.view.spatial, ": poses along the trajectory" * (len(colours) > 1)
+    figure = style.new_figure(f"{short(title, 60)}{more}", 4.0)
     key = figure.legend(handles=_entries(shown, colours), loc="upper left")
     left, foot = (0.2, 0.8) if spatial else (0.75, 0.5)  # inches
     wide = style.WIDTH_IN - left - key.get_window_extent().width / figure.dpi - 0.2
@@ -361,7 +361,8 @@ def _entries(shown: DrawnPoses, colours: Sequence[str]) -> list[Artist]:
     for at, body in enumerate(shown.bodies[:6]):
         look: Any = {"color": _BODIES[at % len(_BODIES)], "linestyle": "none", "marker": "o"}
         entries.append(Line2D([], [], **look, label=short(body.name, 22)))
-    for at, (colour, time) in enumerate(zip(colours, shown.time_s, strict=True)):
+    timed = zip(colours, shown.time_s, strict=True) if len(colours) > 1 else ()
+    for at, (colour, time) in enumerate(timed):
         whose = f"{short(shown.of[at], 12)} " if shown.of else ""
         entries.append(Line2D([], [], color=colour, linewidth=2.6, label=f"{whose}at {time:.3g} s"))
     return list(entries)

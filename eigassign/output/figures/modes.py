@@ -1,4 +1,4 @@
-"""Mode shapes, and the mechanism by itself."""
+"""Mode shapes."""
 
 from __future__ import annotations
 
@@ -20,33 +20,12 @@ from eigassign.output.figures.mechanism import (
     points_of,
 )
 from eigassign.output.figures.scene import parts, scale_words
-from eigassign.study.results import DrawnPoses, ModePictures
+from eigassign.study.results import ModePictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _REST = "#d4d4d4"
-
-
-def _sheet(
-    title: str,
-    held: Extent,
-    width: float = 5.0,
-    tall: tuple[float, float] = (1.4, 4.0),
-    foot: float = 0.75,
-    room: float = 1.06,
-) -> tuple[Figure, Drawing]:
-    """A figure, inches, with axes that hold everything, the directions of x, y, z, and a scale.
-
-    The axes are as high as ``held`` is at their width, within the bounds ``tall``.
-    """
-    wide = width - 0.6
-    height = float(np.clip(wide * held.size[1] / held.size[0], *tall))
-    figure = style.new_figure(title, foot + height + 0.46, width)
-    drawing = held.drawing(figure, (0.3, foot, wide, height), room)
-    drawing.axes.set_axis_off()
-    draw_bearings(figure, drawing, 0.1, 0.08)
-    return figure, drawing
 
 
 def _note(figure: Figure, text: str, x: float = 0.1, y: float = 0.2) -> Any:
@@ -95,7 +74,11 @@ def _draw_mode(pictures: ModePictures, held: Extent, mode: int) -> Figure:
     """One mode with its frequency, the axes, a scale, and q and y, cut where the scale begins."""
     title = f"{short(pictures.title, 60)}: mode {mode + 1}, {pictures.frequencies_hz[mode]:.5g} Hz"
     foot = 0.95 if held.view.spatial else 0.75  # for the axes and the joints' feet
-    figure, drawing = _sheet(title, held, style.WIDTH_IN, (1.6, 5.2), foot, room=1.0)
+    wide = style.WIDTH_IN - 0.6
+    height = float(np.clip(wide * held.size[1] / held.size[0], 1.6, 5.2))
+    figure = style.new_figure(title, foot + height + 0.46)
+    drawing = held.drawing(figure, (0.3, foot, wide, height))
+    draw_bearings(figure, drawing, 0.1, 0.08)
     _draw_shape(drawing, pictures, mode)
     values = [
         f"{short(name, 16)} = {number(value)} {unit}".rstrip()
@@ -112,25 +95,12 @@ def _draw_shape(drawing: Drawing, pictures: ModePictures, mode: int) -> None:
     """One mode over the mechanism at rest."""
     rest, deformed = pictures.rest, pictures.deformed
     drawing.axes.set_axis_off()
-    _draw_staying(drawing, rest)
+    still, moving = parts(rest), parts(deformed)
+    draw(drawing, of_roles(still, "ground"), 0, GREY)
+    draw(drawing, of_roles(still, "link", "rigid", "slide", "pivot"), 0, _REST)
     for line, moved in zip(rest.lines[0], deformed.lines[mode], strict=True):
         drawing.line(drawing.view.flat(2.0 * line - moved), graph.SKY, 1.0)
-    _draw_pose(drawing, deformed, mode)
-
-
-def _draw_staying(drawing: Drawing, poses: DrawnPoses, pose: int = 0) -> None:
-    """The ground, and one pose in grey."""
-    every = parts(poses)
-    draw(drawing, of_roles(every, "ground"), 0, GREY)
-    draw(drawing, of_roles(every, "link", "rigid", "slide", "pivot"), pose, _REST)
-
-
-def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
-    """One pose in colour."""
-    if poses.tip_path is not None:
-        drawing.line(drawing.view.flat(poses.tip_path), graph.VERMILLION, 1.2)
-    every = parts(poses)
-    draw(drawing, [part for part in every if part.role != "ground"], pose, BLUE)
+    draw(drawing, [part for part in moving if part.role != "ground"], mode, BLUE)
 
 
 def thumbnail(pictures: ModePictures) -> bytes:
@@ -142,22 +112,3 @@ def thumbnail(pictures: ModePictures) -> bytes:
         _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, 0)
         _note(figure, f"mode 1: {pictures.frequencies_hz[0]:.4g} Hz", 0.06, 0.11)
         return style.encoded(figure, "png")
-
-
-# --- The mechanism by itself
-
-
-def mechanism_plan(title: str, poses: DrawnPoses) -> FigurePlan:
-    """The first of these poses, the others behind it in grey, with the path of the tip."""
-    text = f"Line drawing of the mechanism in {len(poses.lines)} poses, the first in colour."
-    return FigurePlan("mechanism", "Mechanism", "", text, partial(_draw_mechanism, title, poses))
-
-
-def _draw_mechanism(title: str, poses: DrawnPoses) -> Figure:
-    figure, drawing = _sheet(short(title, 60), extent(poses))
-    every = parts(poses)
-    draw(drawing, of_roles(every, "ground"), 0, GREY)
-    for pose in range(len(poses.lines) - 1, 0, -1):
-        draw(drawing, of_roles(every, "link", "rigid"), pose, _REST)
-    _draw_pose(drawing, poses, 0)
-    return figure

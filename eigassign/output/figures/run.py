@@ -21,7 +21,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
         if one.spectrum is not None and one.spectrum.initial_hz.size:
             yield curves.overview(one, one.spectrum)
     if any(results.poses.lines):
-        yield mechanism.poses(results)
+        yield mechanism.poses(results.case.title, results.poses)
     asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
     yield from (curves.statics(one) for one in each if one.statics)
     yield from meaning_figures(results)
