@@ -16,7 +16,6 @@ CASES = [
     pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
     for name in (*SHIPPED, *DEVELOPMENT)
 ]
-MET = 1e-8  # of a limit's range: what the program's solver may miss it by
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -186,12 +186,6 @@ def test_a_fixed_parameter_stays_and_tells_what_freeing_it_would_gain():
     assert limit.multiplier == pytest.approx(0.3, rel=1e-10)
 
 
-def test_with_everything_fixed_there_is_nothing_to_solve():
-    result = solve([1.2], [[-0.5, 1.0]], [0.2, 0.1], [0.2, 0.1])
-    np.testing.assert_array_equal(result.y, [0.2, 0.1])
-    assert result.status == "nothing is free"
-
-
 @pytest.mark.parametrize(
     ("fast", "lower", "upper"),
     [(1e-6, [0.0, -INF], [INF, INF]), (-0.7, [0.0, 0.0], [1e12, 1.0])],

@@ -33,21 +33,7 @@ SMALL = ROOT / "benchmarks" / "small_arm.yaml"
 
 # The command, which writes the name of every case that it begins to `begun`: each begins with the
 # hidden folder of its run, `.<name>.<pid>-<8 digits>.tmp`. Its workers import it.
-PROGRAM = """
-import os, re, sys
-
-def note(event, args):
-    if event == "os.mkdir":
-        made = re.fullmatch(r"[.](.*)[.][0-9]+-[0-9a-f]{12}[.]tmp", os.path.basename(str(args[0])))
-        if made and os.path.dirname(str(args[0])).endswith("out"):
-            with open("begun", "a") as file:
-                file.write(made[1] + chr(10))
-
-sys.addaudithook(note)
-if __name__ == "__main__":
-    from eigassign.cli import main
-    sys.exit(main())
-"""
+PROGRAM = Path(__file__).with_name("noting_program.py.txt").read_text("utf-8")
 COMMAND = (
     *("program.py", "batch", "arm.yaml", "--reports", "none", "--jobs", str(JOBS), "--out", "out"),
     *("--set", f"mechanism.bodies.tool.mass=0..0.5:{CASES // 4}"),

@@ -177,15 +177,6 @@ def test_an_expansion_without_design_parameters_is_one_over_the_angles() -> None
     np.testing.assert_allclose(l0, exact_lam(model, Q0 + 0.1, [], 2), rtol=1e-4)
 
 
-def test_a_bar_on_a_pin_is_a_constant_in_its_angle() -> None:
-    section = {"shape": "circle", "diameter": 0.02}
-    model = model_of(bar(3, 0.5, 70e9, 2700.0, section, "revolute"))
-    e = expand(model, [0.3], [], (1, 2), 4)
-    assert e.indices.tolist() == [[0]]
-    f = model.frequencies([2.0], [], 2)
-    np.testing.assert_allclose(e.frequencies([[0.1], [2.0]], []), np.repeat(f, 2, axis=0))
-
-
 def test_a_structure_without_variables_has_a_constant_expansion() -> None:
     model = model_of(bar(3, 0.5, 70e9, 2700.0, {"shape": "circle", "diameter": 0.02}))
     e = expand(model, [], [], (1, 2), 4)

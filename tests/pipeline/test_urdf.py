@@ -19,57 +19,7 @@ from eigassign.errors import CaseError, StorageError, UsageError
 
 Floats = NDArray[np.float64]
 
-ROBOT = """<?xml version="1.0"?>
-<robot name="crane">
-  <link name="base_link"/>
-  <link name="column">
-    <inertial>
-      <origin xyz="0.02 -0.01 0.3" rpy="0.3 0.2 -0.4"/>
-      <mass value="12"/>
-      <inertia ixx="0.5" ixy="0.03" ixz="-0.02" iyy="0.4" iyz="0.01" izz="0.2"/>
-    </inertial>
-  </link>
-  <link name="upper-arm">
-    <inertial>
-      <origin xyz="0.25 0.01 0"/>
-      <mass value="5"/>
-      <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.12" iyz="0" izz="0.11"/>
-    </inertial>
-  </link>
-  <link name="slide">
-    <inertial>
-      <origin xyz="0 0 0.1" rpy="0 1.5707963267948966 0"/>
-      <mass value="2"/>
-      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/>
-    </inertial>
-  </link>
-  <link name="tool">
-    <inertial>
-      <origin xyz="0.05 0.02 0.03"/>
-      <mass value="1.5"/>
-      <inertia ixx="0.004" ixy="0" ixz="0" iyy="0.005" iyz="0" izz="0.006"/>
-    </inertial>
-  </link>
-  <joint name="yaw" type="continuous">
-    <parent link="base_link"/><child link="column"/>
-    <origin xyz="0 0 0.1" rpy="0 0 0.2"/><axis xyz="0 0 1"/>
-  </joint>
-  <joint name="pitch" type="revolute">
-    <parent link="column"/><child link="upper-arm"/>
-    <origin xyz="0.05 0 0.6" rpy="0 1.5707963267948966 0.3"/><axis xyz="0 0.6 0.8"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <joint name="lift" type="prismatic">
-    <parent link="upper-arm"/><child link="slide"/>
-    <origin xyz="0.5 0.1 -0.05" rpy="0.1 -0.2 0.3"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <joint name="flange" type="fixed">
-    <parent link="slide"/><child link="tool"/>
-    <origin xyz="0 0.03 0.2" rpy="0.5 0 0"/>
-  </joint>
-</robot>
-"""
+ROBOT = Path(__file__).with_name("crane.urdf").read_text("utf-8")
 STIFFNESS = {"yaw": 2e4, "pitch": 9e3, "lift": 3e5}
 POSE = [0.4, -0.7, 0.06]
 

@@ -10,21 +10,7 @@ import pytest
 import eigassign as ea
 from eigassign.cli import main
 
-BOOM = """title: boom
-mechanism:
-  space: planar
-  {gravity}
-  materials: {{s: {{youngs_modulus: 210 GPa, density: 7850}}}}
-  sections: {{t: {{shape: tube, outer_diameter: {diameter}, thickness: 12 mm}}}}
-  links: {{boom: {{length: {length}, material: s, section: t, elements: 8}}}}
-  joints: {{foot: {{type: revolute, base: ground, follower: boom.start}}}}
-  bodies: {{load: {{at: boom.end, mass: {mass}, offset: {offset}}}}}
-coordinates: {{luff: {{joint: foot, drive: locked}}}}
-trajectory: {{q: [[60 deg], [70 deg], [80 deg]], duration: 20 s}}
-design: {{m: {{parameter: bodies.load.mass, min: {low}, max: {high}}}}}
-targets: [{target}]
-{more}
-"""
+BOOM = Path(__file__).with_name("boom.yaml.format").read_text("utf-8")
 REFERENCES = Path(__file__).parents[1] / "mechanism" / "weight_references"
 SAID = "gravity, which is not stated"
 DOWN = "mechanism.gravity: [0, -9.81]"

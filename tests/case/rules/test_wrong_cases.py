@@ -9,11 +9,6 @@ from small_case import edited, unmarked
 TABLES = tables("wrong_cases")
 MECHANISM = [Wrong(*row) for row in TABLES["mechanism"]]
 STUDY = [Wrong(*row) for row in TABLES["study"]]
-MOTION = """\
-  tip: hand.end
-  waypoints: [[0.3, 0.1], [0.2, 0.2]]
-  branch: {elbow: [10 deg, 170 deg]}
-"""
 SAMPLED = [Wrong(*row) for row in TABLES["sampled"]]
 
 

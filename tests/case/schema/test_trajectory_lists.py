@@ -1,6 +1,7 @@
 # ruff: noqa: E501  (a table)
 """`trajectory:` as a list: read, resolved, and every mistake at its own line and column."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -67,90 +68,8 @@ def test_a_mode_may_have_a_target_of_its_own_on_each_trajectory() -> None:
     assert [t.trajectory for t in read(listed(targets=targets)).targets] == ["pick", "2"]
 
 
-WRONG = {
-    "no trajectory in the list": (
-        ("trajectory:\n" + LIST, "¦trajectory: []\n"),
-        "trajectory",
-        "needs at least 1 entries",
-    ),
-    "name with a slash": (("name: pick", "¦name: ../x"), "trajectory[0].name", "not a usable name"),
-    "name that is a number": (("name: pick", "¦name: 7"), "trajectory[0].name", 'write "7"'),
-    "the same name": (
-        ("weight: 2.5", "¦name: pick"),
-        "trajectory[1].name",
-        "has this name already",
-    ),
-    "the same name but for case": (
-        ("weight: 2.5", "¦name: Pick"),
-        "trajectory[1].name",
-        "'pick' (some file systems",
-    ),
-    "no weight": (("weight: 2.5", "¦weight: 0"), "trajectory[1].weight", "must be > 0"),
-    "unknown key": (("weight: 2.5", "¦wait: 2.5"), "trajectory[1].wait", "unknown key"),
-    "no form at all": (
-        ("  - {q: [[0, 90 deg], [1, 2]], time: [1 s, 3 s], weight: 2.5}", "  - ¦{weight: 2.5}"),
-        "trajectory[1]",
-        "expected one of the keys tip",
-    ),
-    "text in the list": (
-        ("  - {q: [[0, 90 deg], [1, 2]], time: [1 s, 3 s], weight: 2.5}", "  - ¦pick"),
-        "trajectory[1]",
-        "expected a mapping",
-    ),
-    "wrong unit in the second": (
-        ("[[0, 90 deg]", "[[0, ¦90 mm]"),
-        "trajectory[1].q[0][1]",
-        "got '90 mm', which is length",
-    ),
-    "wrong number of coordinates": (
-        ("[[0, 90 deg], [1, 2]]", "[[0, 90 deg], ¦[1]]"),
-        "trajectory[1].q[1]",
-        "needs 2 entries",
-    ),
-    "unknown node": (
-        ("tip: hand.end", "¦tip: hand.tip"),
-        "trajectory[0].tip",
-        "expected 'hand.start' or 'hand.end'",
-    ),
-    "waypoint in space": (
-        ("[0.2, 0.2]]", "¦[0.2, 0.2, 0]]"),
-        "trajectory[0].waypoints[1]",
-        "needs 2 components",
-    ),
-    "branch of no joint": (
-        ("branch: {elbow:", "branch: {¦elbo:"),
-        "trajectory[0].branch.elbo",
-        "did you mean 'elbow'",
-    ),
-    "missing file": (
-        ("q: [[0, 90 deg], [1, 2]], time: [1 s, 3 s]", "¦file: none.csv"),
-        "trajectory[1].file",
-        "none.csv",
-    ),
-    "unknown trajectory of a target": (
-        (TARGETS, "  - {mode: 1, frequency: 190 Hz, ¦trajectory: pic}\n"),
-        "targets[0].trajectory",
-        "did you mean 'pick'",
-    ),
-    "two targets of a mode on one": (
-        (TARGETS, TARGETS + "  - {¦mode: 1, frequency: 180 Hz, trajectory: pick}\n"),
-        "targets[1].mode",
-        "mode 1 has a target already along trajectory 'pick'",
-    ),
-    "profile too short for one of them": (
-        (TARGETS, "  - {mode: 1, frequency: {¦time: [0, 2], frequency: [190, 180]}}\n"),
-        "targets[0].frequency.time",
-        "trajectory '2' lasts from 1 to 3 s",
-    ),
-    "profile too short for its own": (
-        (
-            TARGETS,
-            "  - {mode: 1, trajectory: pick, frequency: {¦time: [0.5, 2], frequency: [190, 180]}}\n",
-        ),
-        "targets[0].frequency.time",
-        "trajectory 'pick' lasts from 0 to 1 s",
-    ),
-}
+MISTAKES = Path(__file__).with_name("wrong_trajectory_lists.json")
+WRONG = json.loads(MISTAKES.read_text("utf-8"))
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -1,6 +1,7 @@
 """What is said to be proved of designs under their weight: against grids of designs."""
 
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -152,18 +153,7 @@ def test_designs_whose_first_mode_is_high_enough_are_convex_under_the_weight(see
 
 # --- Designs within the bounds that fall or buckle
 
-MAST = """title: mast
-mechanism:
-  space: planar
-  gravity: [0, -9.81]
-  materials: {s: {youngs_modulus: 210 GPa, density: 7850}}
-  sections: {t: {shape: tube, outer_diameter: 60 mm, thickness: 3 mm}}
-  links: {mast: {length: 6, material: s, section: t, elements: 2}}
-  joints: {foot: {type: revolute, base: ground, follower: mast.start}}
-  bodies: {load: {at: mast.end, mass: 100}}
-coordinates: {tilt: {joint: foot, drive: locked}}
-trajectory: {q: [[70 deg], [90 deg]], duration: 20 s}
-"""
+MAST = Path(__file__).with_name("mast.yaml").read_text("utf-8")
 LOAD = "design: {m: {parameter: bodies.load.mass, min: 10, max: 2000%s}}\n"
 THIN = """design:
   d: {parameter: sections.t.outer_diameter, min: 20 mm, max: 120 mm}
