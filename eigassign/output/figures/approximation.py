@@ -6,6 +6,7 @@ Frequency above, errors below; over one of two entries the worst of all values o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +109,10 @@ def _compared(
             Curve(comparison.linearised_hz, LINEARISED, linearised_label),
         )
         if single
-        else (Shade(*_range(exact), EXACT.colour, "exact", 0.5),)
+        else (
+            Shade(*_range(exact), EXACT.colour, "exact", 0.5),
+            *(Curve(edge, replace(EXACT, width=1.2)) for edge in _range(exact)),
+        )
     )
     labels = ("", "") if single else (taylor_label, linearised_label)
     errors: tuple[Mark, ...] = tuple(
@@ -120,7 +124,6 @@ def _compared(
             "frequency [Hz]",
             (*frequencies, *(Rule(at, POINT, "expansion point", upright=True) for at in uprights)),
             1.9,
-            holds=_range(exact),
         ),
         Panel(
             "|error| [%]",

@@ -228,12 +228,13 @@ def _key_beside(figure: Figure, panels: Sequence[Axes], handles: Sequence[tuple[
 
 def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bool = False) -> None:
     """Make axis ``which`` logarithmic; ``cut``: the lowest label says ≤, for values below it."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(numticks=9))
-    axis.set_minor_locator(NullLocator())  # eight of them a decade take a tenth of the time
+    axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))  # all eight take a tenth of the time
+    axis.set_minor_formatter(NullFormatter())
     low = limits[0] * (1.0 + 1e-9)
     axis.set_major_formatter(
         FuncFormatter(lambda at, _: ("≤" if cut and at <= low else "") + graph.power(at))
