@@ -34,7 +34,7 @@ from scipy.sparse import linalg
 
 import eigassign as ea
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.modal import factor_sparse, modes
 
 BLOCK = 16  # right-hand sides at once, as in the recursion

@@ -31,9 +31,9 @@ from eigassign.mechanism.assembly.congruence import inertia, pulled, scattered
 from eigassign.mechanism.assembly.dynamics.velocity_terms import IMAGINARY
 from eigassign.mechanism.assembly.node_motion import MotionRow, SpringEnds, combined
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import DOFS, multiply
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import DOFS, multiply
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory, rates_at
 from eigassign.series.algebra import Tangents

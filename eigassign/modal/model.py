@@ -22,13 +22,19 @@ from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
-from eigassign.mechanism.assembly.energies import EnergyForms, TotalMass, energy_forms
-from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
+from eigassign.mechanism.assembly.mode_shapes import (
+    EnergyForms,
+    NodeShape,
+    StrandShape,
+    TotalMass,
+    energy_forms,
+    shapes,
+)
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.forces import DriveForces, drive_forces
 from eigassign.mechanism.kinematics.forward import Kinematics, LinkFrames
-from eigassign.mechanism.kinematics.limits import Label
+from eigassign.mechanism.kinematics.parameters import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing

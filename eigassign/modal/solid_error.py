@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.mesh import LinkMesh, Lost
+from eigassign.mechanism.kinematics.joints import Objects
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import Objects
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.series.compiler import CompiledArrays
 

@@ -29,7 +29,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes
 from eigassign.mechanism.assembly.sagged import sagged
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.kinematics.parameters import is_imported
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.exact.standing import buckling_share

@@ -26,7 +26,7 @@ from eigassign.mechanism.assembly.build import (
     local_links,
     whole_links,
 )
-from eigassign.mechanism.assembly.energies import total_mass
+from eigassign.mechanism.assembly.mode_shapes import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.forward import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design

@@ -27,8 +27,7 @@ from eigassign.mechanism.assembly.build import (
     with_elements,
     with_reduction,
 )
-from eigassign.mechanism.kinematics.limits import resting_pose
-from eigassign.mechanism.kinematics.parameters import initial_design, is_imported
+from eigassign.mechanism.kinematics.parameters import initial_design, is_imported, resting_pose
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error

@@ -21,7 +21,7 @@ from eigassign.assignment.requirements.requirement import (
 )
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy, limit_unit
-from eigassign.mechanism.assembly.energies import TotalMass
+from eigassign.mechanism.assembly.mode_shapes import TotalMass
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -29,11 +29,10 @@ from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
-from eigassign.mechanism.kinematics.limits import property_limits, rails
+from eigassign.mechanism.kinematics.joints import DOFS, Floats
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
-from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters, property_limits, rails
 from eigassign.mechanism.kinematics.parameters import parameters as variables
-from eigassign.mechanism.kinematics.rotations import DOFS, Floats
 from eigassign.mechanism.kinematics.topology import build_tree, coordinates
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Scalar
@@ -104,12 +103,12 @@ def _in_few_elements(scene: Loaded, parameters: ModelParameters) -> Loaded:
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
     """The case with other numbers of elements for the named beam links."""
-    return _with_links(case, "elements", elements)
+    return _with_links(case, lambda n, _: {"elements": elements[n]} if n in elements else {})
 
 
 def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> CaseFile:
     """The case with other frequencies (Hz) to which links are reduced; None leaves one whole."""
-    return _with_links(case, "reduce_to", frequencies)
+    return _with_links(case, lambda n, _: {"reduce_to": frequencies[n]} if n in frequencies else {})
 
 
 def in_few_elements(case: CaseFile) -> CaseFile:
@@ -118,19 +117,15 @@ def in_few_elements(case: CaseFile) -> CaseFile:
     Superelements and solids are left their interface.
     """
 
-    def few(part: Any) -> Any:
+    def few(_: str, part: Any) -> dict[str, Any]:
         update: dict[str, Any] = {}
         if hasattr(part, "reduce_to"):
             update["reduce_to"] = LOWEST if part.type in IMPORTED else None
         if hasattr(part, "elements") and isinstance(part.section, str):
             update["elements"] = 1
-        if hasattr(part, "beams"):
-            update["beams"] = type(part.beams)({n: few(beam) for n, beam in part.beams.items()})
-        return part.model_copy(update=update)
+        return update
 
-    same_kind: Any = type(case.mechanism.links)
-    links = same_kind({name: few(link) for name, link in case.mechanism.links.items()})
-    return replace(case, mechanism=case.mechanism.model_copy(update={"links": links}))
+    return _with_links(case, few)
 
 
 def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
@@ -140,30 +135,29 @@ def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
     """
     counts: list[int] = []
 
-    def scaled(part: Any) -> Any:
-        if hasattr(part, "elements"):
-            counts.append(max(1, round(part.elements * factor)))
-            return part.model_copy(update={"elements": counts[-1]})
+    def scaled(_: str, part: Any) -> dict[str, Any]:
+        if not hasattr(part, "elements"):
+            return {}
+        counts.append(max(1, round(part.elements * factor)))
+        return {"elements": counts[-1]}
+
+    return _with_links(case, scaled), tuple(counts)
+
+
+def _with_links(case: CaseFile, change: Callable[[str, Any], dict[str, Any]]) -> CaseFile:
+    """The case with what ``change`` gives new for a link, or for a beam "link.beam" of one."""
+
+    def changed(name: str, part: Any) -> Any:
+        update = change(name, part)
         if hasattr(part, "beams"):
-            beams = {name: scaled(beam) for name, beam in part.beams.items()}
-            return part.model_copy(update={"beams": beams})
-        return part
+            update["beams"] = all_of(part.beams, f"{name}.")
+        return part.model_copy(update=update)
 
-    links = {name: scaled(link) for name, link in case.mechanism.links.items()}
-    mechanism = case.mechanism.model_copy(update={"links": links})
-    return replace(case, mechanism=mechanism), tuple(counts)
+    def all_of(parts: Any, prefix: str = "") -> Any:
+        return type(parts)({n: changed(prefix + n, each) for n, each in parts.items()})
 
-
-def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
-    if not values:
-        return case
-    links = {
-        name: link.model_copy(update={key: values[name]}) if name in values else link
-        for name, link in case.mechanism.links.items()
-    }
-    same_kind: Any = type(case.mechanism.links)
-    mechanism = case.mechanism.model_copy(update={"links": same_kind(links)})
-    return replace(case, mechanism=mechanism)
+    links = all_of(case.mechanism.links)
+    return replace(case, mechanism=case.mechanism.model_copy(update={"links": links}))
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import AffineEntries, Row
 from eigassign.mechanism.elements.mesh import Reduction, Term, total
-from eigassign.mechanism.kinematics.rotations import multiply, scaled, some
+from eigassign.mechanism.kinematics.joints import multiply, scaled, some
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]

@@ -35,9 +35,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
-from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
-from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import (
+from eigassign.mechanism.kinematics.joints import (
     DOFS,
     Objects,
     carried,
@@ -46,6 +44,8 @@ from eigassign.mechanism.kinematics.rotations import (
     present,
     some,
 )
+from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
+from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.topology import GROUND, Freedom, JointEdge, NodeName, split
 from eigassign.series.expression import Scalar, is_constant
 
@@ -89,10 +89,6 @@ class NodeMotions:
         for freedom in freedoms:
             self.passive[freedom.joint, freedom.component] = {self.count: 1.0}
             self.count += 1
-
-    def forget(self) -> None:
-        """Derive every motion anew: what passive joints do has changed."""
-        self.known.clear()
 
     def rows(self, node: NodeName) -> MotionRows:
         """Six rows of a node's elastic motion in its link's axes; missing components stay empty."""
@@ -191,7 +187,7 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     solved = passive_motion(parameters.recorder, J[:, dependent], np.hstack([J[:, free], G]))
     for k, row in zip(dependent, solved, strict=True):
         nodes.passive[keys[k]] = dict(zip(masters, row, strict=True))
-    nodes.forget()
+    nodes.known.clear()  # what passive joints do has changed
 
 
 def _matrix(rows: Sequence[MotionRow], unknowns: Sequence[int]) -> Objects:
@@ -304,7 +300,8 @@ class SpringEnds:
         """Motion of both ends in the spring's axes, the first carried to the second."""
         here, there, arm = self.in_world(start), self.in_world(end), np.zeros(3, dtype=object)
         if GROUND not in (start, end):
-            arm = self._place(end) - self._place(start)
+            first, second = (self.motion.placement(n[0]).at(self._local(n)) for n in (start, end))
+            arm = second[1] - first[1]
             here = apply(carried(np.eye(3).astype(object), arm), here)
         R = mount  # in the ground, where that is first
         if start != GROUND:
@@ -315,9 +312,6 @@ class SpringEnds:
 
     def _local(self, node: NodeName) -> Objects:
         return node_position(self.case, self.parameters, self.motion.tree, node)
-
-    def _place(self, node: NodeName) -> Objects:
-        return self.motion.placement(node[0]).at(self._local(node))[1]
 
     def in_world(self, node: NodeName) -> MotionRows:
         """Full motion of a node in world axes: elastic rows and N T columns."""

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.brief import Brief
-from eigassign.mechanism.kinematics.rotations import Objects, some
+from eigassign.mechanism.kinematics.joints import Objects, some
 from eigassign.series.algebra import Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.expression import Scalar, one_atom, parts
 from eigassign.series.multi_index import LowerSet, on_faces
 
 if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and case
-    from eigassign.mechanism.kinematics.limits import PropertyLimits, Rails
+    from eigassign.mechanism.kinematics.parameters import PropertyLimits, Rails
 
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ vertical: there r is the work of the weight per rate, Σ_links Tᵀ J (g, 0).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,9 +25,9 @@ from eigassign.mechanism.assembly.congruence import LocalLink, inertia
 from eigassign.mechanism.assembly.node_motion import MotionRows, SpringEnds, resists
 from eigassign.mechanism.assembly.pencil import AffineEntries, Entries, joined
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, multiply
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, multiply
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
 from eigassign.series.expression import Expression, Scalar, one_atom
@@ -47,10 +47,52 @@ def separated(
     Raises MechanismError where springs leave a motion whose direction changes with the pose, or
     would leave one more where a stiffness that varies is zero.
     """
-    found = _Resistance(case, motion, free, *_rows(case, parameters, motion, free))
-    W, pivots = found.unresisted()
-    found.require_lasting(W.shape[1])
+    rows, springs = _rows(case, parameters, motion, free)
+
+    def moved(W: Floats) -> str:
+        """The coordinates that move in W (n_free, n), in words."""
+        names = tuple(case.coordinates)
+        moving = np.flatnonzero(np.abs(W).max(axis=1) > RESISTED).tolist()
+        each = [names[motion.columns[free[k]]] for k in moving]
+        return " and ".join([", ".join(each[:-1]), each[-1]] if len(each) > 1 else each)
+
+    units = np.abs(rows).max(axis=(0, 1), initial=0.0)
+    units[units == 0.0] = 1.0
+    scaled = rows / units  # rad against m
+    scaled = scaled / np.maximum(np.abs(scaled).max(axis=(1, 2), keepdims=True), 1e-300)
+    always = _null_space(scaled.reshape(-1, len(free)))
+    least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
+    if least.shape[1] > always.shape[1]:
+        paths = tuple(dict.fromkeys(springs))
+        raise MechanismError(
+            "mechanism." + ".".join(paths[0].split(".")[:2]),
+            f"{' and '.join(paths)} hold {moved(least - always @ (always.T @ least))} in one "
+            "direction only, which changes with the pose. Give the springs stiffness in the other "
+            "directions, lock one of these coordinates, or give it a drive stiffness",
+        )
+    W, pivots = _echelon(always / units[:, None])
+    ranges = case.ranges
+    zero = np.array([path in ranges and ranges[path][0] == 0.0 for path in springs], dtype=bool)
+    left = _null_space(rows[~zero].reshape(-1, len(free)))
+    if zero.any() and left.shape[1] != W.shape[1]:
+        raise _unheld(case, np.array(springs)[zero].tolist(), moved(left))
     return _recombined(motion, free, W, pivots)
+
+
+def _unheld(case: CaseFile, springs: Sequence[str], moved: str) -> MechanismError:
+    """Where stiffnesses that vary are least, more moves than elsewhere."""
+    paths = dict.fromkeys(springs)
+    design = case.design.parameters.items()
+    named = {path: name for name, column in design for path in column.factors}
+    path = next(iter(paths))
+    place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
+    what = " and ".join(named.get(path, path) for path in paths)
+    return MechanismError(
+        place,
+        f"with {what} = 0 nothing holds {moved}, which adds a rigid-body motion: "
+        f"{'take a min' if path in named else 'set a value'} above 0, such as a thousandth of "
+        "the largest, or give the coordinate a drive",
+    )
 
 
 def swinging(
@@ -230,66 +272,6 @@ def _at_poses(table: CompiledArrays, z: Floats, span: Floats) -> Floats:
         except SingularityError:
             continue
     return np.repeat(table(z[:, None])[0], 2, axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Resistance:
-    """The resistance of springs to the motions of the ``free`` columns, see `_rows`."""
-
-    case: CaseFile
-    motion: Kinematics
-    free: Sequence[int]
-    rows: Floats
-    springs: tuple[str, ...]
-
-    def unresisted(self) -> tuple[Floats, list[int]]:
-        """W (n_free, n_rigid), and the coordinate of each column where it is 1, the others 0."""
-        units = np.abs(self.rows).max(axis=(0, 1), initial=0.0)
-        units[units == 0.0] = 1.0
-        scaled = self.rows / units  # rad against m
-        scaled = scaled / np.maximum(np.abs(scaled).max(axis=(1, 2), keepdims=True), 1e-300)
-        always = _null_space(scaled.reshape(-1, len(self.free)))
-        least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
-        if least.shape[1] > always.shape[1]:
-            raise self._turning(least - always @ (always.T @ least))
-        return _echelon(always / units[:, None])
-
-    def require_lasting(self, n_rigid: int) -> None:
-        """The motions that springs leave stay the same where stiffnesses that vary are least."""
-        ranges = self.case.ranges
-        lost = [path in ranges and ranges[path][0] == 0.0 for path in self.springs]
-        zero = np.array(lost, dtype=bool)
-        left = _null_space(self.rows[~zero].reshape(-1, len(self.free)))
-        if not zero.any() or left.shape[1] == n_rigid:
-            return
-        paths = dict.fromkeys(np.array(self.springs)[zero].tolist())
-        design = self.case.design.parameters.items()
-        named = {path: name for name, column in design for path in column.factors}
-        path = next(iter(paths))
-        place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
-        what = " and ".join(named.get(path, path) for path in paths)
-        raise MechanismError(
-            place,
-            f"with {what} = 0 nothing holds {self._moved(left)}, which adds a rigid-body motion: "
-            f"{'take a min' if path in named else 'set a value'} above 0, such as a thousandth of "
-            "the largest, or give the coordinate a drive",
-        )
-
-    def _moved(self, W: Floats) -> str:
-        """The coordinates that move in W (n_free, n), in words."""
-        names = tuple(self.case.coordinates)
-        moving = np.flatnonzero(np.abs(W).max(axis=1) > RESISTED).tolist()
-        moved = [names[self.motion.columns[self.free[k]]] for k in moving]
-        return " and ".join([", ".join(moved[:-1]), moved[-1]] if len(moved) > 1 else moved)
-
-    def _turning(self, left: Floats) -> MechanismError:
-        paths = tuple(dict.fromkeys(self.springs))
-        return MechanismError(
-            "mechanism." + ".".join(paths[0].split(".")[:2]),
-            f"{' and '.join(paths)} hold {self._moved(left)} in one direction only, which "
-            "changes with the pose. Give the springs stiffness in the other directions, lock one "
-            "of these coordinates, or give it a drive stiffness",
-        )
 
 
 def _null_space(A: Floats) -> Floats:

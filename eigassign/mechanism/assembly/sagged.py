@@ -29,7 +29,7 @@ from eigassign.mechanism.assembly.dynamics.under_load import Beams, LoadedPose
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.links import BentElement, bent_link
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
-from eigassign.mechanism.elements.sections import BeamValues
+from eigassign.mechanism.elements.sections import Profile, each_element
 from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import X
 from eigassign.mechanism.kinematics.parameters import Moved
@@ -90,8 +90,7 @@ class _Element(NamedTuple):
     axes: Floats
     step: Floats
     turn: Floats
-    own: Beams
-    k: int
+    profile: Profile
 
     def between(self, nodes: Nodes, number: Mapping[int, int]) -> BentElement:
         """What it is where the nodes are now: along its chord, its y the mean of both ends'."""
@@ -100,12 +99,8 @@ class _Element(NamedTuple):
         along, y = (q - p) / h, (R + S) @ self.axes[1]
         y = y - (along @ y) * along
         y = y / np.linalg.norm(y)
-        alike = self.own.alike
-        profile = [BeamValues(*row) for row in alike.values[self.k].tolist()]
-        if not alike.sheared:
-            profile = [beam._replace(shear_z=None, shear_y=None) for beam in profile]
         ends = number[self.ends[0]], number[self.ends[1]]
-        return BentElement(ends, np.array([along, y, np.cross(along, y)]), h, profile)
+        return BentElement(ends, np.array([along, y, np.cross(along, y)]), h, self.profile)
 
 
 def _elements(strand: Strand, own: Beams, v: Floats) -> Iterator[_Element]:
@@ -113,10 +108,11 @@ def _elements(strand: Strand, own: Beams, v: Floats) -> Iterator[_Element]:
     d = own.elements.seen(v[:, None])[..., 0]
     axes = np.array(strand.axes, dtype=np.float64)
     ends = pairwise(int(slots[0]) for slots in strand.slots)
-    for k, (pair, h, each) in enumerate(zip(ends, own.alike.h, d, strict=True)):
+    profiles = each_element(own.profile, len(d))
+    for pair, h, each, profile in zip(ends, own.h, d, profiles, strict=True):
         step = h * X + each[6:9] - each[:3] - np.cross(each[3:6], h * X)
         turn = Rotation.from_rotvec(each[9:] - each[3:6]).as_matrix()
-        yield _Element(pair, axes, step, turn, own, k)
+        yield _Element(pair, axes, step, turn, profile)
 
 
 def _set(start: Floats, elements: Sequence[_Element]) -> Nodes:

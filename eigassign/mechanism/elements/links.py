@@ -31,8 +31,8 @@ from eigassign.mechanism.elements.sections import (
     beam_values,
     each_element,
 )
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Scalar, atom_of, is_constant, parts
 

@@ -19,8 +19,8 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.parts import tensor
 from eigassign.mechanism.elements.beam import Shear
 from eigassign.mechanism.elements.sections import Profile
+from eigassign.mechanism.kinematics.joints import CROSS, DOFS, Objects, multiply, skew, vector
 from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects, multiply, skew, vector
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Expression, Scalar, atom_of, parts
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.solids.elements import KINDS, dofs, gradients, lame, mass, slopes
 from eigassign.mechanism.solids.part import AT_ONCE, Coupling, SolidPart, crossed, moments
 

@@ -5,8 +5,8 @@ of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that
 
 In a plane its nodes keep u_x, u_y and θ_z; u_z, θ_x and θ_y are held.
 
-The free-free modes K φ = λ M φ are solved as M φ = μ (K + s M) φ, μ = 1 / (λ + s), with s near the
-lowest λ of the part held at its nodes, so that rigid-body modes and elastic ones are both accurate.
+The free-free modes K φ = λ M φ are solved as M φ = μ (K + s M) φ, μ = 1 / (λ + s), with s near
+the highest λ that is looked at, so that rigid-body modes and elastic ones are both accurate.
 """
 
 from __future__ import annotations
@@ -23,7 +23,14 @@ from scipy.linalg import LinAlgError, eigh
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, MechanismError
-from eigassign.mechanism.elements.craig_bampton import DENSE, coefficients, held_factor
+from eigassign.mechanism.elements.craig_bampton import (
+    DENSE,
+    coefficients,
+    held_factor,
+    is_semidefinite,
+    kept_factor,
+    largest_modes,
+)
 from eigassign.mechanism.elements.mesh import (
     Entries,
     LinkMesh,
@@ -35,8 +42,8 @@ from eigassign.mechanism.elements.mesh import (
     total,
 )
 from eigassign.mechanism.elements.solid_stress import stressed
-from eigassign.mechanism.elements.sparse_factor import is_semidefinite, kept_factor, largest_modes
 from eigassign.mechanism.imports.parts import UNITS, imported_part, matrix_keys
+from eigassign.mechanism.kinematics.joints import DOFS, vector
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,
     initial_design,
@@ -45,7 +52,6 @@ from eigassign.mechanism.kinematics.parameters import (
     parameters,
     written_loads,
 )
-from eigassign.mechanism.kinematics.rotations import DOFS, vector
 from eigassign.mechanism.solids.part import solid_part
 from eigassign.series.expression import Expression, Scalar
 
@@ -285,7 +291,7 @@ def free_part_lines(
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
     strain = rigid_strain(K, N)
-    free, lowest = _free_modes(K, M, mesh, strain, len(J))
+    free, lowest = _free_modes(K, M, strain, len(J))
     lines = [
         f"{title}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m, about it "
         f"{about} kg m2",
@@ -306,14 +312,14 @@ def free_part_lines(
 
 
 def _free_modes(
-    K: sparse.csr_array, M: sparse.csr_array, mesh: LinkMesh, strain: float, expected: int
+    K: sparse.csr_array, M: sparse.csr_array, strain: float, expected: int
 ) -> tuple[str, float]:
     """The number of rigid modes and the lowest elastic frequencies, in words, and the first in Hz.
 
     Nothing and 0 where they fail.
     """
     try:
-        lam, phi = _lowest(K, M, mesh, expected + 2 * _ELASTIC)
+        lam, phi = _lowest(K, M, expected + 2 * _ELASTIC)
     except (LinAlgError, ArithmeticError, AccuracyError, IndexError):
         return "", 0.0
     least = max(_RIGID * lam[-1], _NOISE * K.trace() / M.trace())
@@ -332,35 +338,18 @@ def _free_modes(
     return f"{text}; ", float(hz[0]) if len(hz) else 0.0
 
 
-def _lowest(
-    K: sparse.csr_array, M: sparse.csr_array, mesh: LinkMesh, count: int
-) -> tuple[Floats, Floats]:
-    """The ``count`` lowest λ at most, ascending, and their modes."""
+def _lowest(K: sparse.csr_array, M: sparse.csr_array, count: int) -> tuple[Floats, Floats]:
+    """The ``count`` lowest λ at most, ascending, and their modes; s is near them at last."""
     s = 1e-6 * float(K.trace() / M.trace())
-    if K.shape[0] <= DENSE:
-        for _ in range(2):  # the second time with s near what was found
-            mu, phi = eigh(M.toarray(), (K + s * M).toarray())
+    for _ in range(2):
+        A = sparse.csc_array(K + s * M)
+        if A.shape[0] <= DENSE:
+            mu, phi = eigh(M.toarray(), A.toarray())
             mu, phi = mu[::-1][:count], phi[:, ::-1][:, :count]
-            lam = 1.0 / mu[mu > _MASSLESS * mu[0]] - s
-            s = max(s, float(lam[-1]))
-        return np.asarray(lam), np.asarray(phi)
-    s = max(1e-6 * s, _held_eigenvalue(K, M, mesh))
-    A = sparse.csc_array(K + s * M)
-    if (factor := kept_factor(A)) is None:
-        raise AccuracyError("a part without mass is loose")
-    mu, phi = largest_modes(factor, A.T, lambda v: np.asarray(M @ v), count)
-    return 1.0 / mu[mu > _MASSLESS * mu[0]] - s, phi
-
-
-def _held_eigenvalue(K: sparse.csr_array, M: sparse.csr_array, mesh: LinkMesh) -> float:
-    """About the lowest λ with the nodes held, by four steps of inverse iteration; 0 without it."""
-    held = np.concatenate([slots[slots >= 0] for slots in mesh.nodes.values()])
-    i = np.setdiff1d(np.arange(K.shape[0]), held)
-    factor = kept_factor(sparse.csc_array(K[i][:, i])) if len(i) else None
-    if factor is None:
-        return 0.0
-    M_ii, v = M[i][:, i], np.random.default_rng(0).standard_normal(len(i))
-    for _ in range(4):
-        v = factor.solve(M_ii @ v)
-        v /= np.abs(v).max() or 1.0
-    return float((v @ (K[i][:, i] @ v)) / (v @ (M_ii @ v)))
+        elif (factor := kept_factor(A)) is None:
+            raise AccuracyError("a part without mass is loose")
+        else:
+            mu, phi = largest_modes(factor, A.T, lambda v: np.asarray(M @ v), count)
+        lam = 1.0 / mu[mu > _MASSLESS * mu[0]] - s
+        s = max(s, float(lam[-1]))
+    return np.asarray(lam), np.asarray(phi)

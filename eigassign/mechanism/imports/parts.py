@@ -26,7 +26,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes, seen_from
-from eigassign.mechanism.imports import entries, matlab, op4, programs
+from eigassign.mechanism.imports import entries, op4, programs
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
@@ -46,7 +46,7 @@ T = TypeVar("T")
 _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     entries.read_matrix_market,
     entries.read_numpy,
-    matlab.read_matlab,
+    entries.read_matlab,
     op4.read_binary,
     op4.read_text,
     programs.read_bulk,

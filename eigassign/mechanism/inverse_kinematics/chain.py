@@ -11,7 +11,7 @@ components of the tip's position, r = 1 or 3 of its turning.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import ADVANCING, FREEDOMS
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
+from eigassign.mechanism.kinematics.joints import Objects, multiply
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, derivative
@@ -65,7 +65,8 @@ class TipChain:
     kinds: tuple[str, ...]
     turned_by: tuple[int, ...] = ()  # the components of a rotation vector that a tip can have
     assembly: LoopAssembly | None = None
-    design: ChainDesign | None = None  # how it changes with the design; None of a chain without one
+    y: Floats = field(default_factory=lambda: np.zeros(0))  # the design (n_y,) that it is of
+    design: TipTables | None = None  # how it changes with the design; None of a chain without one
 
     @property
     def n_q(self) -> int:
@@ -75,16 +76,6 @@ class TipChain:
     def of_kind(self, kind: str) -> Bools:
         """Mask of the entries of a state that are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)
-
-
-@dataclass(frozen=True)
-class ChainDesign:
-    """A chain as a function of the design parameters y, written down once for all of them."""
-
-    names: tuple[str, ...]
-    y: Floats  # (n_y,) of this chain
-    chain: Callable[[Floats], TipChain]  # y (n_y,) -> the same chain at another design
-    evaluate: Callable[[Floats, Floats], TipEvaluation]  # z, y -> the columns of y after those of q
 
 
 @dataclass(frozen=True)
@@ -139,27 +130,12 @@ def tip_chain(
     """
     points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
     set_ = np.zeros(0) if loads is None else loads / parameters.scales
-    tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else (), set_)
-    passive = None  # the passive freedoms of the model itself
-    if motion.passive:
-        passive = parameters.compiled(np.array(motion.passive, dtype=object))
-
-    def at(y: Floats) -> TipChain:
-        return TipChain(
-            evaluate=partial(tables.evaluate, y=y),
-            joints=tuple(c.joint for c in case.coordinates.values()),
-            relative_map=(motion.relative, motion.offset),
-            kinds=_kinds(case, motion.tree),
-            turned_by=tables.turns,
-            assembly=_assembly(case, passive, motion, tables.properties(y)),
-            design=ChainDesign(parameters.design, y, at, tables.evaluate_with_design),
-        )
-
-    return at(y)
+    own = (points, turns if oriented else (), set_)
+    return TipTables(case, parameters, motion, tip, *own).chain(y)
 
 
 @dataclass(frozen=True, eq=False)
-class _TipTables:
+class TipTables:
     """The chain's scalars over z and y, compiled once, and evaluated for all states together.
 
     The links are placed anew with open loops: passive freedoms are variables, closure is an
@@ -174,6 +150,40 @@ class _TipTables:
     d: int
     turns: tuple[int, ...]
     loads: Floats  # (n_loads,) as variables of the program: see ModelParameters
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The design parameters y."""
+        return self.parameters.design
+
+    def chain(self, y: Floats) -> TipChain:
+        """The chain at design y (n_y,)."""
+        return TipChain(
+            evaluate=partial(self.evaluate, y=y),
+            joints=tuple(c.joint for c in self.case.coordinates.values()),
+            relative_map=(self.motion.relative, self.motion.offset),
+            kinds=_kinds(self.case, self.motion.tree),
+            turned_by=self.turns,
+            assembly=self._assembly(y) if self.motion.passive else None,
+            y=y,
+            design=self,
+        )
+
+    @cached_property
+    def _passive_table(self) -> CompiledArrays:
+        """The passive freedoms of the model itself."""
+        return self.parameters.compiled(np.array(self.motion.passive, dtype=object))
+
+    def _assembly(self, y: Floats) -> LoopAssembly:
+        """The branch of the model itself: where it was chosen, and its passive freedoms."""
+
+        def passive(q: Floats) -> Floats:
+            return self._passive_table(self._variables(q, y))[0]
+
+        gaps, sines = (2, 1) if self.case.mechanism.space == "planar" else (3, 3)
+        loops = len(self.motion.tree.loops)
+        turning = np.array(([False] * gaps + [True] * sines) * loops, dtype=bool)
+        return LoopAssembly(reference_coordinates(self.case), passive, turning)
 
     def properties(self, y: Floats) -> Floats:
         """The loads and the design y as variables of the program, behind s."""
@@ -291,20 +301,3 @@ def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
         turn = "screw" if kind == "screw" or (tree.loops and advancing) else "turn"
         kinds.append("slide" if slides else turn)
     return tuple(kinds)
-
-
-def _assembly(
-    case: CaseFile, table: CompiledArrays | None, motion: Kinematics, properties: Floats
-) -> LoopAssembly | None:
-    """The branch of the model itself: where it was chosen, and its passive freedoms."""
-    if table is None:
-        return None
-
-    def passive(q: Floats) -> Floats:
-        s = q @ motion.relative.T + motion.offset
-        z = np.hstack([s, np.broadcast_to(properties, (len(q), len(properties)))]).T
-        return table(z)[0]
-
-    gaps, sines = (2, 1) if case.mechanism.space == "planar" else (3, 3)
-    turning = np.array(([False] * gaps + [True] * sines) * len(motion.tree.loops), dtype=bool)
-    return LoopAssembly(reference_coordinates(case), passive, turning)

@@ -103,43 +103,6 @@ def lost_assembly(ik: TipProblem, course: Course, k: int, u: Floats, why: str) -
     return TrajectoryError(WAYPOINTS, message, k)
 
 
-def blocked(
-    ik: TipProblem, course: Course, k: int, s: float, u: Floats, dead: bool
-) -> TrajectoryError:
-    """The path was followed to parameter s and state u (n_z,), and not on to sample k."""
-    where = ", ".join(f"{x:.6g}" for x in course.path.point(s)[0])
-    why = (
-        "the loops are at a dead point"
-        if dead
-        else "the links stand stretched or folded in line, at the end of their reach"
-    )
-    message = (
-        f"{course.label(k)} cannot be reached without a jump: near ({where}) m, {pose(ik, u)}, "
-        f"{why}; keep the path away from there"
-    )
-    return TrajectoryError(WAYPOINTS, message, k)
-
-
-def other_branch(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
-    """Sample k can be reached with another design, but not from state u (n_z,) of the first one."""
-    why = (
-        "the links come to stand stretched or folded in line, or the loops at a dead point"
-        if ik.rank == ik.n_q
-        else "the motion that leaves the tip in place, kept as in the initial design, has to change"
-    )
-    message = (
-        f"{course.label(k)} can be reached, but not by changing the design steadily from the "
-        f"initial one: near {pose(ik, u)} {why}; take narrower bounds"
-    )
-    return TrajectoryError(WAYPOINTS, message, k)
-
-
-def with_design(values: Mapping[str, float], error: TrajectoryError) -> TrajectoryError:
-    """The same error with the design parameters at which it was met, SI."""
-    design = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
-    return TrajectoryError(error.path, f"with {design}: {error.message}", error.sample)
-
-
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
@@ -287,7 +250,17 @@ def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryE
     # a dead point, where two assemblies meet, can be come as near to as 1e-6 of L
     if miss[best] > (1e-6 if dead else RESIDUAL) * ik.lever:
         return out_of_reach(ik, course, k, u[best])
-    return blocked(ik, course, k, float(path.s[-1]), last, dead)
+    where = ", ".join(f"{x:.6g}" for x in course.path.point(path.s[-1])[0])
+    why = (
+        "the loops are at a dead point"
+        if dead
+        else "the links stand stretched or folded in line, at the end of their reach"
+    )
+    message = (
+        f"{course.label(k)} cannot be reached without a jump: near ({where}) m, {pose(ik, last)}, "
+        f"{why}; keep the path away from there"
+    )
+    return TrajectoryError(WAYPOINTS, message, k)
 
 
 def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:

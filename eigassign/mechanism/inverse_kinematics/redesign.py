@@ -25,15 +25,14 @@ from functools import cached_property
 import numpy as np
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import Bools, ChainDesign, Floats, reduced
+from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, TipTables, reduced
 from eigassign.mechanism.inverse_kinematics.follow import (
     RESIDUAL,
     Followed,
     as_assembled,
-    other_branch,
     out_of_reach,
+    pose,
     require_reached,
-    with_design,
 )
 from eigassign.mechanism.inverse_kinematics.solver import (
     ROUND_OFF,
@@ -46,7 +45,7 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     within,
 )
-from eigassign.mechanism.inverse_kinematics.tip_path import Course
+from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +54,14 @@ class PathOfDesign:
 
     course: Course
     problem: TipProblem  # at the initial design y0
-    design: ChainDesign
     u: Floats  # states (n, n_z) at y0
+
+    @property
+    def design(self) -> TipTables:
+        """The chain as a function of the design; MechanismError where it is not known."""
+        if self.problem.chain.design is None:
+            raise MechanismError("design", "this chain is not known as a function of the design")
+        return self.problem.chain.design
 
     def __call__(self, y: Floats) -> tuple[Floats, Floats]:
         """q (n, n_q) in rad or m and dq/dy (n, n_q, n_y) at design y (n_y,), SI.
@@ -66,11 +71,12 @@ class PathOfDesign:
         """
         y = np.asarray(y, dtype=np.float64)
         try:
-            u = self.u if np.array_equal(y, self.design.y) else self.states(y)
+            u = self.u if np.array_equal(y, self.problem.chain.y) else self.states(y)
         except TrajectoryError as error:
             values = dict(zip(self.design.names, y.tolist(), strict=True))
-            shown = {name: values[name] for name in self.moving}
-            raise with_design(shown, error) from None
+            design = ", ".join(f"{name} = {values[name]:.6g}" for name in self.moving)
+            message = f"with {design}: {error.message}"
+            raise TrajectoryError(error.path, message, error.sample) from None
         n_q = self.problem.n_q
         q = (u * self.problem.scale)[:, :n_q]
         slopes = self._slopes(y, u)[:, :n_q] * self.problem.scale[:n_q, None]
@@ -81,7 +87,7 @@ class PathOfDesign:
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """The parameters that move the tip, or what its loops consist of."""
-        moves = np.abs(self._slopes(self.design.y, self.u)).max(axis=(0, 1)) > 0.0
+        moves = np.abs(self._slopes(self.problem.chain.y, self.u)).max(axis=(0, 1)) > 0.0
         return tuple(name for name, one in zip(self.design.names, moves, strict=True) if one)
 
     @property
@@ -107,7 +113,7 @@ class PathOfDesign:
 
     def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""
-        y0, target = self.design.y, self.course.target(self.course.s)
+        y0, target = self.problem.chain.y, self.course.target(self.course.s)
         u, done, step = self.u, 0.0, 1.0
         seen = self.problem.evaluate(u)
         motion = within(reduced(seen, self.problem.n_q), self.directions)
@@ -136,7 +142,17 @@ class PathOfDesign:
         best = int(np.argmin(miss))
         if miss[best] > RESIDUAL * ik.lever:
             return out_of_reach(ik, self.course, k, tried[best])
-        return other_branch(ik, self.course, k, u[k])
+        why = (
+            "the links come to stand stretched or folded in line, or the loops at a dead point"
+            if ik.rank == ik.n_q
+            else "the motion that leaves the tip in place, kept as in the initial design, has to "
+            "change"
+        )
+        message = (
+            f"{self.course.label(k)} can be reached, but not by changing the design steadily from "
+            f"the initial one: near {pose(ik, u[k])} {why}; take narrower bounds"
+        )
+        return TrajectoryError(WAYPOINTS, message, k)
 
     def _slopes(self, y: Floats, u: Floats) -> Floats:
         """du/dy (n, n_z, n_y) where the samples are at their points and the loops are closed."""
@@ -156,10 +172,7 @@ def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
 
     Raises MechanismError for a parameter that moves the tip away from all that it can reach.
     """
-    design = followed.problem.chain.design
-    if design is None:
-        raise MechanismError("design", "this chain is not known as a function of the design")
-    path = PathOfDesign(course, followed.problem, design, followed.u)
+    path = PathOfDesign(course, followed.problem, followed.u)
     _require_within_reach(path)
     return path
 
@@ -167,11 +180,11 @@ def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
 def _require_within_reach(path: PathOfDesign) -> None:
     """Refuse parameters whose effect on the tip no coordinate can undo, by their names."""
     ik, design = path.problem, path.design
-    n_q, n_y = ik.n_q, len(design.y)
-    moved = reduced(ik.evaluate_with_design(path.u, design, design.y), n_q + n_y).J
-    left = moved[:, :, n_q:] + moved[:, :, :n_q] @ path._slopes(design.y, path.u)[:, :n_q]
+    n_q, n_y = ik.n_q, len(ik.chain.y)
+    moved = reduced(ik.evaluate_with_design(path.u, design, ik.chain.y), n_q + n_y).J
+    left = moved[:, :, n_q:] + moved[:, :, :n_q] @ path._slopes(ik.chain.y, path.u)[:, :n_q]
     # what moves the tip is in m or rad, and may be 0: it counts as L or 1 at least
-    size = np.maximum(np.abs(design.y), min(ik.lever, 1.0))
+    size = np.maximum(np.abs(ik.chain.y), min(ik.lever, 1.0))
     off = np.linalg.norm(left, axis=1).max(axis=0) * size
     for name, length in zip(design.names, off, strict=True):
         # 1e-6 of L, per relative change of the parameter, is round-off

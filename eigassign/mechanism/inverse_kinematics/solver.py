@@ -24,11 +24,11 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Bools,
-    ChainDesign,
     Floats,
     Reduced,
     TipChain,
     TipEvaluation,
+    TipTables,
     reduced,
 )
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
@@ -62,10 +62,10 @@ class TipProblem:
         """The chain's evaluation with metres and radians in one measure."""
         return self._measured(self.chain.evaluate(u * self.scale), self.scale)
 
-    def evaluate_with_design(self, u: Floats, design: ChainDesign, y: Floats) -> TipEvaluation:
+    def evaluate_with_design(self, u: Floats, design: TipTables, y: Floats) -> TipEvaluation:
         """The same at design y, with its columns, per unit of y, after those of q."""
         scale = np.insert(self.scale, self.n_q, np.ones(len(y)))
-        return self._measured(design.evaluate(u * self.scale, y), scale)
+        return self._measured(design.evaluate_with_design(u * self.scale, y), scale)
 
     def _measured(self, seen: TipEvaluation, scale: Floats) -> TipEvaluation:
         chain, J, r = self.chain, seen.jacobian * scale, len(self.chain.turned_by)
@@ -351,6 +351,12 @@ def least_norm(J: Floats, error: Floats, rank: int) -> Floats:
     return np.asarray(step[:, :, 0])
 
 
+def moved(motion: Reduced, task: Floats, rank: int) -> Floats:
+    """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
+    own = least_norm(motion.J, task, rank)
+    return np.hstack([own, np.einsum("npq,nq->np", motion.following, own)])
+
+
 def handedness(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
     """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
 
@@ -386,15 +392,6 @@ _MAX_ADVANCE = 0.125  # of the path, a trace step
 
 
 @dataclass(frozen=True)
-class TracePoint:
-    """A solution u (1, n_z) at path parameter s, with du/ds."""
-
-    s: float
-    u: Floats
-    slope: Floats
-
-
-@dataclass(frozen=True)
 class Trace:
     """Solutions at path parameters s_i (m,) with their slopes du/ds, up to where it got."""
 
@@ -413,25 +410,25 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
     seen = ik.evaluate(u0[None])
     motion = reduced(seen, ik.n_q)
     sense = handedness(ik, seen, motion)[0]
-    here = _pose(ik, course, float(course.s[0]), u0[None], motion)
-    poses, advance, bend = [here], _MAX_ADVANCE, np.zeros_like(here.u)
+    s, u, slope = [float(course.s[0])], [u0], [_slope(ik, course, float(course.s[0]), motion)]
+    advance, bend = _MAX_ADVANCE, np.zeros_like(u0)
     # below 1e-8 of the path the joints turn faster and faster without advancing
-    while here.s < stops[-1] and advance >= 1e-8:
-        fastest = float(np.abs(here.slope[:, : ik.n_q]).max())
+    while s[-1] < stops[-1] and advance >= 1e-8:
+        fastest = float(np.abs(slope[-1][: ik.n_q]).max())
         advance = min(advance, turn / max(fastest, turn))
-        stop = float(stops[np.searchsorted(stops, here.s, side="right")])
-        s = min(here.s + advance, stop)
-        guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
-        found = newton(ik, guess, course.target(np.array([s])), _TRACE)
+        stop = float(stops[np.searchsorted(stops, s[-1], side="right")])
+        there = min(s[-1] + advance, stop)
+        step = there - s[-1]
+        guess = (u[-1] + step * (slope[-1] + step * bend))[None]
+        found = newton(ik, guess, course.target(np.array([there])), _TRACE)
         if (lost(ik, found, guess, _STRAY * turn, sense) | singular(ik, found))[0]:
-            advance = 0.5 * min(advance, stop - here.s)
+            advance = 0.5 * min(advance, stop - s[-1])
             continue
-        there = _pose(ik, course, s, found.u, found.motion)
-        bend = 0.5 * (there.slope - here.slope) / (there.s - here.s) * (there.s < stop)
-        poses.append(there)
-        here, advance = there, min(2.0 * advance, _MAX_ADVANCE)
-    u, slopes = np.vstack([p.u for p in poses]), np.vstack([p.slope for p in poses])
-    return Trace(np.array([p.s for p in poses]), u, slopes, sense)
+        s, u = [*s, there], [*u, found.u[0]]
+        slope.append(_slope(ik, course, there, found.motion))
+        bend = 0.5 * (slope[-1] - slope[-2]) / step * (there < stop)
+        advance = min(2.0 * advance, _MAX_ADVANCE)
+    return Trace(np.array(s), np.array(u), np.array(slope), sense)
 
 
 def lost(ik: TipProblem, found: Corrected, guess: Floats, most: float, sense: Floats) -> Bools:
@@ -448,12 +445,11 @@ def singular(ik: TipProblem, found: Corrected) -> Bools:
     return np.asarray((regularity < _SINGULAR) | (loop_regularity(ik, found.seen) < DEAD))
 
 
-def _pose(ik: TipProblem, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:
+def _slope(ik: TipProblem, course: Course, s: float, motion: Reduced) -> Floats:
+    """du/ds (n_z,) along the path at parameter s."""
     velocity, spin = course.rates(s)
     spin = ik.lever * spin[:, list(ik.chain.turned_by)]
-    slope = least_norm(motion.J, np.hstack([velocity, spin]), ik.rank)
-    passive = np.einsum("npq,nq->np", motion.following, slope)
-    return TracePoint(s, u, np.hstack([slope, passive]))
+    return np.asarray(moved(motion, np.hstack([velocity, spin]), ik.rank)[0])
 
 
 def interpolated(path: Trace, s: Floats) -> Floats:

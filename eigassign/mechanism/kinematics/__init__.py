@@ -2,11 +2,9 @@
 
 Read in this order; each imports only from those above it:
 
-    rotations     rotation matrices and rigid transformations
-    joints        rotation, translation and motion subspace A of each type of joint
+    joints        rotations; rotation, translation and motion subspace A of each type of joint
     topology      spanning tree, loop-closing joints, freedoms; coordinates, s = A q + b
-    parameters    numbers of the mechanism, lengths and node positions; design parameters
+    parameters    numbers of the mechanism, node positions; what riders and properties may be
     forward       twists of the links, from the ground to the tips; their frames in the world
     loop_closure  passive freedoms p(q, y) and their rates P q̇; the assembly branch
-    limits        how far riders may travel on their beams, and what properties that vary may be
 """

@@ -20,20 +20,22 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
-from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
+from eigassign.mechanism.kinematics.joints import (
+    Floats,
+    JointMotion,
+    Objects,
+    cross,
+    joint_motion,
+    mounting,
+    multiply,
+    present,
+    turned,
+)
 from eigassign.mechanism.kinematics.parameters import (
     STILL,
     ModelParameters,
     link_type,
     node_position,
-)
-from eigassign.mechanism.kinematics.rotations import (
-    Floats,
-    Objects,
-    cross,
-    mounting,
-    multiply,
-    present,
 )
 from eigassign.mechanism.kinematics.topology import (
     CoordinateMap,
@@ -42,7 +44,6 @@ from eigassign.mechanism.kinematics.topology import (
     Topology,
     split,
 )
-from eigassign.series.compiler import CompiledArrays
 from eigassign.series.expression import Scalar
 
 
@@ -326,27 +327,10 @@ class LinkFrames:
         """Numbers (n_samples, *shape) of arrays of this mechanism's scalars, evaluated together."""
         return self.parameters.compiled(*arrays)(self.parameters.z(np.atleast_2d(x)))
 
-    @cached_property
-    def _ends(self) -> CompiledArrays:
-        """World positions (n_lines, 2, 3) of both ends of every drawn line of each link."""
-        drawn = zip(self.links, self.drawn, strict=True)
-        places = [[[self.world(k, node) for node in pair] for pair in pairs] for k, pairs in drawn]
-        return self.parameters.compiled(*(np.array(each, dtype=object) for each in places))
-
     def world(self, link: str, node: str) -> NDArray[np.object_]:
         """World position of a named node, as scalars (3,)."""
         X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
         return self.motion.placement(link).at(X)[1]
-
-    def segments(self, x: Floats) -> tuple[Floats, ...]:
-        """The straight lines of each link, (n, n_lines, 2 ends, 3) in m."""
-        return tuple(self._ends(self.parameters.z(np.atleast_2d(x))))
-
-    def lines(self, x: Floats) -> Floats:
-        """Start and end of every link, (n, n_links, 2, 3) in m: the first and last point drawn."""
-        pieces = self.segments(x)
-        ends = [np.stack([p[:, 0, 0], p[:, -1, 1]], axis=1) for p in pieces]
-        return np.stack(ends, axis=1)
 
     def position(self, x: Floats, link: str, node: str) -> Floats:
         """World position (n, 3) of a named node, in m."""

@@ -17,12 +17,12 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
+from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, multiply
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,
     initial_design,
     written_loads,
 )
-from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, multiply
 from eigassign.mechanism.kinematics.topology import CoordinateMap, Topology
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative

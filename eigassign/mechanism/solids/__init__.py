@@ -4,6 +4,5 @@ Read in this order; each imports only from those above it:
 
     elements   stiffness and mass of tetrahedra of 4 and 10 nodes and hexahedra of 20
     mesh_file  a mesh from a file of gmsh, Abaqus, CalculiX or Nastran, within limits
-    enriched   how far a mesh errs, by functions of one degree more
-    part       K, M and rigid motion of a part, for E = 1 and ρ = 1; nodes for surfaces
+    part       K, M and rigid motion of a part; nodes for surfaces; how far its mesh errs
 """

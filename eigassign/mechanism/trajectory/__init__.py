@@ -2,7 +2,6 @@
 
 Read in this order; each imports only from those above it:
 
-    csv         joint samples from a CSV file
-    motion      q, q̇ and q̈ at any time: of points by timing laws, of samples, along a path
+    motion      samples from CSV files; q, q̇ and q̈ at any time: of points, of samples, of a tip
     trajectory  the trajectory of a case; several together; rates q̇ and q̈
 """

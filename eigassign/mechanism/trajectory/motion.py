@@ -1,4 +1,7 @@
-"""q, q̇ and q̈ at any time of a trajectory, exactly, and timing laws s(τ).
+"""q, q̇ and q̈ at any time of a trajectory, exactly; timing laws s(τ); samples from CSV files.
+
+s and rad (m for strokes) are meant where no unit is written; see `eigassign.case.table`. The
+columns of the tip that runs write (`tip x [m]`, …) are passed over without a note.
 
 Point to point, q(t) runs between joint coordinates, each segment by the same timing law.
 
@@ -15,10 +18,11 @@ Shapes: n times, m points, n_q coordinates, n_z entries of a state u. SI units, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -26,14 +30,64 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
+from eigassign.case.table import CsvColumn, CsvTable, read_table
+from eigassign.case.units import DIMENSIONS
+from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import reduced
 from eigassign.mechanism.inverse_kinematics.follow import Followed, at_parameters
 from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign
-from eigassign.mechanism.inverse_kinematics.solver import TipProblem, least_norm
+from eigassign.mechanism.inverse_kinematics.solver import TipProblem, moved
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, smooth
 
 Floats = NDArray[np.float64]
+_KEY = "trajectory.file"
+TIME = "time"
+TIP_COLUMNS = ("tip x", "tip y", "tip z")
+_KINDS = {"rad": "angle", "m": "length"}
+
+
+@dataclass(frozen=True)
+class SampleTable:
+    """Samples as a file gives them, in SI units."""
+
+    time_s: Floats  # (n,)
+    q: Floats  # (n, n_q) in rad or m
+    table: CsvTable
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on what was ignored."""
+        return self.table.notes
+
+    def where(self, k: int) -> str:
+        """``file:line`` of sample k."""
+        return self.table.where(k)
+
+
+def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
+    """One for each coordinate; ``q_units`` are "rad" or "m", all rad if empty."""
+    units = q_units or ["rad"] * len(q_names)
+    return [
+        CsvColumn(name, (DIMENSIONS[_KINDS[unit]],))
+        for name, unit in zip(q_names, units, strict=True)
+    ]
+
+
+def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()) -> SampleTable:
+    """Samples of the coordinates ``q_names`` from a CSV file, in SI units.
+
+    ``q_units`` are those of the coordinates, "rad" or "m"; all rad if empty.
+
+    Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
+    TrajectoryError for a line that does not hold one finite number a column; both name the line.
+    """
+    columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
+    table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
+    if len(table.lines) < 2:
+        message = f"{file.name}: {len(table.lines)} samples; at least two are needed"
+        raise MechanismError(_KEY, message)
+    values = np.column_stack([table.numbers[column.name] for column in columns])
+    return SampleTable(values[:, 0].copy(), np.ascontiguousarray(values[:, 1:]), table)
 
 
 @dataclass(frozen=True)
@@ -288,11 +342,10 @@ class TipMotion(Motion):
 
     def of_design(self, time_s: Floats) -> PathOfDesign | None:
         """How q at times (n,) follows the design, where that moves the tip."""
-        design, course = self.followed.problem.chain.design, self.course_at(time_s)
-        if design is None or not self.follows_design:
+        if not self.follows_design:
             return None
-        u = at_parameters(self.followed, course)
-        return PathOfDesign(course, self.followed.problem, design, u)
+        course = self.course_at(time_s)
+        return PathOfDesign(course, self.followed.problem, at_parameters(self.followed, course))
 
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone."""
@@ -328,8 +381,8 @@ class TipMotion(Motion):
         """The problem at design y, q (n, n_q) and the states u (n, n_z), at times or a course."""
         course = self.course_at(time_s) if course is None else course
         u, ik = at_parameters(self.followed, course), self.followed.problem
-        if y is not None and self.follows_design and ik.chain.design is not None:
-            path = PathOfDesign(course, ik, ik.chain.design, u)
+        if y is not None and self.follows_design:
+            path = PathOfDesign(course, ik, u)
             u, ik = path.states(y), path.problem_at(y)
         return ik, np.array((u * ik.scale)[:, : ik.n_q]), u
 
@@ -344,24 +397,21 @@ class TipMotion(Motion):
         """u̇ and ü (n, n_z); see the module."""
         first, second = self._task(ik, course, 1), self._task(ik, course, 2)
         rate, push = first * ds, second * ds**2 + first * dds
-        u_rate = _motion(ik, u, rate)
+
+        def along(state: Floats, task: Floats) -> Floats:
+            return moved(reduced(ik.evaluate(state), ik.n_q), task, ik.rank)
+
+        u_rate = along(u, rate)
         size = np.abs(u_rate).max(axis=1, initial=0.0, keepdims=True)
         h = _STEP / np.where(size > 0.0, size, 1.0)
-        at = {k: _motion(ik, u + k * h * u_rate, rate) for k in (-2, -1, 1, 2)}
+        at = {k: along(u + k * h * u_rate, rate) for k in (-2, -1, 1, 2)}
         turning = (8.0 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12.0 * h)
-        return u_rate, turning + _motion(ik, u, push)
+        return u_rate, turning + along(u, push)
 
     def _task(self, ik: TipProblem, course: Course, order: Literal[1, 2]) -> Floats:
         """dp/ds or d²p/ds² (n, m): the point in m, the turning times the lever."""
         velocity, spin = course.rates(course.s, order)
         return np.hstack([velocity, ik.lever * spin[:, list(ik.chain.turned_by)]])
-
-
-def _motion(ik: TipProblem, u: Floats, task: Floats) -> Floats:
-    """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
-    motion = reduced(ik.evaluate(u), ik.n_q)
-    own = least_norm(motion.J, task, ik.rank)
-    return np.hstack([own, np.einsum("npq,nq->np", motion.following, own)])
 
 
 # --- with more behind q
@@ -379,10 +429,13 @@ class Loaded(Motion):
         """Those of the motion."""
         return self.motion.breaks_s
 
+    def behind(self, q: Floats) -> Floats:
+        """The loads behind coordinates q (n, n_q)."""
+        return np.hstack([q, np.broadcast_to(self.loads, (len(q), len(self.loads)))])
+
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone, with the loads."""
-        behind = np.broadcast_to(self.loads, (len(time_s), len(self.loads)))
-        return np.hstack([self.motion.poses(time_s, y), behind])
+        return self.behind(self.motion.poses(time_s, y))
 
     def tip(self, time_s: Floats) -> Floats | None:
         """That of the motion."""
@@ -396,14 +449,12 @@ class Loaded(Motion):
 
         def loaded(y: Floats) -> tuple[Floats, Floats]:
             q, slopes = own(y)
-            behind = np.broadcast_to(self.loads, (len(q), len(self.loads)))
-            still = np.zeros((len(q), len(self.loads), len(y)))
-            return np.hstack([q, behind]), np.concatenate([slopes, still], axis=1)
+            return self.behind(q), np.pad(slopes, [(0, 0), (0, len(self.loads)), (0, 0)])
 
         return loaded
 
     def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
         """q with the loads behind, which do not move."""
-        found, shape = self.motion.moving(time_s, y), (len(time_s), len(self.loads))
-        behind = np.broadcast_to(self.loads, shape), np.zeros(shape), np.zeros(shape)
-        return Moving(*(np.hstack([a, b]) for a, b in zip(found, behind, strict=True)))
+        q, *rates = self.motion.moving(time_s, y)
+        still = [(0, 0), (0, len(self.loads))]
+        return Moving(self.behind(q), *(np.pad(each, still) for each in rates))

@@ -41,7 +41,6 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
     spline,
     straight,
 )
-from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.motion import (
     BESIDE,
     Loaded,
@@ -50,6 +49,7 @@ from eigassign.mechanism.trajectory.motion import (
     PointMotion,
     SampledMotion,
     TipMotion,
+    read_samples,
     shared_times,
     timing_law,
 )

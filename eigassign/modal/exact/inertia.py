@@ -29,7 +29,7 @@ from scipy.linalg import lapack
 
 from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import NO_MASS
 from eigassign.modal.exact.sparse import principal

@@ -9,7 +9,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import (
+from eigassign.mechanism.elements.craig_bampton import (
     factorise,
     has_positive_pivots,
     largest_modes,

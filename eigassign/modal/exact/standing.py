@@ -20,7 +20,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import (
+from eigassign.mechanism.elements.craig_bampton import (
     definite_factor,
     factorise,
     has_positive_pivots,

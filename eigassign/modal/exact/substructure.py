@@ -45,7 +45,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import definite_factor, largest_modes
+from eigassign.mechanism.elements.craig_bampton import definite_factor, largest_modes
 from eigassign.modal.exact.condensation import (
     Modes,
     condense_blocks,

@@ -30,7 +30,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise, lu
+from eigassign.mechanism.elements.craig_bampton import factorise, lu
 from eigassign.modal.exact.sparse import block, principal
 
 Floats = NDArray[np.float64]

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING, SLIDING
 from eigassign.mechanism.kinematics.forward import LinkFrames
-from eigassign.mechanism.kinematics.joints import sliding_axis
+from eigassign.mechanism.kinematics.joints import mounting, multiply, sliding_axis
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type
-from eigassign.mechanism.kinematics.rotations import mounting, multiply
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread

@@ -21,7 +21,7 @@ from eigassign.case.suggestions import shown, unknown
 from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
-from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
+from eigassign.mechanism.trajectory.motion import TIME, coordinate_columns
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.built_case import BuiltCase
 

@@ -218,9 +218,9 @@ def test_a_designed_length_moves_the_links_it_carries() -> None:
         tree = two_link(design={})
         tree["mechanism"]["links"]["upper"]["length"] = length
         pose = solve_pose(tree, np.array([0.4, 1.7]))
-        lines = model.poses.lines(model.x([0.4, 1.7], [length]))[0]
-        for line, link in zip(lines, ("upper", "fore"), strict=True):
-            np.testing.assert_allclose(line[1, :2], pose.node(tree, f"{link}.end")[:2])
+        for link in ("upper", "fore"):
+            end = model.poses.position(model.x([0.4, 1.7], [length]), link, "end")[0]
+            np.testing.assert_allclose(end[:2], pose.node(tree, f"{link}.end")[:2])
 
 
 def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:

@@ -280,7 +280,7 @@ def test_a_slider_crank_driven_by_its_slider_stops_at_the_dead_centre(x: float, 
 
 def test_only_the_sample_at_the_dead_point_is_named() -> None:
     with pytest.raises(SingularityError, match=r"x = 0\.6$"):
-        built(driven_by_the_slider()).poses.lines(np.array([[0.5], [0.6], [0.4]]))
+        built(driven_by_the_slider()).poses.position(np.array([[0.5], [0.6], [0.4]]), "rod", "end")
 
 
 # What cannot be closed or moved

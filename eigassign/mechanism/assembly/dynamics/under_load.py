@@ -41,9 +41,13 @@ from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     stacked,
     whole_size,
 )
-from eigassign.mechanism.assembly.loads.second_order import add_second_order
+from eigassign.mechanism.assembly.loads.second_order import (
+    CROSSED,
+    Numbers,
+    add_second_order,
+    stress_terms,
+)
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, first_moment
-from eigassign.mechanism.assembly.loads.stress import CROSSED, Numbers, end_forces, stress_terms
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import (
@@ -53,13 +57,13 @@ from eigassign.mechanism.elements.beam import (
     fields,
     shear,
 )
+from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.elements.mesh import Entries, Strand
 from eigassign.mechanism.elements.sections import SHARES, STATIONS, BeamValues, Profile
-from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, present
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, present
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Expression, Recorder, Scalar
@@ -68,46 +72,35 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 
-class Alike(NamedTuple):
-    """Elements of one kind, sheared or not, tapered or not."""
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """The elements of a strand, with their lengths and values, all sheared or none."""
 
-    h: Floats  # (n,)
+    elements: StackedElements
+    h: Numbers  # lengths (n,) in m
     values: Floats  # (n, n_legendre, n_values)
     sheared: bool
 
-    def profile(self) -> Profile:
-        """Their values as arrays (n,)."""
-        rows = [BeamValues(*one) for one in np.moveaxis(self.values, 0, -1)]
-        return rows if self.sheared else [r._replace(shear_z=None, shear_y=None) for r in rows]
-
-
-@dataclass(frozen=True, eq=False)
-class Beams:
-    """The elements of a strand, with their lengths and values."""
-
-    elements: StackedElements
-    alike: Alike
-
     def same(self, other: Beams) -> bool:
         """True where lengths and values are the same."""
-        one, two = self.alike, other.alike
-        return np.array_equal(one.h, two.h) and np.array_equal(one.values, two.values)
+        return np.array_equal(self.h, other.h) and np.array_equal(self.values, other.values)
 
-    @property
-    def h(self) -> Numbers:
-        """Lengths (n,) in m."""
-        return self.alike.h
+    @cached_property
+    def profile(self) -> Profile:
+        """The values as arrays (n,)."""
+        rows = [BeamValues(*one) for one in np.moveaxis(self.values, 0, -1)]
+        return rows if self.sheared else [r._replace(shear_z=None, shear_y=None) for r in rows]
 
     @cached_property
     def bent(self) -> tuple[Shear, Shear]:
         """The numbers of shear in both planes."""
-        return shear(self.alike.profile(), self.h)
+        return shear(self.profile, self.h)
 
     @cached_property
     def matrices(self) -> tuple[Floats, Floats]:
         """k and m (n, 12, 12); of numbers all is in one term."""
-        profile = self.alike.profile()
-        ((_, k),), ((_, m),) = element_stiffness(profile, self.h), element_mass(profile, self.h)
+        each = element_stiffness(self.profile, self.h), element_mass(self.profile, self.h)
+        ((_, k),), ((_, m),) = each
         return k, m
 
     @cached_property
@@ -122,7 +115,7 @@ class Beams:
         xi = np.tile(0.5 * (1.0 + STATIONS), (len(self.h), 1))
         N = fields(xi, self.h[:, None], phi.transpose(2, 0, 1)[:, None])[..., :3, :]
         P = np.polynomial.legendre.legvander(STATIONS, 3)
-        mass: Any = np.array([beam.mass for beam in self.alike.profile()[:3]])
+        mass: Any = np.array([beam.mass for beam in self.profile[:3]])
         heavy = (mass.T @ P.T[: len(mass)])[..., None] * P * SHARES[:, None]
         return np.asarray(np.einsum("ngl,ngij->lnij", heavy * (np.arange(4) + 0.5), N))
 
@@ -156,7 +149,7 @@ class StiffnessUnderLoad:
         for own, row in zip(z.T, zip(*self.at_rest(z), strict=True), strict=True):
             now = _Numbers._make((row[:5], *row[5:11], row[11:]))
             beams = [
-                Beams(elements, Alike(h, profile, sheared))
+                Beams(elements, h, profile, sheared)
                 for (elements, sheared), h, profile in zip(
                     self.strands, now.elements[::2], now.elements[1::2], strict=True
                 )
@@ -420,8 +413,8 @@ class _Acting:
             v, pull = (one.elements.seen(each) for each in (self.v, self.pull))
             k, m = one.matrices
             r = (k @ v - m @ pull).transpose(1, 2, 0)
-            forces = end_forces(r, (one.carried @ pull).transpose(0, 2, 3, 1), one.h)
-            c, matrices = zip(*stress_terms(forces, one.h, one.bent, planar), strict=True)
+            load = (one.carried @ pull).transpose(0, 2, 3, 1)
+            c, matrices = zip(*stress_terms(r, load, one.h, one.bent, planar), strict=True)
             found.append((one.elements, np.tensordot(np.array(c), np.array(matrices), (0, 0))))
         return found
 

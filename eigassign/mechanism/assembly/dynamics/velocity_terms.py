@@ -43,9 +43,9 @@ from eigassign.mechanism.elements.beam import fields
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.elements.sections import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import CROSS, DOFS, Objects
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported
-from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects
 from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,10 @@ class VelocityTerms:
         h = self.interval(q, y, rate, acceleration)
         t = h * np.arange(-2.0, 3.0)[:, None]
         z = self.values(q + rate * t + acceleration * (t * t / 2.0), y)
-        B, W = [self.stack.motion(each) for each in z], self._joints(rate + acceleration * t)
+        B, W = (
+            [self.stack.motion(each) for each in z],
+            (rate + acceleration * t)[:, : len(self.parameters.coordinates)],
+        )
         m = [self.stack.mass(z[k]) for k in (1, 2, 3)]
         P = [
             (B[k + 1] - B[k - 1]) * (0.5 / h) + self.stack.turned(z[k], W[k], B[k])
@@ -100,10 +103,6 @@ class VelocityTerms:
         """The numbers of all matrices at each of the poses q (n, n_q)."""
         z = self.parameters.z(np.hstack([q, np.tile(y, (len(q), 1))]))
         return list(zip(*self.table(z), strict=True))
-
-    def _joints(self, rates: Floats) -> Floats:
-        """The rates of the coordinates alone, of rates (…, n_q) of loads too."""
-        return rates[..., : len(self.parameters.coordinates)]
 
 
 def placeless(case: CaseFile) -> tuple[str, ...]:

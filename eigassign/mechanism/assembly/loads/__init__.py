@@ -4,8 +4,7 @@ The drives hold the pose; n are the internal forces that the loads cause there. 
 once: the weight has loads that are functions of (q, y), any others are variables (`dynamics`).
 Read in this order; each imports only from those above it:
 
-    stress        k_σ of beam elements and of imported parts from what acts on them
     statics       a mechanism that loads act on; the wrenches through its joints, loops included
-    second_order  all terms of K_g but those of beams: arms, joints, springs, imported parts
+    second_order  k_σ of beams and parts from what acts on them; arms, joints, springs
     weight        the weight as loads, the beams it stresses; forces that hang on stiffnesses
 """

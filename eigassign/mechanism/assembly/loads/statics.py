@@ -34,13 +34,7 @@ from eigassign.mechanism.assembly.node_motion import (
 )
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, add_bodies, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
-from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
-from eigassign.mechanism.kinematics.parameters import (
-    ModelParameters,
-    link_type,
-    node_position,
-)
-from eigassign.mechanism.kinematics.rotations import (
+from eigassign.mechanism.kinematics.joints import (
     DOFS,
     Floats,
     Objects,
@@ -49,6 +43,12 @@ from eigassign.mechanism.kinematics.rotations import (
     present,
     scaled,
     some,
+)
+from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
+from eigassign.mechanism.kinematics.parameters import (
+    ModelParameters,
+    link_type,
+    node_position,
 )
 from eigassign.mechanism.kinematics.topology import (
     GROUND,
@@ -64,7 +64,7 @@ from eigassign.series.expression import Scalar
 class Loaded:
     """A mechanism that loads act on; the passive freedoms of ``known`` are known.
 
-    ``bent``: parts known by their matrices bend between their nodes as beams do, see `stress`.
+    ``bent``: parts known by their matrices bend between their nodes as beams do: `second_order`.
     """
 
     case: CaseFile

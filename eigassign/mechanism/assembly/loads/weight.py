@@ -16,32 +16,28 @@ import numpy as np
 from scipy import sparse
 
 from eigassign.mechanism.assembly.congruence import (
-    LocalLink,
     add_links,
     add_stressed,
     inertia,
     pulled,
     scattered,
 )
-from eigassign.mechanism.assembly.loads.second_order import add_second_order, on_nodes
+from eigassign.mechanism.assembly.loads.second_order import (
+    add_second_order,
+    on_nodes,
+    stress_terms,
+)
 from eigassign.mechanism.assembly.loads.statics import (
     Loaded,
     Loads,
     first_moment,
     hangs_on_stiffness,
 )
-from eigassign.mechanism.assembly.loads.stress import (
-    ElementForces,
-    axial_forces,
-    stress_terms,
-)
 from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term, summed
-from eigassign.mechanism.kinematics.loop_closure import passive_motion
-from eigassign.mechanism.kinematics.parameters import link_type
-from eigassign.mechanism.kinematics.rotations import (
+from eigassign.mechanism.kinematics.joints import (
     DOFS,
     Floats,
     Objects,
@@ -49,6 +45,8 @@ from eigassign.mechanism.kinematics.rotations import (
     multiply,
     scaled,
 )
+from eigassign.mechanism.kinematics.loop_closure import passive_motion
+from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.expression import Expression, Scalar, atom_of, one_atom, parts
 
@@ -70,7 +68,7 @@ class Sagging:
     def received(self, node: NodeName) -> Objects:
         """What acts on a node beside the weight, (6,) in its link's axes: k v − m N (g, 0)."""
         link, slots = self.scene.links[node[0]], self.scene.nodes.meshes[node[0]].nodes[node[1]]
-        v = [self._local(link, s) for s in range(len(link.own))]
+        v = [self._moved(self.scene.local(node[0], s)) for s in range(len(link.own))]
         out = np.zeros(6, dtype=object)
         for axis, slot in enumerate(slots.tolist()):
             if slot >= 0:
@@ -80,10 +78,6 @@ class Sagging:
                     for column, value in zip(row.col.tolist(), row.data.tolist(), strict=True):
                         out[axis] = out[axis] + coefficient * value * v[column]
         return out
-
-    def _local(self, link: LocalLink, slot: int) -> Scalar:
-        own = int(link.own[slot])
-        return self.u[own] if own >= 0 else self._moved(dict(link.carried[slot]))
 
     def _moved(self, row: MotionRow) -> Scalar:
         """Σ c_k u_k; rates of coordinates do not count: they are held."""
@@ -222,9 +216,9 @@ def _add_row(
         own = multiply(turn, g)
         p = np.array([scaled(own, beam.mass) for beam in strand.profiles[k][:3]], dtype=object)
         beyond = beyond + acting.get(int(strand.slots[k + 1][0]), still)
-        forces, beyond = _through_element(beyond, turn, p, h)
+        r, beyond = _through_element(beyond, turn, p, h)
         dofs = np.append(strand.slots[k], strand.slots[k + 1])
-        for whole, matrix in stress_terms(forces, h, strand.shear[k], planar):
+        for whole, matrix in stress_terms(r, p, h, strand.shear[k], planar):
             turned = R.T @ matrix @ R
             i, j = np.nonzero(np.abs(turned) > 1e-14 * np.abs(turned).max())
             kept = (dofs[i] >= 0) & (dofs[j] >= 0)
@@ -235,20 +229,17 @@ def _add_row(
 
 def _through_element(
     beyond: Objects, turn: Floats, p: Objects, h: Scalar
-) -> tuple[ElementForces, Objects]:
-    """The forces in an element, and the wrench about its first node of it and all beyond.
+) -> tuple[Objects, Objects]:
+    """What the ends of an element receive (12,), and the wrench about its first node of all.
 
     ``beyond`` is about its last node in the link's axes, p (n_legendre, 3) its weight per length in
     its own.
     """
     F, M = multiply(turn, beyond[:3]), multiply(turn, beyond[3:])
-    weight = scaled(p[0], h)
     # ∫ ξ P_l dξ = 1/2, 1/6 for l = 0, 1
     first = p[0] * 0.5 + (p[1] * (1.0 / 6.0) if len(p) > 1 else 0.0)
     along = np.array([1.0, 0.0, 0.0], dtype=object)
+    F_a = F + scaled(p[0], h)
     M_a = M + scaled(cross(along, F), h) + scaled(cross(along, first), h * h)
-    forces = ElementForces(
-        axial_forces(F[0], p[:, 0], h), M[0], np.array([M_a * -1.0, M], dtype=object), p
-    )
-    total = np.concatenate([multiply(turn.T, F + weight), multiply(turn.T, M_a)])
-    return forces, total
+    total = np.concatenate([multiply(turn.T, F_a), multiply(turn.T, M_a)])
+    return np.concatenate([F_a * -1.0, M_a * -1.0, F, M]), total
