@@ -21,7 +21,7 @@ from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
 from eigassign.output.documents import dumps
-from eigassign.output.store.cache import Cache, content_key
+from eigassign.output.store.cache import Cache, content_key, hdf5
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions, Scene
 
@@ -150,10 +150,8 @@ def _hdf5(arrays: Mapping[str, Array], words: Mapping[str, str]) -> bytes:
     """A file with a dataset for each array, and ``words`` as attributes of the group ``meta``."""
     import h5py
 
-    body = io.BytesIO()
-    with h5py.File(body, "w") as file:
-        for name, array in arrays.items():
-            file[name] = array
+    body = io.BytesIO(hdf5(arrays))
+    with h5py.File(body, "a") as file:
         file.create_group("meta").attrs.update(words)
     return body.getvalue()
 

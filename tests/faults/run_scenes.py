@@ -179,6 +179,6 @@ def faults(scene: Scene) -> list[str]:
     found += [] if scene.whole() else ["the next run is not whole"]
     found += [] if scene.aside() else ["what was mine is not beside the next run"]
     cache = Cache(scene.root / "cache")
-    damaged = [path for path in cache.directory.glob("*.arrays") if cache.load(path.stem) is None]
+    damaged = [path for path in cache.directory.glob("*.h5") if cache.load(path.stem) is None]
     found += [f"{path.name} of the cache is damaged" for path in damaged]
     return found + [f"{name} is left" for name in scene.left()]

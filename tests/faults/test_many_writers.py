@@ -58,7 +58,7 @@ def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
     found = Cache(root / "cache").load(KEY)
     assert found is not None
     assert (found["a"] == found["a"][0]).all()
-    assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.arrays"]
+    assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.h5"]
 
 
 def test_sixteen_runs_of_one_case_leave_one_whole_run(root: Path) -> None:

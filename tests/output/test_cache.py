@@ -58,7 +58,7 @@ def empty(path: Path) -> bytes:
 def of_another_key(path: Path) -> bytes:
     other = Cache(path.parent.parent)
     other.store(key("another"), ARRAYS)
-    return (other.directory / f"{key('another')}.arrays").read_bytes()
+    return (other.directory / f"{key('another')}.h5").read_bytes()
 
 
 @pytest.mark.parametrize("damage", [flipped, empty, of_another_key])
@@ -68,7 +68,7 @@ def test_a_damaged_file_is_set_aside_with_a_warning_and_can_be_rebuilt(
     stored.write_bytes(damage(stored))
     assert cache.load(KEY) is None
     assert "damaged cache file" in caplog.text
-    assert [p.name for p in cache.directory.iterdir()] == [f"{KEY}.arrays.damaged"]
+    assert [p.name for p in cache.directory.iterdir()] == [f"{KEY}.h5.damaged"]
     cache.store(KEY, ARRAYS)
     assert bits(cache.load(KEY)) == bits(ARRAYS)
 
@@ -116,8 +116,8 @@ def test_clear_removes_what_is_ours_and_nothing_else(cache, stored):
     cache.store(key("other"), {"a": np.ones(2)})
     stored.write_bytes(b"")
     assert cache.load(KEY) is None
-    dead = cache.directory / f".{KEY}.arrays.1-deadbeef.tmp"
-    alive = cache.directory / f".{KEY}.arrays.2-deadbeef.tmp"
+    dead = cache.directory / f".{KEY}.h5.1-deadbeef.tmp"
+    alive = cache.directory / f".{KEY}.h5.2-deadbeef.tmp"
     foreign = cache.directory / "measurements.h5"
     for path in (dead, alive, foreign):
         path.write_bytes(b"")
@@ -128,9 +128,7 @@ def test_clear_removes_what_is_ours_and_nothing_else(cache, stored):
 
 
 def test_what_a_killed_writer_left_is_swept_by_the_next_reader_and_nothing_else(cache, stored):
-    ours, theirs = (
-        cache.directory / f".{name}.1-deadbeef.tmp" for name in (f"{KEY}.arrays", "notes")
-    )
+    ours, theirs = (cache.directory / f".{name}.1-deadbeef.tmp" for name in (f"{KEY}.h5", "notes"))
     for path in (ours, theirs):
         path.write_bytes(b"half")
     assert Cache(cache.directory).load(KEY) is not None
@@ -142,28 +140,28 @@ def aged(cache: Cache, days: list[float]) -> list[Path]:
     paths = []
     for number, age in enumerate(days):
         cache.store(key(number), {"a": np.ones(1000)})
-        paths.append(cache.directory / f"{key(number)}.arrays")
+        paths.append(cache.directory / f"{key(number)}.h5")
         os.utime(paths[-1], 2 * (time.time() - 86400 * age,))
     return paths
 
 
 def test_above_the_limit_the_oldest_files_go(cache, monkeypatch):
     paths = aged(cache, [3, 1, 2, 0])
-    (cache.directory / "measurements.arrays").write_bytes(bytes(10**6))
+    (cache.directory / "measurements.h5").write_bytes(bytes(10**6))
     size = paths[0].stat().st_size
     monkeypatch.setenv("EIGASSIGN_LIMITS", f"{3.5 * size / 1e9}")
     Cache(cache.directory).store(KEY, {"a": np.ones(1000)})
-    left = {path for path in cache.directory.iterdir() if path.name != "measurements.arrays"}
-    assert left == {paths[1], paths[3], cache.directory / f"{KEY}.arrays"}
+    left = {path for path in cache.directory.iterdir() if path.name != "measurements.h5"}
+    assert left == {paths[1], paths[3], cache.directory / f"{KEY}.h5"}
     monkeypatch.setenv("EIGASSIGN_LIMITS", f"{0.5 * size / 1e9}")
     Cache(cache.directory).store(KEY, {"a": np.ones(1000)})
-    assert [path.name for path in cache.directory.glob(f"{KEY}.arrays")] == [f"{KEY}.arrays"]
+    assert [path.name for path in cache.directory.glob(f"{KEY}.h5")] == [f"{KEY}.h5"]
     assert not any(path.exists() for path in paths)
 
 
 def test_what_another_machine_is_writing_is_left_alone_for_a_week(cache, stored):
     """Locks of a network folder may be seen on one machine only."""
-    old, young = (cache.directory / f".{KEY}.arrays.{n}-{4 * '0'}deadbeef.tmp" for n in (1, 2))
+    old, young = (cache.directory / f".{KEY}.h5.{n}-{4 * '0'}deadbeef.tmp" for n in (1, 2))
     for path, days in ((old, 8), (young, 6)):
         path.write_bytes(b"half")
         os.utime(path, 2 * (time.time() - 86400 * days,))

@@ -44,11 +44,11 @@ def test_files_of_the_cache(
     arrays = expansion_arrays(true.full, true.linear)
     rng, cache, believed = np.random.default_rng(12), Cache(tmp_path), 0
     cache.store(entry, arrays)
-    whole = (tmp_path / f"{entry}.arrays").read_bytes()
+    whole = (tmp_path / f"{entry}.h5").read_bytes()
     caplog.set_level(logging.CRITICAL)
     for k in range(2 * count):
         if k < count:
-            (tmp_path / f"{entry}.arrays").write_bytes(damaged(whole, rng))
+            (tmp_path / f"{entry}.h5").write_bytes(damaged(whole, rng))
         else:
             cache.store(entry, forged(arrays, rng))
         found, notes = expand_plan(model, plan, cache)

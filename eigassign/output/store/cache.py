@@ -1,7 +1,8 @@
-"""A folder of results that need not be computed again, one file of arrays per content key.
+"""A folder of results that need not be computed again, one HDF5 file per content key.
 
-    eigassign-stored 3 <SHA-256 of the key and of all bytes after this line>
-    the arrays as NumPy's ``savez`` writes them
+    eigassign-stored 4 <SHA-256 of the key and of all that follows the user block>
+    zeros up to 512 bytes: the user block, which HDF5 skips
+    HDF5: each array a contiguous dataset
 
 A hit is bit for bit what was stored. A file that is not exactly what its writer finished is renamed
 to ``*.damaged`` with a warning, and the caller computes anew. A folder that cannot be read or
@@ -17,7 +18,6 @@ import io
 import json
 import logging
 import os
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -35,9 +35,10 @@ VARIABLE = "EIGASSIGN_CACHE"
 WORTH_S = 0.1  # of work: making a key and reading a file take 5 ms, writing it 10 ms and a sync
 _RULES = {"always": 0.0, "auto": WORTH_S, "never": None}
 _log = logging.getLogger(__name__)
-_SUFFIX = ".arrays"
+_SUFFIX = ".h5"
 _DAMAGED = ".damaged"
-_START = b"eigassign-stored 3 "
+_START = b"eigassign-stored 4 "
+BLOCK = 512  # bytes: the least user block of HDF5
 
 
 class DamagedError(EigassignError):
@@ -180,31 +181,50 @@ def content_key(arrays: Mapping[str, Array], algorithm: str) -> str:
     return digest.hexdigest()
 
 
-def _packed(key: str, arrays: Mapping[str, Array]) -> bytes:
+def hdf5(arrays: Mapping[str, Array], block: int = 0) -> bytes:
+    """HDF5 with a dataset for each array, behind ``block`` bytes that are left to the caller."""
+    import h5py
+
     body = io.BytesIO()
+    with h5py.File(body, "w", userblock_size=block) as file:
+        for name, array in arrays.items():
+            file[name] = array
+    return body.getvalue()
+
+
+def _packed(key: str, arrays: Mapping[str, Array]) -> bytes:
     try:
-        np.savez(body, allow_pickle=False, **arrays)
-    except ValueError as error:
+        body = memoryview(hdf5(arrays, BLOCK))[BLOCK:]
+    except (TypeError, ValueError) as error:
         raise UsageError(f"these arrays cannot be stored: {error}") from error
-    return _sealed(key, body.getbuffer()) + body.getbuffer()
+    return _sealed(key, body) + body
 
 
-def _sealed(key: str, body: bytes | memoryview) -> bytes:
-    """The first line of a file."""
+def _sealed(key: str, body: memoryview) -> bytes:
+    """The user block of a file."""
     digest = hashlib.sha256(key.encode())
     digest.update(body)
-    return _START + digest.hexdigest().encode() + b"\n"
+    return (_START + digest.hexdigest().encode() + b"\n").ljust(BLOCK, b"\0")
 
 
 def _unpack(key: str, data: bytes) -> dict[str, Array]:
     """What `_packed` made a file of, read-only; raises DamagedError where any byte differs."""
-    body = memoryview(data)[len(_START) + 65 :]
-    if data[: len(_START) + 65] != _sealed(key, body):
+    import h5py
+
+    if data[:BLOCK] != _sealed(key, memoryview(data)[BLOCK:]):
         raise DamagedError("its content does not have the hash that it begins with")
+    arrays = {}
     try:
-        with np.load(io.BytesIO(body), allow_pickle=False) as stored:
-            arrays = dict(stored)
-    except (ValueError, LookupError, OSError, zipfile.BadZipFile) as error:
+        with h5py.File(io.BytesIO(data), "r") as file:
+            for name in file:
+                link, stored = file.get(name, getlink=True), file[name]
+                # no filter, link or other file: what is read is in these bytes, and no more
+                own = isinstance(link, h5py.HardLink) and isinstance(stored, h5py.Dataset)
+                own = own and not (stored.chunks or stored.external or stored.is_virtual)
+                if not own or stored.nbytes > len(data):
+                    raise DamagedError(f"{name} was never stored so")
+                arrays[name] = np.array(stored[()])
+    except (ValueError, LookupError, OSError, RuntimeError, TypeError) as error:
         raise DamagedError(f"it was never stored ({type(error).__name__})") from error
     for array in arrays.values():
         array.setflags(write=False)
