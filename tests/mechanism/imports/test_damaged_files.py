@@ -127,7 +127,7 @@ def test_a_damaged_file_of_the_cache_is_solved_anew(
             assert not outcome.excesses(), outcome
             answers.add((tmp_path / "run" / "coefficients.json").read_text())
             shutil.rmtree(tmp_path / "run")
-            files = list((tmp_path / "cache").glob("*.arrays"))
+            files = list((tmp_path / "cache").glob("*.h5"))
             assert files
             for file in files:
                 file.write_bytes(damaged(file.read_bytes(), rng))
