@@ -17,7 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
-    "h5py": {"mechanism", "pipeline"},
+    "h5py": {"mechanism", "output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja
     "rich": {"output"},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
@@ -142,18 +141,8 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     meta = {"case": scene.file.title, "sha256": scene.file.sha256, "x_names": ", ".join(names)}
     return {
         "coefficients.json": (dumps(document) + "\n").encode(),
-        "coefficients.h5": _hdf5({**point, **flat}, meta),
+        "coefficients.h5": hdf5({**point, **flat}, meta),
     }
-
-
-def _hdf5(arrays: Mapping[str, Array], words: Mapping[str, str]) -> bytes:
-    """A file with a dataset for each array, and ``words`` as attributes of the group ``meta``."""
-    import h5py
-
-    body = io.BytesIO(hdf5(arrays))
-    with h5py.File(body, "a") as file:
-        file.create_group("meta").attrs.update(words)
-    return body.getvalue()
 
 
 def _table(expansion: Expansion) -> dict[str, Array]:

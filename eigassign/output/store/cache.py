@@ -181,20 +181,25 @@ def content_key(arrays: Mapping[str, Array], algorithm: str) -> str:
     return digest.hexdigest()
 
 
-def hdf5(arrays: Mapping[str, Array], block: int = 0) -> bytes:
-    """HDF5 with a dataset for each array, behind ``block`` bytes that are left to the caller."""
+def hdf5(arrays: Mapping[str, Array], words: Mapping[str, str], block: int = 0) -> bytes:
+    """HDF5 with a dataset for each array, and any ``words`` as attributes of the group ``meta``.
+
+    ``block`` bytes at its beginning are left to the caller.
+    """
     import h5py
 
     body = io.BytesIO()
     with h5py.File(body, "w", userblock_size=block) as file:
         for name, array in arrays.items():
             file[name] = array
+        if words:
+            file.create_group("meta").attrs.update(words)
     return body.getvalue()
 
 
 def _packed(key: str, arrays: Mapping[str, Array]) -> bytes:
     try:
-        body = memoryview(hdf5(arrays, BLOCK))[BLOCK:]
+        body = memoryview(hdf5(arrays, {}, BLOCK))[BLOCK:]
     except (TypeError, ValueError) as error:
         raise UsageError(f"these arrays cannot be stored: {error}") from error
     return _sealed(key, body) + body
