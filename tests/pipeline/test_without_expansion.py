@@ -60,7 +60,7 @@ def without(result: Result) -> str:
 
 def test_a_full_turn_of_a_crank_is_kept_clear_of_a_band(tmp_path: Path) -> None:
     result = solved(tmp_path, crank())
-    assert "reaches 5.0e-04: the best is about" in without(result)
+    assert "reaches 2.5e-04: the best is about" in without(result)
     assert result.results.assignment is not None
     assert result.results.assignment.verdict == "reached"
     assert all(row.clear for row in result.results.assignment.clearances)
