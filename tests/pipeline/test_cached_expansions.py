@@ -77,7 +77,7 @@ def test_what_is_cached_follows_the_rule_and_the_size(
         monkeypatch.setenv("EIGASSIGN_CACHE", rule)
     for name, text, count in (("small", shipped(), small), ("large", shipped(*LARGE), large)):
         solve_case(case_of(tmp_path, text), Options(cache_dir=tmp_path / name, study="none"))
-        assert len(list((tmp_path / name).glob("*.arrays"))) == count, name
+        assert len(list((tmp_path / name).glob("*.h5"))) == count, name
 
 
 CHANGES = {

@@ -20,6 +20,6 @@ def test_a_case_whose_auto_refuses_is_charted_all_the_same(tmp_path: Path) -> No
     (tmp_path / "crank.yaml").write_text(crank())
     made = chart_case(load_case(tmp_path / "crank.yaml"), Options(), FEW, Request((1e-6,)))
     assert made.advice[0].auto is not None
-    assert made.advice[0].auto.refused.startswith("no expansion of order up to 20")
+    assert made.advice[0].auto.refused.startswith("no expansion of order up to 16")
     assert "Taylor 4 full" in {p.method for p in made.points}
     assert made.seconds > 0.0

@@ -144,7 +144,7 @@ def minimise(
         stationarity=left,
         limits=limits,
         predicted=predicted if best is place else None,
-        end=End.OPTIMAL if left <= OPTIMAL else end,
+        end=End.OPTIMAL if left <= OPTIMAL and end not in STOPPED else end,
         steps=tuple(run.steps),
         appraisals=run.appraisals,
     )
@@ -294,6 +294,7 @@ ALIKE = 1e-3  # of the bounds: the same design
 DOWN = 5  # steps from the side of a valley to its floor: those of Gauss and Newton took 2 or 3
 HALVINGS = 2  # of the way between two ends: it is looked at in 7 places
 FINISHED = (End.OPTIMAL, End.STALLED)
+STOPPED = (End.SECONDS, End.INTERRUPTED)
 
 
 @dataclass(frozen=True)

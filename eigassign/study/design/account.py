@@ -132,8 +132,13 @@ def assignment_row(
 
 
 def _decided(scene: Scene, answer: Answer) -> Conflict | None:
-    """The limits that contradict, unless one of them is not decided for all designs."""
+    """The limits that contradict, unless one of them is not decided for all designs.
+
+    Where all is listed each is decided by going through the lists.
+    """
     open_ = {one.name for one in scene.limits if not one.is_decided}
+    if answer.found is not None and _is_settled(answer.found):
+        open_ = set()
     found = answer.conflict
     return None if found is None or open_.intersection(found.names) else found
 
@@ -417,7 +422,7 @@ def _optimality(
         words = f"the problem is convex: {words}"
         return OptimalityRow("proved", best.stationarity, None, words)
     if found.are_listed:
-        return _of_choices(found)
+        return _of_choices(found, conflict is None)
     if bound is not None and bound.kind == "proved":
         return bound
     row = OptimalityRow("local", best.stationarity, None, "")
@@ -432,6 +437,9 @@ def _optimality(
 
 def _of_starts(found: Found) -> str:
     """Say how many optima the starts led to, and whether more are to be expected."""
+    if found.choices > 1:
+        searched = f"{len(found.outcomes)} of {found.choices} choices of modes below bands"
+        return f"the best of {searched}, from {counted(found.starts, 'start')}"
     tally = found.tally
     if tally is None or not tally.optima:
         return f"the best design that {counted(found.starts, 'start')} led to"
@@ -440,7 +448,7 @@ def _of_starts(found: Found) -> str:
     return f"the {which} from {counted(tally.starts, 'start')}{further}"
 
 
-def _of_choices(found: Found) -> OptimalityRow:
+def _of_choices(found: Found, can_be_met: bool) -> OptimalityRow:
     """What is known of the choices from catalogues, searched to the end or as far as solves go."""
     best, among = found.best, f"{found.choices} combinations of the catalogues"
     if found.task.bands:
@@ -460,7 +468,7 @@ def _of_choices(found: Found) -> OptimalityRow:
     if not found.is_discrete:
         words += f", the other parameters of {len(found.outcomes)} from several starts"
     words += f"; {found.untried} were not searched" * bool(found.untried)
-    words += "; others may be better"
+    words += "; others may " + ("be better" if can_be_met else "miss the limits by less")
     return OptimalityRow("local", best.stationarity, None, words)
 
 

@@ -105,7 +105,8 @@ def _word(facts: Facts) -> tuple[str, str]:
     if facts.aim:  # all limits are kept: whatever is gained is one
         gain = GAINED * abs(before)
     if violation > MET:
-        return "do_not_use", f"no design was found that meets all limits: {_all(far)}"
+        limits = broken if broken and (worst is None or worst.asked.is_goal) else far
+        return "do_not_use", f"no design was found that meets all limits: {_all(limits)}"
     if before_violation > MET or after < before - gain:
         though = "" if worst is None else _though(worst)
         return "improved", f"better than the initial design; {_all(far)}{though}"

@@ -16,6 +16,7 @@ import eigassign
 import eigassign as ea
 from eigassign.errors import CaseError, MechanismError, MissingMassError
 from eigassign.mechanism import Coupling, joined, part_lines, read_mesh, solid_part
+from eigassign.modal import Model
 from eigassign.pipeline import modes
 from eigassign.study import load_case
 
@@ -393,7 +394,7 @@ def test_modulus_and_density_of_a_solid_are_design(tmp_path: Path) -> None:
 def test_what_a_solid_leaves_out_is_bounded(tmp_path: Path, g: float) -> None:
     """Under its weight too, which softens it by up to a third: what is left out feels none."""
 
-    def model_to(reduce_to: float) -> ea.Model:
+    def model_to(reduce_to: float) -> Model:
         given = case(tmp_path, part, reduce_to=reduce_to)
         given["mechanism"]["bodies"] = {"tool": {"at": "bar.end", "mass": 0.3}}
         given["mechanism"]["gravity"] = [-g, 0.0, 0.3 * g] if g else "none"

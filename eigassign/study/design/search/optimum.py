@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
-from eigassign.assignment.exact.sequential import End, Optimum, Tally, minimise, worth
+from eigassign.assignment.exact.sequential import STOPPED, End, Optimum, Tally, minimise, worth
 from eigassign.assignment.inputs import frozen
 from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
@@ -68,7 +68,6 @@ TOGETHER = 64  # choices that are bounded together
 PROMISING = 4  # of designs all over the bounds: those that a choice with bands is searched from
 DRAWN = 6  # times that limits are drawn in
 BEFORE = 1e-12  # of F: less is no better
-STOPPED = (End.SECONDS, End.INTERRUPTED)
 BOUNDED, TRIED, DONE, EXCLUDED = 0, 100, 101, 102  # what is known of a choice; bounds by level
 
 
@@ -340,6 +339,7 @@ class _Search:
         self.failed: EigassignError | None = None
         self.ended: End | None = None
         self.made = self.tried = self.spent = 0
+        self.leads: dict[int, Floats] = {}  # what the estimate of a choice came to
         self.keep = KEEP if self.every.is_discrete else 1
 
     @property
@@ -393,10 +393,13 @@ class _Search:
                     self.search(k)
         except KeyboardInterrupt:
             self.ended = End.INTERRUPTED
-        if not self.outcomes and self.ended is not None:  # the nearest, as far as it is known
+        if not self.outcomes and self.ended is not None:
+            self.progress(f"  {self.ended.value}: judging the best that is known")
             away = np.abs(every.lower + every.upper - 2.0 * self.starts[0])
             width = np.where((reach := np.ptp(every.lower, axis=0)) > 0.0, reach, np.inf)
-            self.search(int((away / width).sum(axis=1).argmin()))
+            nearest = int((away / width).sum(axis=1).argmin())
+            best = every.ahead(np.isin(range(len(every.of)), [*self.leads]))
+            self.search(int(best[0]) if best.size else nearest)
 
     def ahead(self) -> Ints:
         """The choices that may be better than the best few that were searched."""
@@ -428,15 +431,16 @@ class _Search:
             return
         self.ended = found.end if found.end in STOPPED else self.ended
         self.every.missed[k], self.every.value[k] = worth(found)
+        self.leads[k] = found.y
         self.spent += variant.response.exact_solves
 
     def near(self, variant: PosedProblem) -> list[Floats]:
         """Designs to search a choice from; few that are like those of other choices."""
-        starts = [*self.starts]
+        starts, least = [*self.starts], most_starts(self.task.scene.file, alone=False)
         if self.designs is not None and not self.task.followers:
             starts = [*self.designs.best_of(variant, PROMISING), *starts]
         if self.every.listed:
-            starts = [*(one.best.y for one in self.ranked[:1]), *starts][:2]
+            starts = [*(one.best.y for one in self.ranked[:1]), *starts][: min(2, least)]
         return [np.clip(y, variant.problem.lower, variant.problem.upper) for y in starts]
 
     def search(self, k: int) -> None:
@@ -459,7 +463,7 @@ class _Search:
             searched = self.searched(k, margins, [searched.optima[0].y], False)
             missed = searched.optima[0].seen.violation
         rows = _clearances(self.task, choice.below, searched.optima[0].y)
-        for drawn in range(DRAWN if missed <= MET else 0):
+        for drawn in range(DRAWN if missed <= MET and not self.ended else 0):
             if not wanting(rows):
                 break
             margins = _drawn_in(margins, rows, 1.1 if 2 * drawn < DRAWN else 2.0)
@@ -483,10 +487,12 @@ class _Search:
             return self.every.posed(k, task)
 
         starts = near or self.near(posed(levels[0]))[: 1 if self.every.is_discrete else None]
+        if self.ended and not near and k in self.leads:
+            starts = [self.leads[k]]
         alone = len(self.every.of) == 1
         most = most_starts(self.task.scene.file, alone) if spread else 0
         found = search_starts(
-            *(levels, posed, starts, self.made, self.deadline, self.progress, most)
+            *(levels, posed, starts, self.made, self.deadline, self.progress, most, self.ended)
         )
         self.made, self.spent = self.made + found.starts, self.spent + found.exact_solves
         self.ended = found.ended or self.ended

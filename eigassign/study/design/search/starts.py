@@ -19,6 +19,7 @@ from eigassign.assignment.exact.sequential import (
     NOTHING,
     PAYS,
     ROUND_OFF,
+    STOPPED,
     End,
     Optimum,
     Tally,
@@ -82,15 +83,16 @@ def search_starts(
     deadline: float,
     progress: Callable[[str], None],
     most: int,
+    ended: End | None = None,
 ) -> Searched:
     """The local optima of what is ``posed`` that ``starts`` lead to, and spread designs up to most.
 
-    So many starts were ``made`` before.
+    So many starts were ``made`` before. Of a search that has ``ended`` the first is judged alone.
     ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
     answer; with scenarios, in which others may have one, where none has.
     """
     first, keys = levels[0], levels[0].scene.file.assignment
-    search, lost = Searched(posed(first)), list[EigassignError]()
+    search, lost = Searched(posed(first), ended=ended), list[EigassignError]()
     for start in _in_turn(first, posed, search.variant, starts, most):
         progress(f"  from start {made + search.starts + 1}")
         try:
@@ -131,8 +133,7 @@ def _after(
     problem, optima = search.variant.problem, search.optima
     try:
         found = minimise(problem, start, 0 if search.ended else steps, deadline)
-        stopped = found.end if found.end in (End.SECONDS, End.INTERRUPTED) else None
-        ended = search.ended or stopped
+        ended = search.ended or (found.end if found.end in STOPPED else None)
         found = found if before is None else continued(before, found)
         apart = with_end(optima, found, None if ended else problem)
     except KeyboardInterrupt:
