@@ -56,6 +56,19 @@ def test_all_at_their_cheapest_bound_with_every_limit_met_is_a_proof() -> None:
     assert (row.verdict, row.optimality.kind, row.optimality.gap) == ("reached", "proved", 0.0)
 
 
+def test_starts_are_as_many_as_asked_for_of_each_choice() -> None:
+    _, _, row = answered("two_lists_and_drives", assignment={"starts": 1})
+    assert row.starts == 12
+
+
+def test_what_no_combination_meets_contradicts_a_torque_too() -> None:
+    """All is listed, and every combination exerts 12.6 N m at least."""
+    _, _, row = answered("lists_and_torque")
+    assert (row.verdict, row.conflict, row.optimality.kind) == (
+        "infeasible", ("design.torque.q1",), "proved",
+    )  # fmt: skip
+
+
 def test_a_limit_contradicts_with_the_linear_one_that_forbids_what_would_meet_it() -> None:
     """Lists and a linear limit that rules all combinations out which keep the other."""
     design = {
