@@ -438,7 +438,8 @@ def _optimality(
 def _of_starts(found: Found) -> str:
     """Say how many optima the starts led to, and whether more are to be expected."""
     if found.choices > 1:
-        searched = f"{len(found.outcomes)} of {found.choices} choices of modes below bands"
+        some = f"{len(found.outcomes)} of " * (len(found.outcomes) < found.choices)
+        searched = f"{some}{found.choices} choices of modes below bands"
         return f"the best of {searched}, from {counted(found.starts, 'start')}"
     tally = found.tally
     if tally is None or not tally.optima:
