@@ -37,12 +37,10 @@ def banded(seed: int) -> tuple[ea.Case, float, float]:
     return load_text(yaml.safe_dump(data)), low, high
 
 
-def along(case: ea.Case, q: np.ndarray, y: np.ndarray, low: float, high: float) -> np.ndarray:
-    """At random instants: the modes below each edge."""
-    (path,) = case.trajectory.parts
-    last = path.trajectory.time_s[-1]
-    at = np.random.default_rng(0).uniform(0.0, last, INSTANTS)
-    between = path.trajectory.motion.poses(at)
+def along(case: ea.Case, path: Any, y: np.ndarray, low: float, high: float) -> np.ndarray:
+    """At random instants of a trajectory: the modes below each edge."""
+    at = np.random.default_rng(0).uniform(path.time_s[0], path.time_s[-1], INSTANTS)
+    between = path.motion.poses(at)
     model = case.model()
     available = model.n_dof - model.n_rigid
     count = min(4, available)
@@ -65,13 +63,13 @@ def test_an_answer_called_clear_is_clear_at_random_instants_and_a_forged_one_is_
     if row.verdict == "reached":
         assert all(said.clear for said in row.clearances)
     model = case.model()
-    for said, rows in zip(row.clearances, case.trajectory.rows, strict=True):
-        q = case.trajectory.q[rows]
+    for said, part in zip(row.clearances, case.trajectory.parts, strict=True):
+        q = part.trajectory.given.q
         kind = "forged", "", (), slice(0, len(q)), np.full(len(q), low)
         band = ForbiddenBand(*kind, np.full(len(q), high))
         if not said.clear:
             continue
-        assert (along(case, q, y, low, high) == said.below).all()
+        assert (along(case, part.trajectory, y, low, high) == said.below).all()
         for k in {said.below + 1, max(said.below - 1, 0)} - {said.below}:
             assert not BandMotion(model, band, k, q, y).judged().clear
         hz = model.frequencies(q, y, said.below + 1)[:, said.below]
