@@ -695,7 +695,7 @@ class RobustRow(Brief):
     """
 
     scenarios: Annotated[int, Fact("deviations in which the search holds what is asked")]
-    draws: Annotated[int, Fact("random deviations, at all samples")]
+    draws: Annotated[int, Fact("random deviations, 128 of them at all samples")]
     nominal: Floats
     measured: Annotated[str, Fact("the objective")]
     objective_nominal: Annotated[float, Fact("without masses and prices, not deviating")]

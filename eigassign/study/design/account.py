@@ -467,7 +467,8 @@ def _of_choices(found: Found, can_be_met: bool) -> OptimalityRow:
     if found.ended is not None:
         return OptimalityRow("local", best.stationarity, None, f"{words}; {found.ended.value}")
     if not found.is_discrete:
-        words += f", the other parameters of {len(found.outcomes)} from {found.starts} starts"
+        starts = counted(found.starts, "start")
+        words += f", the other parameters of {len(found.outcomes)} from {starts}"
     words += f"; {found.untried} were not searched" * bool(found.untried)
     words += "; others may " + ("be better" if can_be_met else "miss the limits by less")
     return OptimalityRow("local", best.stationarity, None, words)

@@ -41,6 +41,9 @@ LOST = (
     "smaller tolerances, or bounds that leave more room"
 )
 DRAWS = 128  # random deviations, at all samples
+MANY = 10_000  # more of them, of small models, at so many samples
+AT = 6
+AT_ONCE = 100  # of these, solved together
 
 
 @dataclass(frozen=True)
@@ -98,11 +101,12 @@ def robust_optimum(
     alone = _Deviations(nominal, look.had)
     both = zip(alone.edges, first, strict=bool(first))  # none where some have no modes
     before = _by_name((rows.of.name, alone.worst_at(rows, one.design)[0]) for rows, one in both)
-    progress(f"robust: {DRAWS} random deviations")
-    targets = tuple(look.rows(worst, before, look.drawn(), nominal.best.y))
+    draws = DRAWS + look.many
+    progress(f"robust: {draws} random deviations")
+    targets = tuple(look.rows(worst, before, look.drawn(worst), nominal.best.y))
     row = RobustRow(
         scenarios=len(found.task.scenarios),
-        draws=DRAWS,
+        draws=draws,
         nominal=nominal.best.y,
         measured=scene.file.assignment.named_objective,
         objective_nominal=nominal.variant.problem.measure(nominal.best.seen.residual),
@@ -134,6 +138,8 @@ class _Deviations:
         own = found.variant.problem.measure(found.best.seen.residual)
         self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
+        small = self.scene.model.pencil.is_dense and not self.task.followers
+        self.many = MANY if small and any(rows.of.mode_terms for rows in self.edges) else 0
 
     def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
         """What is missed where rows have some values, and the slopes of that in these."""
@@ -205,9 +211,10 @@ class _Deviations:
                 made.append(sigma)
                 yield sigma
 
-    def drawn(self) -> dict[str, float]:
+    def drawn(self, worst: Sequence[WorstDeviation]) -> dict[str, float]:
         """The worst of random deviations by name; of large models by reduced ones that hold there.
 
+        Many more of small ones are solved where the ``worst`` of what is asked of frequencies are.
         Raises EigassignError where one has no answer.
         """
         models = None if self.task.followers else reduced_models(self.scene)
@@ -215,7 +222,31 @@ class _Deviations:
         rng = np.random.default_rng(0)
         designs = rng.uniform(self.lower, self.upper, (DRAWS, len(self.y)))
         missed = ((rows, self.worst_at(rows, y, response)) for y in designs for rows in self.edges)
-        return _by_name((rows.of.name, worst) for rows, (worst, *_) in missed)
+        all_along = ((rows.of.name, most) for rows, (most, *_) in missed)
+        return _by_name((*all_along, *self._drawn_where(worst, rng)))
+
+    def _drawn_where(
+        self, worst: Sequence[WorstDeviation], rng: np.random.Generator
+    ) -> Iterator[tuple[str, float]]:
+        """Yield what some random deviations miss at the samples where frequencies have least room.
+
+        Of followed modes, which are followed all along, and of large models none.
+        """
+        model, path, count = self.scene.model, self.scene.path, self.asked.modes
+        least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
+        at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
+        designs = rng.uniform(self.lower, self.upper, (self.many, len(self.y)))
+        for k in range(0, self.many, AT_ONCE):
+            some = designs[k : k + AT_ONCE]
+            q = np.concatenate([path.at(y)[0][at] for y in some])
+            hz = np.full((len(some), len(path.q), count), np.nan)
+            solved = model.frequencies(q, np.repeat(some, len(at), axis=0), count)
+            hz[:, at] = solved.reshape(len(some), len(at), count)
+            for rows in self.edges:
+                if terms := rows.of.mode_terms:
+                    own = sum(c * hz[:, rows.of.rows, m - 1 if m > 0 else m] for m, c in terms)
+                    missed, _ = self.missed(rows, rows.scale * (own - rows.edge))
+                    yield rows.of.name, float(np.nanmax(missed, initial=0.0))
 
     def rows(
         self,
