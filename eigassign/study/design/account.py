@@ -437,15 +437,15 @@ def _optimality(
 
 def _of_starts(found: Found) -> str:
     """Say how many optima the starts led to, and whether more are to be expected."""
+    tally = found.tally
+    further = "; raise `starts` to look further" * (tally is not None and tally.unseen > PAYS)
     if found.choices > 1:
         some = f"{len(found.outcomes)} of " * (len(found.outcomes) < found.choices)
         searched = f"{some}{found.choices} choices of modes below bands"
-        return f"the best of {searched}, from {counted(found.starts, 'start')}"
-    tally = found.tally
+        return f"the best of {searched}, from {counted(found.starts, 'start')}{further}"
     if tally is None or not tally.optima:
         return f"the best design that {counted(found.starts, 'start')} led to"
     which = f"best of {tally.optima} different optima" if tally.optima > 1 else "only optimum"
-    further = "; raise `starts` to look further" if tally.unseen > PAYS else ""
     return f"the {which} from {counted(tally.starts, 'start')}{further}"
 
 
