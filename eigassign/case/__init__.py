@@ -23,7 +23,7 @@ __all__, __getattr__, __dir__ = face(
         "reader": "read_yaml",
         "schema.design": "Tolerance",
         "schema.document": "json_schema",
-        "schema.joints": "FREEDOMS",
+        "schema.mechanism": "FREEDOMS",
         "schema.parts": "Quantity",
         "schema.study": "Measurement MeasurementFile",
         "schema.trajectory": "FileTrajectory PointTrajectory SampledTrajectory TipTrajectory",

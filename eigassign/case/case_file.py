@@ -26,8 +26,14 @@ from eigassign.case.rules.properties import (
 )
 from eigassign.case.schema.design import RESERVED, Design, Parameter, Tolerance
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.joints import JointBase, freedom_of
-from eigassign.case.schema.mechanism import Body, Coordinate, Mechanism, Spring
+from eigassign.case.schema.mechanism import (
+    Body,
+    Coordinate,
+    JointBase,
+    Mechanism,
+    Spring,
+    freedom_of,
+)
 from eigassign.case.schema.parts import FrozenDict, Part, Quantity
 from eigassign.case.schema.study import (
     AssignmentKeys,

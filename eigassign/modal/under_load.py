@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.case.schema.joints import RIDING
+from eigassign.case.schema.mechanism import RIDING
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.dynamics.under_load import LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes

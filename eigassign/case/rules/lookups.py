@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from eigassign.case.reader import KeyPath
 from eigassign.case.schema.design import Choices, Design, column_names
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, Link, RigidLink
-from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism
 from eigassign.case.schema.parts import ANGLE, PLACE, Quantity
 from eigassign.case.schema.targets import FollowedMode, GapTarget
 from eigassign.case.schema.trajectory import (

@@ -8,9 +8,14 @@ from typing import NamedTuple
 from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.rules.lookups import beams, freedoms, guessed, moving, node_problem
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.joints import JointBase, NutJoint, RevoluteJoint
 from eigassign.case.schema.links import BeamLink, FrameLink, RigidLink, SolidLink, SuperelementLink
-from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.mechanism import (
+    Coordinate,
+    JointBase,
+    Mechanism,
+    NutJoint,
+    RevoluteJoint,
+)
 from eigassign.case.schema.sections import BareSection, SectionBase
 from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
 from eigassign.case.suggestions import listed, shown, suggestion, unknown

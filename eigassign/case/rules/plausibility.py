@@ -13,7 +13,6 @@ from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.rules.properties import is_place
 from eigassign.case.schema.design import Choices, Parameter
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import (
     BeamLink,
     FrameBeam,
@@ -22,7 +21,7 @@ from eigassign.case.schema.links import (
     SolidLink,
     Taper,
 )
-from eigassign.case.schema.mechanism import Body
+from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
 from eigassign.case.schema.sections import BareSection, CircleSection, Section, TubeSection
 from eigassign.case.schema.targets import (

@@ -16,7 +16,7 @@ from eigassign.case.rules.lookups import (
 )
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.joints import RevoluteJoint
+from eigassign.case.schema.mechanism import RevoluteJoint
 from eigassign.case.schema.study import Highest, HighestMode, Measurement
 from eigassign.case.schema.targets import (
     FrequencyFile,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import ADVANCING, FREEDOMS
+from eigassign.case.schema.mechanism import ADVANCING, FREEDOMS
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
 from eigassign.mechanism.kinematics.joints import Objects, multiply
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import RIDING
+from eigassign.case.schema.mechanism import RIDING
 from eigassign.mechanism.kinematics.joints import (
     Floats,
     JointMotion,

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import FREEDOMS
+from eigassign.case.schema.mechanism import FREEDOMS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, multiply

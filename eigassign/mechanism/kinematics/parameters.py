@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import RIDING
 from eigassign.case.schema.links import IMPORTED
+from eigassign.case.schema.mechanism import RIDING
 from eigassign.errors import TravelError, UsageError
 from eigassign.mechanism.kinematics.joints import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree, coordinates

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import FREEDOMS, RIDING
+from eigassign.case.schema.mechanism import FREEDOMS, RIDING
 from eigassign.errors import MechanismError
 
 NodeName = tuple[str, str]  # (link, node); the ground is ("ground", "")

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.joints import RIDING, SLIDING
+from eigassign.case.schema.mechanism import RIDING, SLIDING
 from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import mounting, multiply, sliding_axis
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type

@@ -49,7 +49,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy import sparse
 
-from eigassign.case.schema.joints import RIDING
+from eigassign.case.schema.mechanism import RIDING
 from eigassign.mechanism.assembly.congruence import add_stressed
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
 from eigassign.mechanism.assembly.node_motion import (
