@@ -8,7 +8,15 @@ from typing import NamedTuple
 from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.rules.lookups import beams, freedoms, guessed, moving, node_problem
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.links import BeamLink, FrameLink, RigidLink, SolidLink, SuperelementLink
+from eigassign.case.schema.links import (
+    BareSection,
+    BeamLink,
+    FrameLink,
+    RigidLink,
+    SectionBase,
+    SolidLink,
+    SuperelementLink,
+)
 from eigassign.case.schema.mechanism import (
     Coordinate,
     JointBase,
@@ -16,7 +24,6 @@ from eigassign.case.schema.mechanism import (
     NutJoint,
     RevoluteJoint,
 )
-from eigassign.case.schema.sections import BareSection, SectionBase
 from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 from eigassign.files import how_to_raise, raised

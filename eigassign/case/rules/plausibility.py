@@ -14,16 +14,19 @@ from eigassign.case.rules.properties import is_place
 from eigassign.case.schema.design import Choices, Parameter
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import (
+    BareSection,
     BeamLink,
+    CircleSection,
     FrameBeam,
     FrameLink,
     RigidLink,
+    Section,
     SolidLink,
     Taper,
+    TubeSection,
 )
 from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
-from eigassign.case.schema.sections import BareSection, CircleSection, Section, TubeSection
 from eigassign.case.schema.targets import (
     AtLeastTarget,
     AtMostTarget,

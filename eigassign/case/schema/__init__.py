@@ -3,8 +3,7 @@
 In reading order, each importing only from those above it:
 
     parts       quantities, names and vectors that the parts of a case file share
-    sections    the keys `materials` and `sections` of a mechanism; the shapes of sections
-    links       the key `links`
+    links       the keys `materials`, `sections` and `links`; the shapes of sections
     mechanism   joints, bodies, springs, drives, coordinates, and the mechanism as a whole
     trajectory  the key `trajectory`
     design      the key `design`: parameters, catalogues, limits, and the one vector y they make

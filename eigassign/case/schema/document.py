@@ -15,10 +15,9 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
-from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.links import LINKS, SHAPES
 from eigassign.case.schema.mechanism import JOINTS, Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, must
-from eigassign.case.schema.sections import SHAPES
 from eigassign.case.schema.study import (
     AssignmentKeys,
     ExpansionKeys,

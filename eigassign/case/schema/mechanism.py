@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
-from eigassign.case.schema.links import Link
+from eigassign.case.schema.links import Link, Material, Section
 from eigassign.case.schema.parts import (
     IN_PLANE,
     IN_SPACE,
@@ -40,7 +40,6 @@ from eigassign.case.schema.parts import (
     space_of,
     wrong,
 )
-from eigassign.case.schema.sections import Material, Section
 from eigassign.case.suggestions import listed, shown
 from eigassign.case.units import DIMENSIONS
 
