@@ -2,15 +2,14 @@
 
 In reading order, each importing only from those above it:
 
-    suggestions  wording of error messages: what was found, what was probably meant
-    reader       bytes → plain data (a tree) with the line and column of every key
-    units        quantities with units, dimension-checked → SI
-    table        a table in a CSV file → columns in SI
-    schema       what each key may hold: one pydantic model for each part of a case file
-    rules        what keys must have in common once each is right; what looks like a slip
-    case_file    the validated case as the rest of the program sees it; canonical YAML of it
-    values       other values of some keys
-    loading      path or mapping → CaseFile, or all problems of the file at once
+    reader     bytes → plain data (a tree) with the line and column of every key; words of messages
+    units      quantities with units, dimension-checked → SI
+    table      a table in a CSV file → columns in SI
+    schema     what each key may hold: one pydantic model for each part of a case file
+    rules      what keys must have in common once each is right; what looks like a slip
+    case_file  the validated case as the rest of the program sees it; canonical YAML of it
+    values     other values of some keys
+    loading    path or mapping → CaseFile, or all problems of the file at once
 """
 
 from eigassign.faces import face

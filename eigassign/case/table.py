@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from eigassign.case.suggestions import listed, shown, suggestion
+from eigassign.case.reader import listed, shown, suggestion
 from eigassign.case.units import (
     DIMENSIONS,
     NUMBER,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
-from eigassign.case.suggestions import shown, suggestion
+from eigassign.case.reader import shown, suggestion
 
 Exponents = tuple[int, int, int, int, int]  # of kg, m, s, rad, cycle
 

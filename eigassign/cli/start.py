@@ -105,7 +105,7 @@ def docs(page: str | None) -> int:
         return 0
     name = Path(page.partition("#")[0]).stem  # of a link in the manual, too
     if name not in pages:
-        from eigassign.case.suggestions import unknown
+        from eigassign.case.reader import unknown
 
         raise UsageError(unknown("page", page, pages))
     text = (MANUAL / pages[name][1]).read_text(encoding="utf-8")

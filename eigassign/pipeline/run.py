@@ -18,7 +18,7 @@ from eigassign.assignment.assign import Assignment
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.brief import counted
-from eigassign.case.suggestions import shown
+from eigassign.case.reader import shown
 from eigassign.errors import EigassignError
 from eigassign.facts import number
 from eigassign.modal.expansion import Expansion, NearestExpansion

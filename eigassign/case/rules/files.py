@@ -18,13 +18,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, dotted, items
+from eigassign.case.reader import (
+    Finding,
+    KeyPath,
+    Tree,
+    at,
+    dotted,
+    items,
+    listed,
+    suggestion,
+    unknown,
+)
 from eigassign.case.rules.properties import NoPropertyError, property_at, quantities
 from eigassign.case.schema.design import PRICE
 from eigassign.case.schema.document import validated
 from eigassign.case.schema.links import SHAPES
 from eigassign.case.schema.parts import Quantity
-from eigassign.case.suggestions import listed, suggestion, unknown
 from eigassign.case.table import CsvColumn, read_table, read_words
 from eigassign.case.units import PLAIN
 from eigassign.errors import MechanismError

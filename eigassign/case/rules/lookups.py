@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from eigassign.case.reader import KeyPath
+from eigassign.case.reader import KeyPath, listed, shown, suggestion, unknown
 from eigassign.case.schema.design import Choices, Design, column_names
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, Link, RigidLink
@@ -20,7 +20,6 @@ from eigassign.case.schema.trajectory import (
     TipTrajectory,
     named_trajectories,
 )
-from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 ANY = Quantity()  # dimension unknown because of an error elsewhere
 

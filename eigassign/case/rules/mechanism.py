@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
 from eigassign.case.rules.lookups import beams, freedoms, guessed, moving, node_problem
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import (
@@ -25,7 +25,6 @@ from eigassign.case.schema.mechanism import (
     RevoluteJoint,
 )
 from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
-from eigassign.case.suggestions import listed, shown, suggestion, unknown
 from eigassign.files import how_to_raise, raised
 
 MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, listed
 from eigassign.case.rules.properties import is_place
 from eigassign.case.schema.design import Choices, Parameter
 from eigassign.case.schema.document import Document
@@ -40,7 +40,6 @@ from eigassign.case.schema.trajectory import (
     TipTrajectory,
     named_trajectories,
 )
-from eigassign.case.suggestions import listed
 from eigassign.case.units import TWO_TURNS
 
 MODULUS = (1e6, 1.5e12)  # Pa: soft rubber … above diamond (1.2e12)

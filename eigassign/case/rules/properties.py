@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from typing import Annotated, Any, get_args, get_origin
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, listed, suggestion, unknown
 from eigassign.case.rules.lookups import ANY, driven, places
 from eigassign.case.schema.design import Choices, Design
 from eigassign.case.schema.document import Document
@@ -20,7 +20,6 @@ from eigassign.case.schema.links import RigidLink, Section, SolidLink
 from eigassign.case.schema.mechanism import Coordinate, Mechanism, NutJoint
 from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, quantity
 from eigassign.case.schema.trajectory import Added, named_trajectories
-from eigassign.case.suggestions import listed, suggestion, unknown
 from eigassign.case.units import QuantityError
 
 _GROUPS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, listed, shown, unknown
 from eigassign.case.rules.lookups import (
     coordinate_lists,
     followed_modes,
@@ -35,7 +35,6 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
-from eigassign.case.suggestions import listed, shown, unknown
 
 # --- Lists with one entry for each coordinate or design parameter
 

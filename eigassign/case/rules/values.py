@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, shown
 from eigassign.case.rules.lookups import (
     ANY,
     coordinate_lists,
@@ -27,7 +27,6 @@ from eigassign.case.schema.parts import ANGLE, PLACE, Quantity, Written, quantit
 from eigassign.case.schema.study import MeasurementFile
 from eigassign.case.schema.targets import FREQUENCY
 from eigassign.case.schema.trajectory import Added, TipTrajectory, named_trajectories
-from eigassign.case.suggestions import shown
 from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_rate
 
 Undecided = tuple[KeyPath, object, Quantity | None]  # None: no unit can be meant

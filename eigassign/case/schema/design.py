@@ -16,6 +16,7 @@ from typing import Annotated, Any, Self, TypeAlias
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 from pydantic_core import core_schema
 
+from eigassign.case.reader import listed
 from eigassign.case.schema.parts import (
     ByReference,
     Frozen,
@@ -30,7 +31,6 @@ from eigassign.case.schema.parts import (
     quantity,
     wrong,
 )
-from eigassign.case.suggestions import listed
 from eigassign.case.units import QuantityError
 
 YValue: TypeAlias = Annotated[

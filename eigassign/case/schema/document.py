@@ -13,7 +13,16 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
+from eigassign.case.reader import (
+    Finding,
+    KeyPath,
+    Tree,
+    listed,
+    shown,
+    suggestion,
+    unknown,
+    unspaced,
+)
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.links import LINKS, SHAPES
 from eigassign.case.schema.mechanism import JOINTS, Coordinate, Mechanism
@@ -27,7 +36,6 @@ from eigassign.case.schema.study import (
 )
 from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm, kinds_of
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
-from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 P = TypeVar("P", bound=Part)
 _ONE_LINE = must(str.isprintable, "expected one line of printable text")

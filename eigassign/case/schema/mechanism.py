@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
+from eigassign.case.reader import listed, shown
 from eigassign.case.schema.links import Link, Material, Section
 from eigassign.case.schema.parts import (
     IN_PLANE,
@@ -40,7 +41,6 @@ from eigassign.case.schema.parts import (
     space_of,
     wrong,
 )
-from eigassign.case.suggestions import listed, shown
 from eigassign.case.units import DIMENSIONS
 
 

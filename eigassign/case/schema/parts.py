@@ -37,7 +37,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
-from eigassign.case.suggestions import shown
+from eigassign.case.reader import shown
 from eigassign.case.units import (
     DIMENSIONS,
     PLAIN,

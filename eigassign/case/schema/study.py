@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from eigassign.case.reader import shown
 from eigassign.case.schema.design import Tolerance, YValue
 from eigassign.case.schema.parts import (
     ByReference,
@@ -29,7 +30,6 @@ from eigassign.case.schema.parts import (
 )
 from eigassign.case.schema.targets import Frequency, HighestTarget, Mode, Modes
 from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
-from eigassign.case.suggestions import shown
 from eigassign.case.units import QuantityError, number_and_unit
 
 Auto: TypeAlias = Literal["auto"]

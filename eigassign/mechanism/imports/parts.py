@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.reader import listed, shown
 from eigassign.case.rules.files import split_variable
-from eigassign.case.suggestions import listed, shown
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError

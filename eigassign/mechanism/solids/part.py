@@ -37,7 +37,7 @@ from scipy import sparse
 from scipy.linalg import qr
 from scipy.sparse.csgraph import connected_components
 
-from eigassign.case.suggestions import listed, shown
+from eigassign.case.reader import listed, shown
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.imports.parts import UNITS

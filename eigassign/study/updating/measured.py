@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.inputs import frozen
 from eigassign.case.case_file import CaseFile
+from eigassign.case.reader import shown, unknown
 from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, MeasurementFile
-from eigassign.case.suggestions import shown, unknown
 from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
