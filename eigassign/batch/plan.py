@@ -22,7 +22,7 @@ from pathlib import Path
 
 from eigassign._version import __version__
 from eigassign.batch.variants import AS_IT_STANDS, OPTION, Variants, variants_of
-from eigassign.case.loading import Unchecked, read
+from eigassign.case.case_file import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.schema.study import text_of
 from eigassign.case.units import NUMBER

@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any
 
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
-from eigassign.case.loading import Unchecked, checked, read
+from eigassign.case.case_file import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
 from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_record import MARKER, read_record

@@ -7,9 +7,8 @@ In reading order, each importing only from those above it:
     table      a table in a CSV file → columns in SI
     schema     what each key may hold: one pydantic model for each part of a case file
     rules      what keys must have in common once each is right; what looks like a slip
-    case_file  the validated case as the rest of the program sees it; canonical YAML of it
+    case_file  path or mapping → the validated case, or all problems of the file; its canonical YAML
     values     other values of some keys
-    loading    path or mapping → CaseFile, or all problems of the file at once
 """
 
 from eigassign.faces import face
@@ -17,8 +16,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "case_file": "CaseFile plain to_yaml",
-        "loading": "checked from_mapping load parse read",
+        "case_file": "CaseFile checked from_mapping load parse plain read to_yaml",
         "reader": "read_yaml",
         "schema.design": "Tolerance",
         "schema.document": "json_schema",

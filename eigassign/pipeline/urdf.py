@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from eigassign.brief import LONGEST
-from eigassign.case.case_file import to_yaml
-from eigassign.case.loading import parse
+from eigassign.case.case_file import parse, to_yaml
 from eigassign.case.reader import listed, short
 from eigassign.errors import CaseError, StorageError, UsageError
 from eigassign.files import CASE, printable, read_bytes

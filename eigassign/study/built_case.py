@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
-from eigassign.case.case_file import CaseFile
-from eigassign.case.loading import from_mapping, load
+from eigassign.case.case_file import CaseFile, from_mapping, load
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.build import (
     LOWEST,
