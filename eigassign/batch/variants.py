@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
+from eigassign.case.case_file import key_objection
+from eigassign.case.reader import Finding, Source, Tree, key_path, read_yaml, resolve
 from eigassign.case.schema.document import validated_part
 from eigassign.case.schema.study import MOST, Sweep, text_of
 from eigassign.case.table import read_words
-from eigassign.case.values import key_path, objection
 from eigassign.errors import CaseError, MechanismError, Problem
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def _drawn(sweep: Sweep, keys: int) -> NDArray[np.float64]:
 def _wrong_keys(tree: Tree, folder: Path, variants: Variants) -> Iterator[Finding]:
     """Keys that the file does not have, and that it could not have either."""
     for key, value in variants[0].items():
-        if (why := objection(tree, folder, key, value)) is not None:
+        if (why := key_objection(tree, folder, key, value)) is not None:
             if variants.file:
                 yield ("sweep", "file"), f"{variants.file}:1: column {key}: {why}"
             else:

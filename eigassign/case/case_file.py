@@ -15,15 +15,28 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import cached_property, reduce
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from eigassign.brief import cut, named
-from eigassign.case.reader import KeyPath, Mark, Source, dotted, read_mapping, read_yaml, resolve
+from eigassign.case.reader import (
+    KeyPath,
+    Mark,
+    Source,
+    Tree,
+    dotted,
+    key_path,
+    read_mapping,
+    read_yaml,
+    resolve,
+    value_below,
+    with_values,
+)
 from eigassign.case.rules.consistency import inconsistent, keys_have_values, too_many
 from eigassign.case.rules.files import (
     NamedFile,
@@ -72,7 +85,6 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
-from eigassign.case.values import with_values
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
 
@@ -483,7 +495,7 @@ def checked(
 ) -> CaseFile:
     """The case with these ``values`` in place of its own, by dotted key; raises CaseError.
 
-    Each key is in the file, or may be: see `values.objection`.
+    Each key is in the file, or may be: see `key_objection`.
     """
     source, path = written.source, written.path
     if values:
@@ -566,3 +578,54 @@ def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
         elif objection(each.file, each.limit) is None:
             raise StorageError(f"{each.file}: cannot be read: no permission, or the disk fails")
     return digests
+
+
+# --- Which keys a case could have
+
+
+def key_objection(tree: Tree, folder: Path, key: str, value: object) -> str | None:
+    """Why no case could have this key; None where the file has it, or may have it with ``value``.
+
+    ``folder`` is that of the file.
+    """
+    path, node = key_path(tree, key), tree
+    if path[0] == "sweep":
+        return "a sweep gives values to other keys than its own"
+    known = 0  # steps of the path that are there
+    for step in path:
+        if (below := value_below(node, step)) is None:
+            break
+        node, known = below, known + 1
+    if known == len(path):
+        return None
+    wrong = []
+    if isinstance(node, Mapping):  # perhaps a key that the file leaves to its default
+        first = path[: known + 1]
+        _, findings = validated(with_values(tree, {key: value}), folder)
+        about = [(place, why) for place, why in findings if place[: len(first)] == first]
+        wrong = [why for at, why in about if at != path or why.startswith("unknown key")]
+        if not wrong:
+            return None
+    if (near := _nearest(tree, key)) is None:
+        return wrong[0] if wrong else f"no such key: {path[known]!r} is not there"
+    return f"no such key; did you mean {near!r}?"
+
+
+def _nearest(tree: Tree, key: str) -> str | None:
+    """The key of the file that was probably meant."""
+    names = (".".join(map(str, path)) for path in _leaves(tree, ()) if path[0] != "sweep")
+    known = list(islice(names, 2000))  # a fraction of a second, however long the file
+    longer = [name for name in known if name.endswith(f".{key}")]
+    return next(iter(longer or get_close_matches(key, known, n=1, cutoff=0.6)), None)
+
+
+def _leaves(node: Any, path: KeyPath) -> Iterator[KeyPath]:
+    if isinstance(node, Mapping):
+        inner: Any = node.items()
+    elif isinstance(node, tuple) and any(isinstance(v, (Mapping, tuple)) for v in node):
+        inner = enumerate(node)
+    else:
+        yield path
+        return
+    for step, value in inner:
+        yield from _leaves(value, (*path, step))

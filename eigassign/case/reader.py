@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -412,3 +413,67 @@ def items(node: object, *keys: str) -> list[tuple[str, object]]:
     """Entries of the mapping below ``keys``; none if it is not a mapping."""
     inner = at(node, *keys)
     return list(inner.items()) if isinstance(inner, Mapping) else []
+
+
+# --- Other values of some keys: a dotted key, `targets.0.frequency`, is a path into the file
+
+_BRACKET = re.compile(r"\[(\d+)\]")
+
+
+def key_path(tree: Tree, key: str) -> KeyPath:
+    """The path that a dotted key means in the file; what is not there is taken as it is written.
+
+    Where a name holds dots itself, as the paths below `set` do, the longest that is there is meant.
+    """
+    parts, path = _BRACKET.sub(r".\1", key).split("."), list[str | int]()
+    node: Any = tree
+    while parts:
+        if isinstance(node, tuple) and parts[0].isdecimal():
+            step: str | int = int(parts[0])
+        else:
+            names = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+            known = node if isinstance(node, Mapping) else {}
+            step = next((name for name in names if name in known), parts[0])
+        path.append(step)
+        del parts[: str(step).count(".") + 1]
+        node = value_below(node, step)
+    return tuple(path)
+
+
+def short_keys(keys: Iterable[str], least: int = 1) -> dict[str, str]:
+    """The end of each key, from a name on and of at least so many parts, that no other key has.
+
+    The whole key where there is none, of ten parts at most.
+    """
+    parts = {key: key.rsplit(".", 10) for key in keys}
+    ends = {
+        key: [".".join(p[-n:]) for n in range(least, len(p)) if not p[-n].isdecimal()]
+        for key, p in parts.items()
+    }
+    counts = Counter(end for own in ends.values() for end in own)
+    return {key: next((e for e in own if counts[e] == 1), key) for key, own in ends.items()}
+
+
+def value_below(node: Any, step: str | int) -> Any:
+    """The value below one step of a path, or None."""
+    if isinstance(node, tuple):
+        return node[step] if isinstance(step, int) and step < len(node) else None
+    return node.get(step) if isinstance(node, Mapping) else None
+
+
+def with_values(tree: Tree, values: Mapping[str, object]) -> Tree:
+    """``tree`` with these values at these keys, and without its sweep."""
+    changed: Any = {key: body for key, body in tree.items() if key != "sweep"}
+    for key, value in values.items():
+        changed = _with(changed, key_path(tree, key), value)
+    whole: Tree = changed
+    return whole
+
+
+def _with(node: Any, path: KeyPath, value: object) -> Any:
+    if not path:
+        return value
+    step, inner = path[0], _with(value_below(node, path[0]), path[1:], value)
+    if isinstance(node, tuple) and isinstance(step, int):
+        return (*node[:step], inner, *node[step + 1 :])
+    return {**(node or {}), step: inner}

@@ -15,8 +15,8 @@ from urllib.parse import quote
 
 from eigassign._version import __version__
 from eigassign.brief import cut
+from eigassign.case.reader import short_keys
 from eigassign.case.units import QuantityError, handy, handy_unit, number_and_unit
-from eigassign.case.values import short_keys
 from eigassign.facts import capital, fact
 from eigassign.output.batch.summary import (
     NUMBERS,
