@@ -31,7 +31,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.solver": "eigenvalues lowest_modes modes",
         "exact.sparse": "solve_sparse",
         "exact.substructure": "Inner proved solve_large solve_together",
-        "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow overlaps places track",
+        "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
         "expansion": "Expansion NearestExpansion expand",
         "model": "Model",
         "projection": "project project_at project_terms",

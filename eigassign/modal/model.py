@@ -38,7 +38,6 @@ from eigassign.mechanism.kinematics.parameters import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.standing import require_standing
-from eigassign.modal.exact.tracking import Tracked, track
 from eigassign.modal.finer_meshes import FINE, mesh_error, standing_frequencies
 from eigassign.modal.slopes import exact_slopes
 from eigassign.modal.solid_error import SolidLinks, solid_error
@@ -296,14 +295,6 @@ class Model:
         return tuple(
             ModeShapes(own, one.strands, one.nodes) for own, one in zip(hz, found, strict=True)
         )
-
-    def tracked(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Tracked:
-        """``modes`` of the first sample followed along the samples by their shapes.
-
-        ``.frequencies`` (n_samples, n_modes) in Hz, ``.swaps``, ``.encounters`` and ``.notes``.
-        Neighbours must be neighbours: pass each of ``case.trajectories`` by itself.
-        """
-        return track(self.pencil, self.x(q, y), modes)
 
     def matrices(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """M and K of eq. (1) for one sample, dense (n_dof, n_dof), unknowns [u; q̇].

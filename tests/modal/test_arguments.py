@@ -39,13 +39,12 @@ WRONG_MODES = [
 ]
 
 
-@pytest.mark.parametrize("face", ["expand", "reduce", "tracked"])
+@pytest.mark.parametrize("face", ["expand", "reduce"])
 @pytest.mark.parametrize(("modes", "words"), WRONG_MODES)
 def test_modes_that_are_none_are_refused(model, face, modes, words):
     calls = {
         "expand": lambda: expand(model, Q0, Y0, modes=modes),
         "reduce": lambda: reduce(model, Q0, Y0, modes=modes),
-        "tracked": lambda: model.tracked([Q0, Q0], Y0, modes=modes),
     }
     with pytest.raises(UsageError, match=words):
         calls[face]()
@@ -103,7 +102,6 @@ def test_samples_that_are_none_are_refused(model, wrong, words):
         model.frequencies,
         model.modes,
         model.matrices,
-        model.tracked,
         series.frequencies,
         series.eigenvalues,
         series.last_degree_share,

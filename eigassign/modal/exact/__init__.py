@@ -11,5 +11,5 @@ In reading order:
     solver        the dispatcher: dense or sparse, and as many modes as there are
     roundoff      how many digits of a frequency the matrices themselves hold
     clusters      neighbouring modes that are expanded together
-    tracking      modes followed by their shapes, along a path or from where they are named
+    tracking      a mode followed by its shape, along a path or from where it is named
 """
