@@ -26,7 +26,8 @@ def samples(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
     if len(counts) > 1:
         raise UsageError(f"{len(rows[0])} samples of q against {len(rows[1])} of y")
     n = counts.pop() if counts else 1
-    return np.hstack([np.broadcast_to(r, (n, r.shape[1])) for r in rows])
+    wide = [r if len(r) == n else np.broadcast_to(r, (n, r.shape[1])) for r in rows]
+    return np.concatenate(wide, axis=1)
 
 
 def point(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:

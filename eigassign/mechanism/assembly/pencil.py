@@ -277,12 +277,13 @@ class Pencil(Brief):
         return self.stiffness.tocsc(), self.mass.tocsc()
 
     @cached_property
-    def mass_magnitude(self) -> sparse.csr_array:
+    def mass_magnitude(self) -> sparse.csr_array | Floats:
         """|(M_j)_ii| (n_dof, n_theta): with |θ| the size of what adds up to each M_ii."""
         on = np.flatnonzero(self.rows == self.columns)
         place = (np.ones(len(on)), (self.rows[on], np.arange(len(on))))
         spread = sparse.csr_array(place, shape=(self.n_dof, len(on)))
-        return sparse.csr_array(spread @ abs(self.mass[on]))
+        sizes = sparse.csr_array(spread @ abs(self.mass[on]))
+        return sizes if self._stack is None else sizes.toarray()
 
     @cached_property
     def local_directions(self) -> tuple[Floats, Floats]:
@@ -331,9 +332,9 @@ class Pencil(Brief):
         return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
 
     @cached_property
-    def stiffness_terms(self) -> Ints:
-        """Indices j of θ with a stiffness term."""
-        return np.flatnonzero(np.diff(self.by_term[0].indptr))
+    def has_term(self) -> NDArray[np.bool_]:
+        """(2, n_theta): which θ_j have a stiffness term, and which a mass term."""
+        return np.array([np.diff(terms.indptr) > 0 for terms in self.by_term])
 
     def stiffness_matrices(self, theta: Floats) -> Floats:
         """Dense K (n_samples, n_dof, n_dof) alone."""

@@ -96,7 +96,7 @@ def mass_sizes(pencil: Pencil, theta: Floats, coupling: Floats) -> Floats:
     root = np.sqrt(pencil.mass_magnitude @ np.abs(theta)).T
     size = root[:, pencil.elastic]
     if coupling.size:
-        size += np.einsum("kfi,kf->ki", np.abs(coupling), root[:, pencil.rigid])
+        size += (root[:, None, pencil.rigid] @ np.abs(coupling))[:, 0]
     return np.asarray(size * size)
 
 

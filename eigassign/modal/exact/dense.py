@@ -67,7 +67,7 @@ def _batch(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 
 def _elastic_first(pencil: Pencil, theta: Floats) -> tuple[Floats, Floats]:
     """K and M with the rigid unknowns last; K once where it is the same at all samples."""
-    order, stiff = pencil.elastic_first, theta[pencil.stiffness_terms]
+    order, stiff = pencil.elastic_first, theta[pencil.has_term[0]]
     if (stiff == stiff[:, :1]).all():  # as where one pose meets many added masses
         K, M = pencil.stiffness_matrices(theta[:, :1]), pencil.mass_matrices(theta)
     else:

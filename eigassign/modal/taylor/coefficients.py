@@ -61,8 +61,10 @@ def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSerie
         return PencilSeries(
             pencil, *(_sparse(pencil, space, theta, stored, terms) for terms in pencil.by_term)
         )
-    both = zip(pencil.matrices(theta), pencil.by_term, strict=True)
-    return PencilSeries(pencil, *(_dense(space, theta, stored, *each) for each in both))
+    there = pencil.has_term @ (theta != 0.0)
+    there[:, 0] = True
+    both = zip(pencil.matrices(theta), there, strict=True)
+    return PencilSeries(pencil, *(_dense(space, stored, *each) for each in both))
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class ProductPairs:
     right: Ints
     into: Ints
     first: Ints
-    target: Ints
+    target: Ints | slice  # a slice where these are all
 
 
 @lru_cache(maxsize=64)
@@ -111,7 +113,7 @@ def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> ProductPa
         table.right[keep] - below.start,
         target,
         first,
-        target[first],
+        slice(None) if len(first) == starts[degree + 1] - starts[degree] else target[first],
     )
 
 
@@ -130,7 +132,7 @@ class DenseTerms:
         """That of w = 0, (n, n)."""
         return np.asarray(self.stack[0])
 
-    def sums(self, degree: int, X: Floats) -> Iterator[tuple[Ints, Floats]]:
+    def sums(self, degree: int, X: Floats) -> Iterator[tuple[Ints | slice, Floats]]:
         """Parts of Σ_{0<δ≤γ} A_δ X_{γ−δ}, |γ| = degree: which γ, and (n_γ, r, n) of them.
 
         The coefficients are symmetric, so rows multiply from the left.
@@ -142,12 +144,8 @@ class DenseTerms:
             yield p.target, np.add.reduceat(chosen, p.first, axis=0)
 
 
-def _dense(
-    space: LowerSet, theta: Floats, stored: Ints, stack: Floats, terms: sparse.csc_array
-) -> DenseTerms:
+def _dense(space: LowerSet, stored: Ints, stack: Floats, varying: NDArray[np.bool_]) -> DenseTerms:
     """One matrix without the coefficients that it has not: stiffness hardly varies with q."""
-    varying = np.asarray(theta[np.diff(terms.indptr) > 0].any(axis=0))
-    varying[0] = True
     if not varying.all():
         stack, stored = stack[varying], stored[varying]
     return DenseTerms(pairs(space, stored.tobytes()), stack)
