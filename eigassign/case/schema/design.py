@@ -13,7 +13,7 @@ from decimal import Decimal
 from functools import cached_property
 from typing import Annotated, Any, Self, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 from pydantic_core import core_schema
 
 from eigassign.case.reader import listed
@@ -26,6 +26,7 @@ from eigassign.case.schema.parts import (
     OrFile,
     Part,
     Quantity,
+    Told,
     must,
     needs_one_of,
     quantity,
@@ -107,9 +108,8 @@ Factor: TypeAlias = Annotated[
     float, Quantity(), must(bool, "must not be 0: leave out what stays as it is")
 ]
 OneOfSeveral: TypeAlias = Annotated[
-    Annotated[str, Tag("<path>")]
-    | Annotated[Mapping[str, Factor], Field(min_length=1), Frozen, Tag("<factors>")],
-    Discriminator(lambda value: "<factors>" if isinstance(value, Mapping) else "<path>"),
+    str | Annotated[Mapping[str, Factor], Field(min_length=1), Frozen],
+    Told(lambda value: isinstance(value, Mapping)),
 ]
 
 
@@ -131,6 +131,7 @@ class Parameter(Part):
     """
 
     model_config = needs_one_of(("min", "max"), ("values",))
+    other_keys = ("choices",)
 
     parameter: OneOrList[
         str, Annotated[tuple[OneOfSeveral, ...], Field(min_length=2), AfterValidator(_several)]
@@ -296,17 +297,9 @@ def is_entry(value: object) -> bool:
 
 
 Entry: TypeAlias = Annotated[
-    Annotated[Parameter, Tag("<parameter>")] | Annotated[Choices, Tag("<choices>")],
-    Discriminator(
-        lambda value: (
-            "<choices>"
-            if isinstance(value, Choices)
-            or (isinstance(value, Mapping) and "choices" in value and "parameter" not in value)
-            else "<parameter>"
-        )
-    ),
+    Parameter | Choices,
+    Told(lambda value: is_entry(value) and "parameter" not in value),
 ]
-ENTRIES: dict[str, type[Part]] = {"parameter": Parameter, "choices": Choices}
 
 
 # --- The design as one vector y

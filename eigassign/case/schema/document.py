@@ -5,10 +5,9 @@ To add a key: give `Document` a field, with a model of what stands below it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
@@ -17,16 +16,13 @@ from eigassign.case.reader import (
     Finding,
     KeyPath,
     Tree,
-    listed,
     shown,
     suggestion,
-    unknown,
     unspaced,
 )
-from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
-from eigassign.case.schema.links import LINKS, SHAPES
-from eigassign.case.schema.mechanism import JOINTS, Coordinate, Mechanism
-from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, must
+from eigassign.case.schema.design import RESERVED, Design, is_entry
+from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.parts import TAG, FrozenDict, Named, Part, must
 from eigassign.case.schema.study import (
     AssignmentKeys,
     ExpansionKeys,
@@ -34,8 +30,8 @@ from eigassign.case.schema.study import (
     Sweep,
     ValidationKeys,
 )
-from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm, kinds_of
-from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
+from eigassign.case.schema.targets import TargetForm
+from eigassign.case.schema.trajectory import TrajectoryForms
 
 P = TypeVar("P", bound=Part)
 _ONE_LINE = must(str.isprintable, "expected one line of printable text")
@@ -77,17 +73,6 @@ class Document(Part):
 
 # --- Errors of the schema as findings
 
-_KINDS: dict[str, type[Part]] = {
-    **SHAPES,
-    **LINKS,
-    **JOINTS,
-    **MOTIONS,
-    **TARGETS,
-    **CURVES,
-    **ENTRIES,
-}
-_TAGS = {f"<{kind}>" for kind in _KINDS}
-_TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>", "<path>", "<factors>"}
 _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
@@ -120,16 +105,13 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
     for each in error.errors(include_url=False)[:200]:  # nobody reads more
         if each["type"] == "too_short" and len(each["input"]) >= each["ctx"]["min_length"]:
             continue
-        detail = {**each, "loc": (*below, *each["loc"])}
-        path = tuple(p for p in detail["loc"] if p not in _TAGS and p != "[key]")
+        loc = each["loc"] = (*below, *each["loc"])
+        path = tuple(p for p in loc if not str(p).startswith(TAG) and p != "[key]")
         if path[:2] == ("design", "entries"):
             path = (path[0], *path[2:])
-        kind = each["type"]
-        if kind.startswith("no_") and not isinstance(each["input"], Mapping):
-            kind = "no_mapping"
         suffix, message = (), f"{each['msg']}, got {shown(each['input'])}"
-        if kind in _EXPLAIN:
-            suffix, message = _EXPLAIN[kind](detail)
+        if each["type"] in _EXPLAIN:
+            suffix, message = _EXPLAIN[each["type"]](each)
         found.append(((*path, *suffix), message))
     return found
 
@@ -147,91 +129,9 @@ def _with_entries_apart(tree: Tree) -> Tree:
     return {**tree, "design": {"entries": entries, **apart}}
 
 
-def _missing(error: Any) -> _Explained:
-    *parent, key = error["loc"]
-    if isinstance(key, int):
-        return (), f"entry {key + 1} is missing"
-    field = keys_of(_model_at(parent))[key]
-    kinds: list[object] = [
-        m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension
-    ]
-    kinds += ["a whole number, or auto"] * (key == "elements")
-    return (), "required key is missing" + "".join(f": {kind}" for kind in kinds)
-
-
-def _extra(error: Any) -> _Explained:
-    *parent, key = error["loc"]
-    model = _model_at(parent)
-    known = [*keys_of(model), *(["choices"] if model is Parameter else [])]
-    return (), f"unknown key{suggestion(key, known)}; allowed: {listed(known)}"
-
-
-def _model_at(loc: Any) -> type[Part]:
-    """Model whose keys stand at ``loc`` (a pydantic location, union tags included)."""
-    models: list[type[Part]] = [Document]
-    named = False  # the next item is a name, or a place in a list
-    for item in loc:
-        if item in _TAGS:
-            named = item == "<list>"
-            models = models[-1:] if named else [_KINDS.get(item[1:-1], models[0])]
-        elif named:
-            named = False
-        else:
-            annotation = keys_of(models[0])[item].annotation
-            named = _holds_several(annotation)
-            models = [*_parts_in(annotation)] or models
-    return models[0]
-
-
-def _holds_several(annotation: object) -> bool:
-    """True for a list or a mapping of names, also where it may be left out."""
-    kind = get_origin(annotation)
-    if kind in (Union, UnionType, Annotated):
-        return any(map(_holds_several, get_args(annotation)))
-    return kind in (Mapping, tuple)
-
-
-def _parts_in(annotation: object) -> Iterator[type[Part]]:
-    if isinstance(annotation, type) and issubclass(annotation, Part):
-        yield annotation
-    for argument in get_args(annotation):
-        yield from _parts_in(argument)
-
-
-def _no_kind(key: str, known: Mapping[str, object]) -> Any:
-    """Explanation of a mapping whose ``key`` names none of the ``known`` kinds."""
-
-    def explain(error: Any) -> _Explained:
-        if key not in error["input"]:
-            return (key,), f"required key is missing: one of {listed(known)}"
-        value = error["input"][key]
-        if not isinstance(value, str):
-            return (key,), f"expected one of {listed(known)}, got {shown(value)}"
-        return (key,), unknown(key, value, known)
-
-    return explain
-
-
-def _no_motion(error: Any) -> _Explained:
-    return (), (
-        "expected one of the keys tip (path of a link's node), points (point to point), q (joint "
-        f"samples) or file (CSV); got {listed(error['input'])}"
-    )
-
-
-def _no_target(error: Any) -> _Explained:
-    given = error["input"]
-    kinds = kinds_of(given)
-    if kinds:
-        return (kinds[1],), f"{kinds[0]} is given already: write a target of its own for each"
-    near = [(key, hint) for key in given if (hint := suggestion(key, TARGETS))]
-    place, hint = ((near[0][0],), near[0][1]) if near else ((), "")
-    return place, f"expected one of the keys {listed(TARGETS)}; got {listed(given)}{hint}"
-
-
 def _mapping(error: Any) -> _Explained:
     what = "a mapping (key: value)"
-    if error["loc"][-2:] == ("keep_out", "<one>"):
+    if error["loc"][-2:-1] == ("keep_out",):
         what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
     if error["loc"][-1] in ("price", "tolerance"):
         what = "values by property (path: value)"
@@ -268,8 +168,9 @@ def _literal(error: Any) -> _Explained:
     expected = error["ctx"]["expected"]
     value = error["input"]
     words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-    others = {"<value>": "{stiffness: ...}", "<one>": "a list", "<auto>": "a whole number"}
-    also = "{highest: 1}" if "objective" in error["loc"] else others.get(error["loc"][-1], "")
+    *_, place, tag = error["loc"]
+    parts = {"drive": "{stiffness: ...}", "objective": "{highest: 1}"}
+    also = parts.get(place, "") or (tag[2:] if tag.startswith(TAG) else "")
     also = f", or {also}" if also else ""
     hint = suggestion(value, words) if isinstance(value, str) else ""
     if "objective" in error["loc"] and value == "highest":
@@ -279,14 +180,7 @@ def _literal(error: Any) -> _Explained:
 
 _EXPLAIN: dict[str, Any] = {
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
-    "missing": _missing,
-    "extra_forbidden": _extra,
-    "no_mapping": _expected("a mapping", lambda e: unspaced(e["input"])),
-    "no_shape": _no_kind("shape", SHAPES),
-    "no_link": _no_kind("type", LINKS),
-    "no_joint": _no_kind("type", JOINTS),
-    "no_motion": _no_motion,
-    "no_target": _no_target,
+    "missing": lambda e: ((), f"entry {e['loc'][-1] + 1} is missing"),  # of a list
     "literal_error": _literal,
     "model_type": _mapping,
     "model_attributes_type": _mapping,

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from eigassign.case.schema.parts import (
     LENGTH,
@@ -28,6 +28,7 @@ from eigassign.case.schema.parts import (
     OneOrMoreNamed,
     Part,
     Quantity,
+    Told,
     ValueOr,
     Vector,
     kinds,
@@ -263,16 +264,15 @@ class IProfileSection(SectionBase):
 
 Section: TypeAlias = Annotated[
     BareSection | CircleSection | TubeSection | RectangleSection | BoxSection | IProfileSection,
-    KindBy("shape", "shape", default="bare"),
+    KindBy("shape", default="bare"),
 ]
 SHAPES = kinds(Section)
 
 
 Elements: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
 ReduceTo: TypeAlias = Annotated[
-    Annotated[float, quantity("frequency", above=0), Tag("<number>")]
-    | Annotated[Literal["auto"], Tag("<auto>")],
-    Discriminator(lambda value: "<auto>" if value == "auto" else "<number>"),
+    Annotated[float, quantity("frequency", above=0)] | Literal["auto"],
+    Told(lambda value: value == "auto"),
 ]
 Roll: TypeAlias = Annotated[
     Angle,
@@ -489,7 +489,6 @@ class SolidLink(Part):
 
 Link: TypeAlias = Annotated[
     BeamLink | RigidLink | FrameLink | SuperelementLink | SolidLink,
-    KindBy("type", "link", default="beam"),
+    KindBy("type", default="beam"),
 ]
 IMPORTED = ("superelement", "solid")  # of which only nodes and matrices are known
-LINKS = kinds(Link)

@@ -208,7 +208,7 @@ Joint: TypeAlias = Annotated[
     | FixedJoint
     | CarriageJoint
     | NutJoint,
-    KindBy("type", "joint"),
+    KindBy("type"),
 ]
 JOINTS: dict[str, type[JointBase]] = kinds(Joint)  # type: ignore[assignment]
 FREEDOMS = {kind: model.freedoms for kind, model in JOINTS.items()}

@@ -20,24 +20,23 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar, Union, get_args
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
     GetJsonSchemaHandler,
-    Tag,
+    ValidationError,
     ValidationInfo,
     model_validator,
 )
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-from eigassign.case.reader import shown
+from eigassign.case.reader import listed, shown, suggestion, unknown, unspaced
 from eigassign.case.units import (
     DIMENSIONS,
     PLAIN,
@@ -47,6 +46,7 @@ from eigassign.case.units import (
     read_rate,
 )
 
+TAG = "\0"  # in what pydantic adds to the place of an error: no key of a file has it
 T = TypeVar("T")
 L = TypeVar("L")
 P = TypeVar("P", bound="Part")
@@ -58,6 +58,31 @@ class Part(BaseModel):
     """Base of everything in a case file: frozen, strict, no unknown keys, built with its parent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
+    other_keys: ClassVar[tuple[str, ...]] = ()  # of another kind that may stand in its place
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explained(cls, value: Any, handler: Callable[[Any], Self]) -> Self:
+        """Keys that are missing or unknown are named with what they hold, or what there is."""
+        try:
+            return handler(value)
+        except ValidationError as error:
+            each = map(cls._in_words, error.errors(include_url=False))
+            raise ValidationError.from_exception_data(cls.__name__, [*each]) from None
+
+    @classmethod
+    def _in_words(cls, error: Any) -> InitErrorDetails:
+        kind, (key, *below), known = error["type"], error["loc"] or ("",), keys_of(cls)
+        if kind == "at_key":
+            kind = PydanticCustomError(kind, "{text}", error["ctx"])
+        elif kind == "missing" and not below:
+            held = [m.dimension for m in known[key].metadata if isinstance(m, Quantity)]
+            kind = wrong("required key is missing" + "".join(f": {d}" for d in held if d))
+        elif kind == "extra_forbidden" and not below:
+            names = [*known, *cls.other_keys]
+            kind = wrong(f"unknown key{suggestion(key, names)}; allowed: {listed(names)}")
+        place, given, more = error["loc"], error["input"], error.get("ctx", {})
+        return InitErrorDetails(type=kind, loc=place, input=given, ctx=more)
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -289,55 +314,79 @@ ByReference: TypeAlias = Annotated[Mapping[str, T], Frozen]  # values by the nam
 # --- Values of several kinds
 
 
+@dataclass(frozen=True)
+class Told:
+    """Tells the members of a union apart by the looks of a value: ``which`` gives the place of one.
+
+    Where it is none, ``which`` raises `wrong`. ``also`` is what may stand there beside a word.
+    """
+
+    which: Callable[[Any], int]
+    also: str = ""
+
+    def __get_pydantic_core_schema__(self, union: Any, handler: Any) -> core_schema.CoreSchema:
+        members = get_args(union)
+        own = [getattr(member, "__origin__", member) for member in members]
+        tags = [f"{TAG}{k}{self.also}" for k in range(len(members))]
+
+        def tag(value: object) -> str:
+            built = isinstance(value, Part) and type(value) in own
+            return tags[own.index(type(value)) if built else self.which(value)]
+
+        def told(value: object) -> object:
+            tag(value)
+            return value
+
+        choices = {t: handler.generate_schema(m) for t, m in zip(tags, members, strict=True)}
+        schema = core_schema.tagged_union_schema(choices, tag)
+        return core_schema.no_info_before_validator_function(told, schema)
+
+
 OneOrList: TypeAlias = Annotated[
-    Annotated[T, Tag("<one>")] | Annotated[L, Tag("<list>")],
-    Discriminator(lambda value: "<list>" if isinstance(value, (tuple, list)) else "<one>"),
+    T | L, Told(lambda value: isinstance(value, (tuple, list)), "a list")
 ]
 NumberOr: TypeAlias = Annotated[  # a number or a word, such as auto
-    Annotated[T, Tag("<number>")] | Annotated[L, Tag("<auto>")],
-    Discriminator(lambda value: "<auto>" if isinstance(value, str) else "<number>"),
+    T | L, Told(lambda value: isinstance(value, str), "a whole number")
 ]
-ValueOr: TypeAlias = Annotated[
-    Annotated[T, Tag("<value>")] | Annotated[P, Tag("<part>")],
-    Discriminator(lambda value: "<part>" if isinstance(value, (Mapping, Part)) else "<value>"),
-]
+ValueOr: TypeAlias = Annotated[T | P, Told(lambda value: isinstance(value, Mapping))]
+
+
+def mapping(value: object) -> Mapping[str, object]:
+    """``value``, or the error that it is no mapping."""
+    if isinstance(value, Mapping):
+        return value
+    raise wrong(f"expected a mapping, got {shown(value)}{unspaced(value)}")
 
 
 @dataclass(frozen=True)
 class KindBy:
-    """Tells the models of a union apart by one key: ``Annotated[A | B, KindBy("type", "link")]``.
+    """Tells the models of a union apart by one key: ``Annotated[A | B, KindBy("type")]``.
 
     The kinds are the words that the models allow for that key: a new kind is a new model in the
     union, and nothing else.
     """
 
     key: str
-    what: str  # they all are, in the type of the error where none is named: ``no_joint``
     default: str | None = None
 
     def kinds(self, union: object) -> dict[str, type[Part]]:
         """Models of the union by the word that stands for each."""
         return {get_args(m.model_fields[self.key].annotation)[0]: m for m in get_args(union)}
 
-    def kind_of(self, value: object) -> object:
-        """Word of a mapping as read, or of an object built in Python."""
-        if isinstance(value, Mapping):
-            return value.get(self.key, self.default)
-        return getattr(value, self.key, self.default)
-
     def __get_pydantic_core_schema__(self, union: Any, handler: Any) -> core_schema.CoreSchema:
-        kinds = self.kinds(union)
+        known = [*self.kinds(union)]
 
-        def tag(value: object) -> str | None:
-            kind = self.kind_of(value)
-            return f"<{kind}>" if isinstance(kind, str) and kind in kinds else None
+        def which(value: object) -> int:
+            kind = mapping(value).get(self.key, self.default)
+            if kind is None:
+                raise wrong(f"required key is missing: one of {listed(known)}", self.key)
+            if not isinstance(kind, str):
+                raise wrong(f"expected one of {listed(known)}, got {shown(kind)}", self.key)
+            if kind not in known:
+                raise wrong(unknown(self.key, kind, known), self.key)
+            return known.index(kind)
 
-        tagged = tuple(Annotated[model, Tag(f"<{kind}>")] for kind, model in kinds.items())
-        by_tag = Discriminator(tag, f"no_{self.what}", f"no such {self.what}")
-        schema: core_schema.CoreSchema = handler.generate_schema(
-            Annotated[Union[tagged], by_tag]  # noqa: UP007
-        )
-        return schema
+        return Told(which).__get_pydantic_core_schema__(union, handler)
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ program goes through are requirements (`assignment.requirements`): one for each 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from eigassign.case.reader import KeyPath
+from eigassign.case.reader import KeyPath, listed, suggestion
 from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
     ByReference,
@@ -24,7 +24,9 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     Quantity,
+    Told,
     ValueOr,
+    mapping,
     needs_one_of,
     quantity,
     wrong,
@@ -91,28 +93,11 @@ class SpeedFile(FrequencyFile):
     dimension = SPEED
 
 
-CURVES: dict[str, type[Part]] = {"profile": FrequencyProfile, "csv": FrequencyFile}
-_WHICH_CURVE = Discriminator(
-    lambda value: (
-        "<csv>"
-        if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value)
-        else "<profile>"
-        if isinstance(value, (FrequencyProfile, Mapping))
-        else "<value>"
-    )
+_WHICH_CURVE = Told(
+    lambda value: isinstance(value, Mapping) + (isinstance(value, Mapping) and "file" in value)
 )
-Curve: TypeAlias = Annotated[
-    Annotated[Frequency, Tag("<value>")]
-    | Annotated[FrequencyProfile, Tag("<profile>")]
-    | Annotated[FrequencyFile, Tag("<csv>")],
-    _WHICH_CURVE,
-]
-SpeedCurve: TypeAlias = Annotated[
-    Annotated[Speed, Tag("<value>")]
-    | Annotated[SpeedProfile, Tag("<profile>")]
-    | Annotated[SpeedFile, Tag("<csv>")],
-    _WHICH_CURVE,
-]
+Curve: TypeAlias = Annotated[Frequency | FrequencyProfile | FrequencyFile, _WHICH_CURVE]
+SpeedCurve: TypeAlias = Annotated[Speed | SpeedProfile | SpeedFile, _WHICH_CURVE]
 
 
 class Harmonic(Part):
@@ -522,38 +507,31 @@ class SagTarget(StaticTarget):
     at_most: Annotated[float, quantity("length", above=0)]
 
 
-# By the key that says the kind, which the limit of what is static does not.
-TARGETS: dict[str, type[AnyTarget]] = {
-    target.kind: target
-    for target in (
-        *(FrequencyTarget, AtLeastTarget, AtMostTarget, KeepOutTarget, GapTarget),
-        *(StiffnessTarget, ComplianceTarget, SagTarget),
-    )
-}
-
-
-def kinds_of(value: Mapping[str, object]) -> list[str]:
-    """The kinds that the keys of a target name; of statics, a limit is none."""
-    kinds = [key for key in TARGETS if key in value]
+def _which_target(value: object) -> int:
+    """By its one key that names a kind; beside a kind of statics, a limit names none."""
+    given = mapping(value)
+    kinds = [key for key in TARGETS if key in given]
     static = any(issubclass(TARGETS[kind], StaticTarget) for kind in kinds)
-    return [key for key in kinds if not (static and key in ("at_least", "at_most"))]
-
-
-def _target_tag(value: object) -> str | None:
-    if isinstance(value, AnyTarget):
-        return f"<{value.kind}>"
-    keys = kinds_of(value) if isinstance(value, Mapping) else []
-    return f"<{keys[0]}>" if len(keys) == 1 else None
+    kinds = [key for key in kinds if not (static and key in ("at_least", "at_most"))]
+    if len(kinds) > 1:
+        raise wrong(f"{kinds[0]} is given already: write a target of its own for each", kinds[1])
+    if not kinds:
+        near = [(key, hint) for key in given if (hint := suggestion(key, TARGETS))][:1]
+        hint, message = near[0][1] if near else "", f"expected one of the keys {listed(TARGETS)}"
+        raise wrong(f"{message}; got {listed(given)}{hint}", *(key for key, _ in near))
+    return [*TARGETS].index(kinds[0])
 
 
 TargetForm: TypeAlias = Annotated[
-    Annotated[FrequencyTarget, Tag("<frequency>")]
-    | Annotated[AtLeastTarget, Tag("<at_least>")]
-    | Annotated[AtMostTarget, Tag("<at_most>")]
-    | Annotated[KeepOutTarget, Tag("<keep_out>")]
-    | Annotated[GapTarget, Tag("<gap>")]
-    | Annotated[StiffnessTarget, Tag("<stiffness>")]
-    | Annotated[ComplianceTarget, Tag("<compliance>")]
-    | Annotated[SagTarget, Tag("<sag>")],
-    Discriminator(_target_tag, "no_target", "no key names a kind of target"),
+    FrequencyTarget
+    | AtLeastTarget
+    | AtMostTarget
+    | KeepOutTarget
+    | GapTarget
+    | StiffnessTarget
+    | ComplianceTarget
+    | SagTarget,
+    Told(_which_target),
 ]
+# By the key that says the kind, which the limit of what is static does not.
+TARGETS: dict[str, type[AnyTarget]] = {t.kind: t for t in get_args(get_args(TargetForm)[0])}

@@ -6,13 +6,12 @@ It holds one of them, or a list. To add a kind: write its model, put it into the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from eigassign.case.reader import KeyPath
+from eigassign.case.reader import KeyPath, listed
 from eigassign.case.schema.mechanism import QValue
 from eigassign.case.schema.parts import (
     IN_PLANE,
@@ -26,8 +25,10 @@ from eigassign.case.schema.parts import (
     Orientation,
     Part,
     Quantity,
+    Told,
     ValueOr,
     Vector,
+    mapping,
     quantity,
     wrong,
 )
@@ -55,12 +56,10 @@ Samples: TypeAlias = Annotated[int, Field(ge=2, le=100_000)]
 
 
 Orientations: TypeAlias = Annotated[  # a triple of angles, or a list of them
-    Annotated[Orientation, Tag("<one>")] | Annotated[tuple[Orientation, ...], Tag("<list>")],
-    Discriminator(
+    Orientation | tuple[Orientation, ...],
+    Told(
         lambda value: (
-            "<list>"
-            if isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
-            else "<one>"
+            isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
         )
     ),
 ]
@@ -225,25 +224,22 @@ class TipTrajectory(Timed):
         return self
 
 
-MOTIONS: dict[str, type[AnyTrajectory]] = {
-    "tip": TipTrajectory,
-    "file": FileTrajectory,
-    "q": SampledTrajectory,
-    "points": PointTrajectory,
-}  # by the key that only they have
+MOTIONS = ("tip", "file", "q", "points")  # the keys that only they have
 
 
-def _motion_tag(value: object) -> str | None:
-    keys = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", {})
-    return next((f"<{key}>" for key in MOTIONS if key in keys), None)
+def _which_motion(value: object) -> int:
+    given = mapping(value)
+    for k, key in enumerate(MOTIONS):
+        if key in given:
+            return k
+    raise wrong(
+        "expected one of the keys tip (path of a link's node), points (point to point), q (joint "
+        f"samples) or file (CSV); got {listed(given)}"
+    )
 
 
 TrajectoryForm: TypeAlias = Annotated[
-    Annotated[TipTrajectory, Tag("<tip>")]
-    | Annotated[FileTrajectory, Tag("<file>")]
-    | Annotated[SampledTrajectory, Tag("<q>")]
-    | Annotated[PointTrajectory, Tag("<points>")],
-    Discriminator(_motion_tag, "no_motion", "no key names a motion"),
+    TipTrajectory | FileTrajectory | SampledTrajectory | PointTrajectory, Told(_which_motion)
 ]
 
 TrajectoryForms: TypeAlias = OneOrList[
