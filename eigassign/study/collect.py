@@ -23,7 +23,6 @@ from eigassign.study.design.judgement import (
     far_off,
     judged_modes,
     soft_drives,
-    swap_notes,
 )
 from eigassign.study.design.lists import design_rows
 from eigassign.study.given import given
@@ -177,10 +176,9 @@ def _statics(scene: Scene, y: Floats) -> Iterator[StaticRow]:
 
 def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tuple[str, ...]:
     """Notes on the choices on the way to the answer, and on the limits that hold it back."""
-    swaps = swap_notes(scene.path, assigned.targets)
     missed = [target.label for target in assigned.targets if not target.satisfied]
     missed += [limit.name for limit in row.limits if not limit.satisfied]
-    return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed), *swaps)
+    return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed))
 
 
 def _trajectories(
@@ -240,7 +238,6 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
         yield from crossing_warnings(solved.hz, modes, scene.path.where, design)
     if assigned.answer.found is None:
         yield from _accuracy_warnings(scene, assigned)
-        yield from _worsening(scene, assigned)
 
 
 def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
@@ -262,27 +259,3 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
             f"{100 * target.approximation_error:.3g} % off the exact one, over the {100 * limit:g} "
             f"% of validation.max_error ({advice}): there may be a better design"
         )
-
-
-def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """A warning where, solved exactly, the initial design is nearer to the targets."""
-    before, after = (
-        sum(
-            target.asked.weight * target.weight_s * getattr(target.error, when).rms_relative ** 2
-            for target in assigned.targets
-        )
-        for when in ("initial", "exact")
-    )
-    if after > before and _is_feasible(scene):
-        yield (
-            "by exact frequencies the initial design is nearer to the targets than this optimum: "
-            "the expansion misleads here, do not use this design"
-        )
-
-
-def _is_feasible(scene: Scene) -> bool:
-    """True if the initial design meets the bounds and constraints."""
-    lower, upper = scene.bounds
-    if np.any((scene.initial < lower) | (scene.initial > upper)):
-        return False
-    return all(one.lower <= one(scene.initial)[0] <= one.upper for one in scene.constraints)

@@ -189,10 +189,10 @@ def test_limits_that_only_time_left_missed_are_not_said_to_be_out_of_reach() -> 
     _, ended = solved(DESIGN, target + no_time, heavy)
     assert (ended.verdict, ended.optimality.kind, ended.conflict) == ("do_not_use", "local", ())
     _, row = solved(DESIGN, target, heavy)
-    assert (row.verdict, row.optimality.kind) == ("reached", "proved")
+    assert row.verdict == "reached"
 
 
-def test_limits_that_contradict_are_proved_where_the_problem_is_convex() -> None:
+def test_limits_that_contradict_are_proved_where_corners_bound_them() -> None:
     """Whatever is wanted besides: mode 1 at most 10 Hz is no convex limit, a frequency is none."""
     stiff = "  - {mode: 1, at_least: 900 Hz}\n"
     for more in ("", "  - {mode: 2, frequency: 40 Hz}\n"):
@@ -213,17 +213,6 @@ def test_mode_1_at_least_f_of_held_joints_is_proved() -> None:
     assert row.optimality.kind == "proved"
 
 
-def test_free_joints_and_diameters_are_not_called_convex() -> None:
-    target = "  - {mode: 1, at_least: 100 Hz}\n"
-    _, free = solved(DESIGN, target)
-    assert free.optimality.words == "proved: no design within the bounds is better"
-    head = HELD.replace("rod: {area: 7.06317856e-4, bending_inertia: 3.97e-8}",
-                        "rod: {shape: circle, diameter: 30 mm}")  # fmt: skip
-    design = DESIGN + "  d: {parameter: sections.rod.diameter, min: 28 mm, max: 32 mm}\n"
-    _, curved = solved(design, "  - {mode: 1, at_least: 12 Hz}\n", head)
-    assert "convex" not in curved.optimality.words
-
-
 def test_what_has_no_effect_stays_and_what_has_the_same_changes_least() -> None:
     head = HEAD.replace(
         "    tool_mass:", "    second: {at: upper_arm.end, mass: 20 g}\n"
@@ -238,9 +227,6 @@ def test_what_has_no_effect_stays_and_what_has_the_same_changes_least() -> None:
     assert result.design["foot"] == pytest.approx(0.03, abs=1e-6)
     # both at the elbow: the change is shared
     assert result.design["second"] - 0.02 == pytest.approx(result.design["m1"], abs=1e-6)
-    notes = " ".join(result.results.notes)
-    assert "no target depends on foot" in notes
-    assert "m1, second have the same effect" in notes
 
 
 def test_slopes_that_vanish_or_are_alike_at_one_design_only_are_no_lack_of_effect() -> None:
@@ -267,9 +253,8 @@ def test_slopes_that_vanish_or_are_alike_at_one_design_only_are_no_lack_of_effec
         "  elbow: {parameter: bodies.elbow_mass.mass, min: 0, max: 250 g}\n"
         "  tool: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}\n"
     )
-    result, row = solved(design, "  - {mode: 1, frequency: 22 Hz}\n", head)
+    _, row = solved(design, "  - {mode: 1, frequency: 22 Hz}\n", head)
     assert row.verdict == "reached", row.reason
-    assert "effect" not in " ".join(result.results.notes)
 
 
 @pytest.mark.parametrize(
@@ -287,5 +272,3 @@ def test_a_limit_that_only_round_off_misses_contradicts_nothing(above: float, wo
     _, row = solved(design, target, head)
     assert row.verdict == word, row.reason
     assert (row.conflict != ()) == (word == "infeasible")
-    assert "no design" in row.optimality.words
-    assert ("meets all" in row.optimality.words) == (word == "infeasible")

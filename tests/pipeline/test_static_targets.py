@@ -97,9 +97,9 @@ def test_the_limits_hold_at_5000_instants() -> None:
 
 
 def test_a_case_with_nothing_but_a_stiffness_has_an_answer() -> None:
-    """The least change that meets it, and it is proved: K is affine in gears, which hold all."""
+    """The least change that meets it."""
     result, row = solved(f"  - {{stiffness: {{{AT}}}, at_least: 0.4 N/um}}\n")
-    assert (row.verdict, row.optimality.kind) == ("reached", "proved")
+    assert row.verdict == "reached"
     (limit,) = row.limits
     assert limit.optimal == pytest.approx(4e5, rel=1e-6)
     assert limit.initial < 4e5
@@ -220,7 +220,7 @@ def test_slopes_along_a_path_that_lengths_follow_are_total() -> None:
             ends = [way(y + s * h * np.eye(3)[k])[0] for s in (-2, -1, 1, 2)]
             differences = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * h)
             np.testing.assert_allclose(slopes[:, k], differences, rtol=1e-6)
-        assert not limit.is_convex
+        assert not limit.is_decided
 
 
 def test_a_node_inside_a_reduced_link_stays_in_the_model() -> None:

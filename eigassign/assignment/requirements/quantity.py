@@ -54,11 +54,6 @@ class LimitedQuantity(Requirement):
         return True
 
     @property
-    def is_convex(self) -> bool:
-        """True where it allows a convex set of designs."""
-        return self.is_affine
-
-    @property
     def is_decided(self) -> bool:
         """True where no design keeps it if a search from a few starts finds none."""
         return True

@@ -237,11 +237,6 @@ class Requirement(Brief):
         return None
 
     @property
-    def is_convex(self) -> bool:
-        """True where it allows a convex set of designs if K, M and quantities are affine in y."""
-        return self.terms == ((1, 1.0),) and bool(np.isinf(self.upper).all())
-
-    @property
     def bands(self) -> tuple[Any, ...]:
         """Bands along each trajectory for itself, of which the program has a choice."""
         return ()

@@ -82,17 +82,12 @@ class StaticLimit(LimitedQuantity):
         return way
 
     @property
-    def is_convex(self) -> bool:
-        """True where the force is the same at all designs, if K is affine in them."""
+    def is_decided(self) -> bool:
+        """True where K is affine and the force fixed, and so the designs are a convex set."""
         way, n = self.way, self.way.path.q.shape[1]
         design = np.arange(n + len(way.model.y_names)) >= n
         fixed = way.by(False).forces.is_fixed(design) and not way.path.follows_design
-        return fixed and isinstance(way.target.place, PushedNode)
-
-    @property
-    def is_decided(self) -> bool:
-        """True where the designs that keep it are a convex set: else a search may miss some."""
-        return self.is_convex and self.way.model.pencil.is_affine
+        return fixed and isinstance(way.target.place, PushedNode) and way.model.pencil.is_affine
 
     @property
     def unit(self) -> str:

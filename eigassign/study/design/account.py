@@ -20,7 +20,7 @@ from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.checks.weight import weight_doubt
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
-from eigassign.study.design.conclusions import Conflict, aim_row, extreme, is_proved
+from eigassign.study.design.conclusions import Conflict, aim_row, extreme
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes
 from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found, Outcome
@@ -74,7 +74,7 @@ def assignment_row(
     deviated = tuple(_deviated(answer.robust, targets, limits, largest))
     met = all(one.satisfied for one in targets) and all(row.satisfied for row in limits)
     conflict = None if met and not deviated else _decided(scene, answer)
-    optimality = _optimality(scene, answer, conflict, own.bound)
+    optimality = _optimality(answer, conflict, own.bound)
     conflicting = () if conflict is None else conflict.names
     doubts, beyond = _doubts(scene, own, accuracy, motion, of_model, largest, conflicting)
     ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
@@ -407,20 +407,15 @@ def _merits(
 
 
 def _optimality(
-    scene: Scene, answer: Answer, conflict: Conflict | None, bound: OptimalityRow | None
+    answer: Answer, conflict: Conflict | None, bound: OptimalityRow | None
 ) -> OptimalityRow:
     """How good the optimum is known to be."""
     found = answer.found
     if found is None:
         return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
     best = found.best
-    if not found.are_listed and is_proved(scene, found):
-        met = best.seen.violation <= MET
-        words = "no design " + ("is better" if met else "misses the limits by less")
-        if conflict is not None:
-            words = "no design meets all limits, or misses them by less"
-        words = f"the problem is convex: {words}"
-        return OptimalityRow("proved", best.stationarity, None, words)
+    if conflict is not None and conflict.is_linear:
+        return OptimalityRow("proved", best.stationarity, None, "no design meets all limits")
     if found.are_listed:
         return _of_choices(found, conflict is None)
     if bound is not None and bound.kind == "proved":

@@ -27,7 +27,6 @@ from eigassign.study.design.clearance import finer_path
 from eigassign.study.design.conclusions import (
     Conflict,
     conflict,
-    idle_notes,
     least_changed,
 )
 from eigassign.study.design.followed import require_one_shape
@@ -106,7 +105,6 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
     notes += more
     steps = scene.file.assignment.steps
     contradiction = conflict(found, steps, found.task.scene.limits)
-    notes += idle_notes(scene.model.y_names, found, scene.initial)
     notes += _choice_notes(found)
     if found.lost:
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")

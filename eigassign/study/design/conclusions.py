@@ -8,14 +8,6 @@ place of F.
 
 Each before and after, as it is found between the samples too (`clearance`); of a robust design the
 least in all scenarios, but the mass as it is without deviations.
-
-**Proved.** "Mode 1 at least b" is K(y) − (2πb)² M(y) ⪰ 0 where every coordinate is held. With K and
-M affine in y that is a convex set, and so are bounds, linear limits and a mass that is affine in y;
-an affine price and least change are convex. A local optimum is then the best there is. Where
-nothing meets the limits, λ₁ falls short most at a design from which no direction raises it: with K
-and M at a better design, φᵀ(K − λ₁M)φ > 0 for all modes φ of λ₁ here, which is the slope towards
-it. So a stationary violation proves that the limits contradict, and where mode 1 is to be as high
-as can be, a stationary design that it is nowhere higher.
 """
 
 from __future__ import annotations
@@ -33,12 +25,10 @@ from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
     Appraisal,
-    Cost,
     DesignProblem,
-    Objective,
 )
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.exact.sequential import NOTHING, OPTIMAL, End, Optimum, minimise
+from eigassign.assignment.exact.sequential import NOTHING, End, minimise
 from eigassign.assignment.program import can_be_kept, smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
@@ -234,53 +224,6 @@ MOST = 12  # limits of which the smallest contradiction is looked for
 ENOUGH = 100
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
 SAME = 1e-9  # of the merit: a design this little worse is as good
-LEAST = 1e-6  # of the bounds: a change that no printed digit shows
-
-
-# --- Convexity
-
-
-def is_proved(scene: Scene, found: Found) -> bool:
-    """Whether no design is better, or none meets the limits where they are missed.
-
-    Whether these can be met does not depend on what is wanted besides: the violation alone is
-    minimised then, from the answer.
-    """
-    best, asked = found.best, found.variant.requirements
-    if found.variant.below:  # bands leave a choice, and what is convex is so for each alone
-        return False
-    if best.seen.violation <= MET:
-        return (
-            best.stationarity <= OPTIMAL
-            and _is_convex(found.variant.problem.cost, asked)
-            and _are_convex(scene, asked)
-        )
-    if not _are_convex(scene, replace(asked, aims=())):
-        return False
-    limits = found.variant.of(replace(asked, asked=asked.limits, least_change=None, aims=()))
-    alone = replace(limits.problem, cost=None, objective=Objective.LEAST_SQUARES)
-    least = minimise(alone, best.y, scene.file.assignment.steps)
-    return least.seen.violation > MET and least.stationarity <= OPTIMAL
-
-
-def _is_convex(cost: Cost | None, asked: Requirements) -> bool:
-    """True where F is convex: an affine cost, or least change; or where only mode 1 is to be high.
-
-    Its designs above a frequency are a convex set, which says nothing of them with a cost added.
-    """
-    affine = cost is None or cost.is_affine  # of lists nothing is convex
-    return not asked.goals and affine and (cost is None or not asked.aims)
-
-
-def _are_convex(scene: Scene, asked: Requirements) -> bool:
-    """True where the limits allow a convex set of designs, and aims those above any frequency."""
-    file = scene.file
-    if file.design.catalogues or file.assignment.robust or scene.path.follows_design:
-        return False
-    limits = [one for one in (*asked.limits, *asked.aims) if one.constraint is None]
-    if not all(one.is_convex for one in limits):
-        return False
-    return not limits or (scene.model.n_rigid == 0 and scene.model.pencil.is_affine)
 
 
 # --- Contradictions
@@ -290,11 +233,13 @@ def _are_convex(scene: Scene, asked: Requirements) -> bool:
 class Conflict:
     """Limits that no design was found to meet together; without any one of them there is one.
 
-    ``smallest`` is False where there are so many that only those missed here are named.
+    ``smallest`` is False where there are so many that only those missed here are named. Of limits
+    that are linear in the design no search misses a design.
     """
 
     names: tuple[str, ...]
     smallest: bool
+    is_linear: bool = False
 
 
 def conflict(found: Found, steps: int, of_design: Sequence[LimitedQuantity]) -> Conflict | None:
@@ -325,7 +270,10 @@ def conflict(found: Found, steps: int, of_design: Sequence[LimitedQuantity]) -> 
     if open_ and not contradict(names):
         return None
     needed = smallest(names, contradict)
-    return Conflict(missed, False) if None in answers else Conflict(tuple(needed), True)
+    if None in answers:
+        return Conflict(missed, False)
+    linear = {one.name for one in of_design if one.is_affine}
+    return Conflict(tuple(needed), True, linear.issuperset(needed))
 
 
 def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
@@ -351,55 +299,6 @@ def _effects(problem: DesignProblem, y: Floats, seen: Appraisal) -> Floats:
     width = problem.upper - problem.lower
     cost = () if problem.cost is None else (problem.cost_slopes(y),)
     return np.vstack([seen.slopes, seen.excess_slopes, *cost]) * width
-
-
-def idle_notes(names: Sequence[str], found: Found, initial: Floats) -> Iterator[str]:
-    """Parameters without effect, and those that only together have one, in words.
-
-    What slopes of 0 suggest is tried at the bounds, for they are 0 at the top of a curve too.
-    """
-    problem, best = found.variant.problem, found.best
-    width = problem.upper - problem.lower
-    free = np.flatnonzero(width > 0.0)
-    J = _effects(problem, best.y, best.seen)[:, free]
-    size = np.linalg.norm(J, axis=0)
-    still = size <= WITHOUT * size.max(initial=0.0)
-    idle = [k for k in free[still] if _changes_nothing(problem, best, np.eye(len(width))[k])]
-    away = np.where(width > 0.0, (best.y - initial) / np.where(width > 0.0, width, 1.0), 0.0)
-    if idle:
-        kept = ": left as it was" if np.abs(away[idle]).max() <= LEAST else ""
-        yield f"no target depends on {', '.join(names[k] for k in idle)}{kept}"
-    moving = free[~still]
-    V = _null_space(J[:, ~still] / size[~still])
-    together = np.zeros((len(width), V.shape[1]))  # in shares of the bounds
-    together[moving] = V / size[~still, None]
-    if V.size and all(_changes_nothing(problem, best, width * d) for d in together.T):
-        alike = moving[np.abs(V).max(axis=1) > 1e-3]
-        least = np.abs(np.linalg.qr(together)[0].T @ away).max() <= LEAST
-        change = ": their smallest change is taken" if least else ""
-        listed = ", ".join(names[k] for k in alike)
-        yield f"{listed} have the same effect on all targets{change}"
-
-
-def _changes_nothing(problem: DesignProblem, best: Optimum, d: Floats) -> bool:
-    """True where what is asked stays as it is from bound to bound along d (n_y,)."""
-    for along in (d, -d):
-        ends = np.where(along > 0.0, problem.upper, problem.lower) - best.y
-        moved = along != 0.0
-        far = float((ends[moved] / along[moved]).min())
-        y = np.clip(best.y + far * along, problem.lower, problem.upper)
-        try:
-            seen = problem.appraise(y)
-        except EigassignError:
-            return False
-        pairs = (
-            (seen.residual, best.seen.residual),
-            (seen.excess, best.seen.excess),
-            (np.array([problem.price(y)]), problem.price(best.y)),
-        )
-        if max(np.abs(a - b).max(initial=0.0) for a, b in pairs) > ON:
-            return False
-    return True
 
 
 def _null_space(J: Floats) -> Floats:

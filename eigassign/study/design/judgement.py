@@ -171,43 +171,6 @@ def soft_drives(file: CaseFile, model: Model, q: Floats) -> Iterator[tuple[str, 
         )
 
 
-# --- Followed modes that change their numbers
-
-SHOWN = 8  # changes that a note lists
-
-
-def swap_notes(path: Trajectories, targets: Sequence[TargetStudy]) -> tuple[str, ...]:
-    """Say which mode each followed one is and where it swaps, if it is not always the named."""
-    return tuple(
-        dict.fromkeys(
-            f"with the {design} design {row.name} {_runs(path, target, numbers)}"
-            for target in targets
-            for row in target.followed
-            for design, numbers in (
-                ("initial", row.initial_numbers),
-                ("optimal", row.exact_numbers),
-            )
-            if (numbers != row.like).any()
-        )
-    )
-
-
-def _runs(path: Trajectories, target: TargetStudy, numbers: NDArray[np.intp]) -> str:
-    """Write ``swaps its number: mode 2 from sample 0 (t = 0 s), mode 3 from sample 4 …``."""
-    if (numbers == numbers[0]).all():
-        return f"is mode {numbers[0]} throughout"
-    start = target.asked.rows.start
-    first = {rows.start for rows in path.rows} | {start}
-    changes = [
-        k
-        for k, number in enumerate(numbers)
-        if k == 0 or number != numbers[k - 1] or start + k in first
-    ]
-    listed = [f"mode {numbers[k]} from {path.where(start + k)}" for k in changes]
-    more = f" and {len(changes) - SHOWN} more changes" if len(changes) > SHOWN else ""
-    return f"swaps its number: {', '.join(listed[:SHOWN])}{more}"
-
-
 # --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers
 
 NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
