@@ -120,25 +120,6 @@ figures = click.option(
 )
 
 
-against = several(
-    click.option(
-        "--against",
-        type=PATH,
-        metavar="PREVIOUS",
-        help="Compare with an earlier result, and list what has changed: a result folder, "
-        "results.json, summary.json, or the output of validate --json (default: no comparison).",
-    ),
-    click.option(
-        "--tolerance",
-        type=Number(0.0),
-        metavar="HZ",
-        default=0.01,
-        show_default=True,
-        help="Difference up to which frequencies count as unchanged.",
-    ),
-)
-
-
 report = click.option(
     "--report",
     type=click.Choice(["full", "light", "none"]),

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from eigassign.batch.runner import Batch
     from eigassign.batch.workers import Workers
     from eigassign.output.batch.summary import CaseOutcome
-    from eigassign.output.previous import EarlierResult
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
 
@@ -60,7 +59,6 @@ _MANY = 50  # cases: above, only failed ones have figures and a report, and are 
     help="Stop a case that takes longer (default: never).",
 )
 @arguments.out("results, or results/<case>_sweep of one swept case")
-@arguments.against
 @arguments.caching
 @arguments.force
 @arguments.figures
@@ -78,10 +76,9 @@ def batch(
     or with --set, runs once for each variant. Every case has its own folder in --out, beside
     index.html, summary.csv, summary.json and junit.xml. Cases that are done and still current are
     skipped: repeat the command to continue after an interruption. A failed case does not stop the
-    others. Exit code 1 if a case failed, or differs from --against.
+    others. Exit code 1 if a case failed.
     """
     from eigassign.batch.plan import cases_in, plan_of
-    from eigassign.output.previous import EarlierResult
 
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
@@ -92,10 +89,8 @@ def batch(
         with _workers(how["scheduler"], jobs) as workers:
             if dry_run:
                 return _tell(asked, workers, reporter)
-            against = how["against"]  # read before it may be written over
-            since = against and EarlierResult(against, "answers", how["tolerance"])
             rows = _watched(asked, workers, reporter)
-        return _told(asked.folder, rows, since, reporter)
+        return _told(asked.folder, rows, reporter)
 
 
 def _workers(scheduler: str | None, jobs: int | None) -> AbstractContextManager[Workers]:
@@ -130,26 +125,18 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
     return Batch(plan, folder, options)
 
 
-def _told(
-    folder: Path, rows: Sequence[CaseOutcome], since: EarlierResult | None, reporter: Reporter
-) -> int:
+def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
     """Show how the cases ended, all of them or the first that failed; the exit code."""
     from eigassign.output import console
-    from eigassign.output.batch.index import write_tests
     from eigassign.output.batch.summary import batch_table, said
-    from eigassign.output.previous import Known
 
-    if since is not None:
-        moves = {row.name: [*map(str, since.add(Known.of_outcome(row)))] for row in rows}
-        write_tests(folder, rows, moves)
     bad = [row for row in rows if row.status != "ok"]
     listed = [*rows] if len(rows) <= _MANY else bad[:_MANY]
     console.print_tables([batch_table(listed)] if listed else [])
-    console.print_tables([since.table()] if since is not None else [])
     if bad:
         reporter.error(f"{len(bad)} of {_cases(len(rows))} gave no answer to use")
     show(f"{_cases(len(rows))} in {folder}: {said(rows) or 'nothing to run'}")
-    return 1 if bad or (since is not None and since.moves) else 0
+    return 1 if bad else 0
 
 
 def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> list[CaseOutcome]:

@@ -14,7 +14,6 @@ from eigassign.cli.reporter import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.output.previous import Moved
     from eigassign.pipeline.run import Options, Outcome
     from eigassign.study.results import ValidationRow
 
@@ -176,8 +175,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     epilog=arguments.examples(
         "eigassign validate cases/two_link.yaml",
         "eigassign validate cases --junit validation.xml",
-        "eigassign validate cases --json > before.json",
-        "eigassign validate cases --against before.json",
+        "eigassign validate cases --json",
     )
 )
 @click.argument("cases", nargs=-1, type=arguments.PATH)
@@ -187,15 +185,12 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     metavar="FILE",
     help="Also write the results in JUnit format, for CI servers (default: no file).",
 )
-@arguments.against
 @arguments.caching
 @arguments.json
 @arguments.common
 def validate(
     cases: tuple[Path, ...],
     junit: Path | None,
-    against: Path | None,
-    tolerance: float,
     as_json: bool,
     **how: Any,
 ) -> int:
@@ -203,11 +198,9 @@ def validate(
 
     Compares the full expansion, and the one that is linear in the design, along the trajectory,
     within the bounds of the design, and at random points. CASES are files or folders; without any,
-    the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case, or
-    an exact frequency differs from --against by more than --tolerance.
+    the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case.
     """
     from eigassign.batch.plan import cases_in
-    from eigassign.output import previous
     from eigassign.output.batch.summary import write_junit
     from eigassign.pipeline import run
 
@@ -216,7 +209,6 @@ def validate(
     tests: list[tuple[str, str, float, str, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
-        since = against and previous.EarlierResult(against, "validations", tolerance)
         for case in cases_in(cases):
             try:
                 answer = run.validate(case, _options(how, reporter))
@@ -229,24 +221,21 @@ def validate(
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
-            moves = since.add(previous.Known.of_validation(case.stem, answer.rows)) if since else []
-            codes.append(0 if answer.passed and not moves else 1)
-            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows, moves), ""))
+            codes.append(0 if answer.passed else 1)
+            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows), ""))
         if junit:
             write_junit(junit, tests)
-        moved = since.table() if since and rows else None
     if as_json:
-        print_json([*rows, *failures, *(since.moves if since else ())])
+        print_json([*rows, *failures])
     else:
         from eigassign.output.console import print_tables
         from eigassign.output.tables import validation_table
 
         print_tables([validation_table(rows)] if rows else ())
-        print_tables([moved] if moved else ())
     return max(codes)
 
 
-def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str, str]:
+def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
     """The status of a validated case, and why it is not ok."""
     from eigassign.facts import percent
 
@@ -256,8 +245,7 @@ def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str,
         for row in rows
         if not row.passed
     ]
-    status = "tolerance" if reasons else "moved" if moves else "ok"
-    return status, "\n".join([*reasons, *map(str, moves)])
+    return "tolerance" if reasons else "ok", "\n".join(reasons)
 
 
 @click.command(

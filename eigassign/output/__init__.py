@@ -11,7 +11,6 @@ In reading order; each imports from those above it only:
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
     batch         what a batch leaves: summaries, junit.xml, index.html
-    previous      what an earlier result said, and what has moved since
     schema        JSON Schemas of the files of results
 """
 
@@ -30,7 +29,6 @@ __all__, __getattr__, __dir__ = face(
         "figures.paper": "draw render",
         "figures.run": "run_figures",
         "figures.screen": "screen_figure",
-        "previous": "EarlierResult Known",
         "reports.chart": "chart_tables write_chart",
         "reports.page": "page write_modes write_run",
         "reports.verdict": "verdict_of",

@@ -123,17 +123,11 @@ def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
 
     What is wanted is not in the names: it may be swept.
     """
-    return ranges(
-        (t.asked.form.curve_of(t.asked.curve_name), t.asked.trajectory, t.exact_hz.tolist())
-        for t in results.targets
-    )
-
-
-def ranges(curves: Iterable[tuple[str, str | None, Sequence[float]]]) -> tuple[Range, ...]:
-    """Lowest, mean and highest of each: name, trajectory or None, values in Hz."""
     found: dict[str, Range] = {}
-    for name, trajectory, hz in curves:
-        name += "" if trajectory is None else f" along {trajectory!r}"
+    for target in results.targets:
+        asked, hz = target.asked, target.exact_hz.tolist()
+        name = asked.form.curve_of(asked.curve_name)
+        name += "" if asked.trajectory is None else f" along {asked.trajectory!r}"
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
         free = next(each for each in names if each not in found)
         found[free] = (free, min(hz), math.fsum(hz) / len(hz), max(hz))
