@@ -193,8 +193,7 @@ def _run(
         on_outcome(found)
 
     def lose(variant: Variant) -> None:
-        why = "memory or time" if batch.options.seconds else "memory"
-        message = f"the process that ran it was killed, perhaps because {why} ran out"
+        message = "the process that ran it was killed, perhaps because memory ran out"
         keep(variant, outcome_of(variant, "error", message=message))
 
     work = partial(run_case, options=batch.options)

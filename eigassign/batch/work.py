@@ -1,16 +1,11 @@
-"""What a worker does: check a variant, run it, in the time that a case may take."""
+"""What a worker does: check a variant, run it."""
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import errno
-import faulthandler
-import multiprocessing
 import os
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
@@ -27,64 +22,6 @@ from eigassign.process import failure_of
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.results import RunResults
 
-_PATIENCE_S = 5.0  # until a process that does not listen is ended
-_AGAIN_S = 0.5  # Python ignores what some callbacks raise: then the next one ends the case
-
-
-class OutOfTimeError(BaseException):
-    """The case took longer than it may; no Exception, so that nothing on the way catches it."""
-
-
-@contextlib.contextmanager
-def limited(seconds: float | None) -> Iterator[None]:
-    """Raise OutOfTimeError inside as soon as so many seconds are over, in any thread.
-
-    A process of a pool or a cluster that is deep in compiled code, and does not hear that its time
-    is over, is ended some seconds later.
-    """
-    if seconds is None:
-        yield
-        return
-    with open(os.devnull, "w") as nowhere:
-        if is_worker := multiprocessing.parent_process() is not None:
-            faulthandler.dump_traceback_later(seconds + _PATIENCE_S, exit=True, file=nowhere)
-        try:
-            with _alarm(seconds):
-                yield
-        finally:
-            if is_worker:
-                faulthandler.cancel_dump_traceback_later()
-
-
-@contextlib.contextmanager
-def _alarm(seconds: float) -> Iterator[None]:
-    """By a thread: signals reach the main one only, and a cluster's tasks run in another."""
-    raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
-    here = ctypes.c_ulong(threading.get_ident())
-    ended, out_of_time = threading.Event(), ctypes.py_object(OutOfTimeError)
-
-    def ring() -> None:
-        wait_s = seconds
-        while not ended.wait(wait_s):
-            raise_in(here, out_of_time)
-            wait_s = _AGAIN_S
-
-    def stop() -> None:
-        ended.set()
-        ringing.join()  # behind this it raises nothing more
-        raise_in(here, None)  # nor what this thread has not heard yet
-
-    ringing = threading.Thread(target=ring, daemon=True)
-    try:
-        ringing.start()  # it may ring before this returns
-        yield
-    finally:
-        try:
-            stop()
-        finally:
-            stop()  # the last ring may have come while it stopped
-
-
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # not of one case only
 
 
@@ -93,7 +30,6 @@ class CaseOptions:
     """Options of each case's run, which can be sent to another process."""
 
     out: str  # the folder of the batch
-    here: str = field(default_factory=os.getcwd)  # from where names of files are seen
     cache_dir: str | None = None
     use_cache: bool = True
     force: bool = False
@@ -101,7 +37,6 @@ class CaseOptions:
     reports: str = "all"  # of which cases there are figures and a report: all, failed or none
     redraw: bool = False  # cases that were done without theirs run again
     allow_outside: bool = False
-    seconds: float | None = None  # that a case may take
 
     def draws(self, status: str) -> bool:
         """True where a case that ended so has figures and a report."""
@@ -118,7 +53,6 @@ def check_cases(
 
     Raises StorageError where a file of one cannot be read.
     """
-    os.chdir(options.here)  # of a cluster's worker
     found = []
     for variant in variants:
         try:
@@ -162,11 +96,7 @@ def run_case(variant: Variant, options: CaseOptions) -> CaseOutcome:
         return outcome_of(variant, status, perf_counter() - start, message=message, **found)
 
     try:
-        os.chdir(options.here)  # of a cluster's worker
-        with limited(options.seconds):
-            return _solved(variant, options, ended)
-    except OutOfTimeError:
-        return ended("error", f"takes longer than the {options.seconds:g} s of --case-time")
+        return _solved(variant, options, ended)
     except MemoryError:
         return ended("error", "out of memory")
     except Exception as error:

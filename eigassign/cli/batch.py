@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting, show
-from eigassign.errors import UsageError
 from eigassign.files import folder_name
 
 if TYPE_CHECKING:
@@ -42,21 +41,10 @@ _MANY = 50  # cases: above, only failed ones have figures and a report, and are 
 @click.option("--dry-run", is_flag=True, help="Count the cases that would run; run nothing.")
 @click.option("--jobs", type=click.IntRange(1), help="Number of processes (default: one per core).")
 @click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Run on the workers of this dask.distributed scheduler (default: this machine).",
-)
-@click.option(
     "--reports",
     type=click.Choice(["none", "failed", "all"]),
     help="Which cases get figures and a light report (default: all up to 50 cases, else failed); "
     "cases that are done but lack theirs run again.",
-)
-@click.option(
-    "--case-time",
-    type=arguments.LIMIT,
-    metavar="SECONDS",
-    help="Stop a case that takes longer (default: never).",
 )
 @arguments.out("results, or results/<case>_sweep of one swept case")
 @arguments.caching
@@ -79,6 +67,7 @@ def batch(
     others. Exit code 1 if a case failed.
     """
     from eigassign.batch.plan import cases_in, plan_of
+    from eigassign.batch.workers import this_machine
 
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
@@ -86,25 +75,11 @@ def batch(
     usual = Path("results", folder_name(f"{cases[0].stem}_sweep") if swept else "")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
-        with _workers(how["scheduler"], jobs) as workers:
-            if dry_run:
-                return _tell(asked, workers, reporter)
-            rows = _watched(asked, workers, reporter)
+        workers = this_machine(jobs)
+        if dry_run:
+            return _tell(asked, workers, reporter)
+        rows = _watched(asked, workers, reporter)
         return _told(asked.folder, rows, reporter)
-
-
-def _workers(scheduler: str | None, jobs: int | None) -> AbstractContextManager[Workers]:
-    from eigassign.batch.workers import this_machine
-
-    if scheduler is None:
-        return nullcontext(this_machine(jobs))
-    from eigassign.batch.workers import cluster
-
-    if jobs is not None:
-        raise UsageError(
-            "--jobs is for this machine: how many work at --scheduler is settled there"
-        )
-    return cluster(scheduler)
 
 
 def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
@@ -120,7 +95,6 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
         reports=how["reports"] or ("all" if len(plan) <= _MANY else "failed"),
         redraw=how["reports"] is not None,
         allow_outside=how["allow_outside"],
-        seconds=how["case_time"],
     )
     return Batch(plan, folder, options)
 

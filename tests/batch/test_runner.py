@@ -148,7 +148,7 @@ def failing(batch: Batch, error: BaseException) -> Workers:
 def test_of_what_breaks_the_culprit_is_told_and_nobody_else_loses(
     error: Exception, tmp_path: Path
 ) -> None:
-    """A pool of processes breaks with all that it has in flight, a cluster loses one case."""
+    """A pool of processes breaks with all that it has in flight."""
     case(tmp_path)
     batch = batch_of(tmp_path, "0,0.5,1,2")
     assert sorted(ran(batch, failing(batch, error))) == names(batch, range(4))

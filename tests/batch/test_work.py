@@ -4,9 +4,6 @@ import errno
 import json
 import os
 import shutil
-import threading
-import time
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +13,6 @@ import scipy.sparse.linalg
 from eigassign.batch import (
     Batch,
     CaseOptions,
-    OutOfTimeError,
-    limited,
     plan_of,
     run,
     run_case,
@@ -141,77 +136,10 @@ def test_a_full_disk_ends_the_batch(
         run(batch, this_machine(1), lambda _total, _done: None, lambda _row: None)
 
 
-def test_a_case_that_takes_too_long_is_ended(options: CaseOptions) -> None:
-    found = run_case(plan_of([SMALL])[0], replace(options, seconds=0.01))
-    assert (found.status, found.message) == ("error", "takes longer than the 0.01 s of --case-time")
-    assert found.seconds < 10
-
-
 def test_a_bug_in_one_case_is_an_outcome_and_not_an_end(options: CaseOptions) -> None:
     found = run_case(plan_of([SMALL])[0], replace(options, cache_dir=5, use_cache=True))
     assert found.status == "error"
     assert found.message.startswith("internal error: TypeError")
-
-
-def test_a_case_in_a_thread_is_ended_too() -> None:
-    """As on the workers of a cluster, also where a callback swallows the first of what is raised.
-
-    What it does there afterwards is not disturbed.
-    """
-    ended: list[str] = []
-
-    def work_until(limit: float, end: float) -> None:
-        while limit < 1.0 and time.monotonic() < end:
-            time.sleep(0.001)
-
-    def work_on() -> None:
-        for limit in (0.01, 60.0):
-            start = time.monotonic()
-            try:
-                with limited(limit):
-                    with suppress(OutOfTimeError):
-                        work_until(limit, start + 10.0)
-                        ended.append("not ended")
-                    work_until(limit, start + 10.0)
-            except OutOfTimeError:
-                ended.append(f"after {limit} s")
-        ended.append("at the end")
-
-    thread = threading.Thread(target=work_on)
-    thread.start()
-    thread.join()
-    assert ended == ["after 0.01 s", "not ended", "at the end"]
-
-
-def test_a_time_that_is_over_at_once_ends_nothing_behind_it() -> None:
-    late: list[str] = []
-
-    def work() -> None:
-        try:
-            for _ in range(50):
-                with suppress(OutOfTimeError), limited(1e-6):
-                    time.sleep(0.01)
-            for _ in range(70):  # longer than until the next ring
-                time.sleep(0.01)
-        except OutOfTimeError:
-            late.append("rang")
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert not late
-
-
-def test_the_limit_is_lifted_behind_a_case() -> None:
-    def wait(steps: int) -> None:
-        for _ in range(steps):
-            time.sleep(0.01)
-
-    with pytest.raises(OutOfTimeError), limited(0.01):
-        wait(1000)
-    with limited(0.05):
-        pass
-    wait(10)
 
 
 def test_memory_that_runs_out_inside_a_factorisation_is_no_limp_link(

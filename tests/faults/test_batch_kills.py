@@ -1,8 +1,7 @@
 """A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
 
-So does one of which results are damaged between, and one on a cluster of which the scheduler is
-killed. Slow: sixty kills, each followed by the same command again, some of them after a file of a
-case was cut, emptied or deleted.
+So does one of which results are damaged between. Slow: sixty kills, each followed by the same
+command again, some of them after a file of a case was cut, emptied or deleted.
 """
 
 import json
@@ -17,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from schedulers import scheduler
 
 import eigassign
 
@@ -27,7 +25,6 @@ pytestmark = [
 ]
 CASES, KILLS, DAMAGES, JOBS = 40, 60, 20, 2
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-SCHEDULERS = 9  # kills of a scheduler, the command and a worker, in turn
 ROOT = Path(eigassign.__file__).parents[1]
 SMALL = ROOT / "benchmarks" / "small_arm.yaml"
 
@@ -164,29 +161,3 @@ def test_sweeps_that_are_killed_sixty_times_end_as_if_they_had_not_been(tmp_path
     assert not unharmed
     said = f"{KILLS} kills and {DAMAGES} damages in {sweeps} sweeps"
     sys.stdout.write(f"{said}, {twice} cases begun again\n")
-
-
-def test_sweeps_whose_scheduler_is_killed_end_as_if_it_had_not_been(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    undisturbed = placed(tmp_path / "undisturbed")
-    assert begun(undisturbed).wait() == 1
-    expected, draw = made(undisturbed), random.Random(2)
-    left, sweeps, codes = SCHEDULERS, 0, Counter[int]()
-    here = [each for each in COMMAND if each not in ("--jobs", str(JOBS))]
-    while left:
-        folder, sweeps, code = placed(tmp_path / f"killed {sweeps}"), sweeps + 1, 0
-        out = folder / "out"
-        while code != 1:  # it is done, and some cases have missed their targets
-            with scheduler(tmp_path, workers=JOBS) as (address, there):
-                batch = begun(folder, (*here, "--scheduler", address))
-                if left and _goes_on(batch, lambda out=out: done_in(out)):
-                    time.sleep(draw.uniform(0.0, 0.5))
-                    if batch.poll() is None:
-                        (there[0], there[1], batch)[left % 3].kill()
-                        left -= 1
-                code = batch.wait()
-                codes[code] += 1
-        assert made(folder) == expected
-    assert set(codes) == {1, 3, -signal.SIGKILL}
-    said = f"{SCHEDULERS} kills on a cluster in {sweeps} sweeps, exit codes {dict(codes)}"
-    sys.stdout.write(f"{said}\n")
