@@ -23,6 +23,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from eigassign.brief import cut, named
 from eigassign.case.reader import (
     KeyPath,
@@ -89,12 +91,37 @@ from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
-_WIDTH = 90  # characters of a line, so that it is read without turning a page
+_WIDTH = 75  # characters of a line, after which the next entry of a list begins another
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Block style but for mappings of scalars; text in quotes where YAML 1.2 reads it otherwise."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """Everything is written out."""
+        return True
+
+    def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> Any:
+        """A mapping."""
+        node = super().represent_mapping(tag, mapping, flow_style)
+        node.flow_style = all(isinstance(value, yaml.ScalarNode) for _, value in node.value)
+        return node
+
+    def text(self, text: str) -> Any:
+        """A scalar."""
+        quoted = not _PLAIN.fullmatch(text) or resolve(text) != text
+        return self.represent_scalar("tag:yaml.org,2002:str", text, '"' if quoted else None)
+
+
+_Dumper.add_representer(str, _Dumper.text)
+_Dumper.add_multi_representer(float, _Dumper.represent_float)  # `Written` too
 
 
 def to_yaml(content: Mapping[str, object]) -> str:
-    """Block style for what is long, flow style for what fits on a line; None is left out."""
-    return "".join(_entry(key, plain(value), 0) for key, value in content.items())
+    """Block style, flow style for lists and mappings of scalars; None is left out."""
+    form = {"default_flow_style": None, "sort_keys": False, "allow_unicode": True}
+    written: str = yaml.dump(plain(content), Dumper=_Dumper, width=_WIDTH, **form)
+    return written
 
 
 def plain(value: object) -> object:
@@ -131,44 +158,6 @@ def _superfluous(value: Part) -> set[str]:
     if isinstance(value, AnyTrajectory) and not value.set:
         keys.add("set")
     return keys
-
-
-def _entry(key: str, value: object, depth: int) -> str:
-    """One ``key: value`` of a block mapping."""
-    if value is None:
-        return ""
-    pad, flow = "  " * depth, _flow(value)
-    fits = len(pad) + len(key) + 2 + len(flow) <= _WIDTH
-    if isinstance(value, dict) and value and not (fits and depth):
-        return f"{pad}{_word(key)}:\n" + "".join(_entry(k, v, depth + 1) for k, v in value.items())
-    if isinstance(value, list) and not fits:
-        return f"{pad}{_word(key)}:\n" + "".join(_item(v, depth + 1) for v in value)
-    return f"{pad}{_word(key)}: {flow}\n"
-
-
-def _item(value: object, depth: int) -> str:
-    """One entry of a block list; of a long mapping the first key stands beside the dash."""
-    pad, flow = "  " * depth, _flow(value)
-    if not isinstance(value, dict) or len(pad) + 2 + len(flow) <= _WIDTH:
-        return f"{pad}- {flow}\n"
-    inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
-    return f"{pad}- {inner.removeprefix(pad + '  ')}"
-
-
-def _flow(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_word(k)}: {_flow(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_flow(v) for v in value) + "]"
-    return _word(value) if isinstance(value, str) else repr(value)
-
-
-def _word(text: str) -> str:
-    """``text`` as it is where YAML reads it back as text, else in double quotes."""
-    if _PLAIN.fullmatch(text) and resolve(text) == text:
-        return text
-    escaped = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
-    return '"' + "".join("\\" + c if c in '"\\' else c for c in escaped) + '"'
 
 
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
