@@ -84,8 +84,7 @@ class PlannedFile:
         """
         found = {}
         for key, column in zip(self.variants.keys, self.variants.columns, strict=True):
-            values = column if isinstance(column, tuple) else ()  # of ranges only numbers differ
-            texts = {text_of(value) for value in values if not isinstance(value, (int, float))}
+            texts = {text_of(value) for value in column if not isinstance(value, (int, float))}
             counts = Counter(map(str.casefold, texts))
             found[key] = {text for text in texts if counts[text.casefold()] > 1}
         return found

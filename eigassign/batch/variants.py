@@ -12,19 +12,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from eigassign.case.case_file import key_objection
 from eigassign.case.reader import Finding, Source, Tree, key_path, read_yaml, resolve
 from eigassign.case.schema.document import validated_part
-from eigassign.case.schema.study import MOST, Sweep, text_of
+from eigassign.case.schema.study import MOST, Range, Sweep, text_of
 from eigassign.case.table import read_words
 from eigassign.errors import CaseError, MechanismError, Problem
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 
 # --- The values of each variant
 
@@ -33,39 +28,31 @@ if TYPE_CHECKING:
 class Variants:
     """The variants of one case in order: a value of each key for each of them.
 
-    ``columns`` has the values of each key: of a grid every combination of them is a variant, the
-    last key changing fastest; else the k-th ones belong together. Of samples ``columns`` are ranges
-    and ``shares`` (n, n_keys) says how far each value is from its `min` to its `max`.
+    ``columns`` has the values of each key: of a file the k-th ones belong together, else every
+    combination of them is a variant, the last key changing fastest.
     """
 
     keys: tuple[str, ...]
-    columns: tuple[Any, ...]
-    grid: bool = False
-    shares: NDArray[np.float64] | None = None
+    columns: tuple[tuple[Any, ...], ...]
     file: str = ""  # the CSV file they are from, a line of ``lines`` for each
     lines: tuple[int, ...] = ()
 
     def __len__(self) -> int:
-        if self.shares is not None:
-            return len(self.shares)
-        return math.prod(map(len, self.columns)) if self.grid else len(self.columns[0])
+        return len(self.lines) if self.file else math.prod(map(len, self.columns))
 
     def __getitem__(self, index: int) -> dict[str, object]:
         """The values of one variant by key."""
-        row: list[object] = []
-        if self.shares is not None:
-            shares = self.shares[index].tolist()
-            row = [span.value(share) for span, share in zip(self.columns, shares, strict=True)]
-        elif self.grid:
+        if self.file:
+            row = [column[index] for column in self.columns]
+        else:
+            row = []
             for column in reversed(self.columns):
                 index, k = divmod(index, len(column))
                 row.insert(0, column[k])
-        else:
-            row = [column[index] for column in self.columns]
         return dict(zip(self.keys, row, strict=True))
 
 
-AS_IT_STANDS = Variants((), (), grid=True)  # one, without values
+AS_IT_STANDS = Variants((), ())  # one, without values
 
 
 def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> Variants:
@@ -96,33 +83,18 @@ def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> V
 
 
 def _spread(sweep: Sweep, folder: Path) -> Variants:
-    bodies = sweep.parameters or {}
     if sweep.file is not None:
         file = folder / sweep.file
         (_, keys), *rows = read_words(file, "sweep.file")
-        columns = zip(*(map(resolve, cells) for _, cells in rows), strict=True)
+        cells = zip(*(map(resolve, row) for _, row in rows), strict=True)
         lines = tuple(line for line, _ in rows)
-        return Variants(tuple(keys), tuple(columns), file=file.name, lines=lines)
-    if sweep.sample in ("latin_hypercube", "sobol"):
-        shares = _drawn(sweep, len(bodies))
-        return Variants(tuple(bodies), tuple(bodies.values()), shares=shares)
-    found = Variants(tuple(bodies), sweep.axes(), grid=sweep.sample != "list")
+        return Variants(tuple(keys), tuple(cells), file=file.name, lines=lines)
+    bodies = sweep.parameters or {}
+    columns = (body.values if isinstance(body, Range) else body for body in bodies.values())
+    found = Variants(tuple(bodies), tuple(columns))
     if len(found) > MOST:
         raise MechanismError("sweep.parameters", f"{len(found)} variants: at most {MOST}")
     return found
-
-
-def _drawn(sweep: Sweep, keys: int) -> NDArray[np.float64]:
-    """A sample of the unit cube, (count, keys)."""
-    import warnings
-
-    from scipy.stats import qmc
-
-    kind = qmc.Sobol if sweep.sample == "sobol" else qmc.LatinHypercube
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Sobol' of a count that is no power of two: fine here
-        drawn: NDArray[np.float64] = kind(keys, seed=sweep.seed or 0).random(sweep.count or 0)
-    return drawn
 
 
 def _wrong_keys(tree: Tree, folder: Path, variants: Variants) -> Iterator[Finding]:
@@ -148,21 +120,13 @@ def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
 
 
 def _repeated(variants: Variants) -> Iterator[Finding]:
-    """The first variant of a list or file whose values are those of one before."""
-    if variants.grid or any(not isinstance(column, tuple) for column in variants.columns):
-        return  # of a grid, values of a key are told apart; samples and ranges do not meet
+    """The first row of a file whose values are those of one before; a grid has none."""
     seen: dict[tuple[str, ...], int] = {}
-    for k, row in enumerate(zip(*variants.columns, strict=True)):
-        first = seen.setdefault(tuple(map(text_of, row)), k)
-        if first == k:
-            continue
-        if variants.file:
-            line, other = variants.lines[k], variants.lines[first]
-            yield ("sweep", "file"), f"{variants.file}:{line}: has the values of line {other}"
-        else:
-            why = f"variant {k + 1} has the values of variant {first + 1}"
-            yield ("sweep", "parameters"), why
-        return
+    rows = zip(*variants.columns, strict=True) if variants.file else ()
+    for row, line in zip(rows, variants.lines, strict=True):
+        if (first := seen.setdefault(tuple(map(text_of, row)), line)) != line:
+            yield ("sweep", "file"), f"{variants.file}:{line}: has the values of line {first}"
+            return
 
 
 # --- What --set says

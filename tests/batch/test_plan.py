@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from memory import within
 
 from eigassign.batch import folder_names, plan_of, variant_problem
 from eigassign.errors import Problem
@@ -50,10 +49,10 @@ def test_names_that_do_not_say_all_end_with_a_hash_of_their_values(tmp_path: Pat
 
 
 def test_names_that_differ_in_the_case_of_letters_alone_are_told_apart(tmp_path: Path) -> None:
-    for sample in ("grid", "list"):
-        titles = "[arm, Arm, ARM, 180 MHz, 180 mHz, beam]"
-        sweep = f"sweep: {{sample: {sample}, parameters: {{title: {titles}}}}}\n"
-        found = names(plan_of([case(tmp_path, end=sweep)]))
+    titles = ["arm", "Arm", "ARM", "180 MHz", "180 mHz", "beam"]
+    (tmp_path / "titles.csv").write_text("\n".join(["title", *titles, ""]))
+    for values in (f"parameters: {{title: [{', '.join(titles)}]}}", "file: titles.csv"):
+        found = names(plan_of([case(tmp_path, end=f"sweep: {{{values}}}\n")]))
         assert len({name.casefold() for name in found}) == len(found) == 6
         assert [name.partition("~")[0] for name in found[:2]] == ["title=arm", "title=Arm"]
         assert found[-1] == "title=beam"
@@ -127,15 +126,3 @@ def test_a_plan_of_many_variants_is_made_at_once(tmp_path: Path) -> None:
     plan = plan_of([case(tmp_path)], [f"{MASS}=0..1:1000", "targets.0.frequency=180..190:1001"])
     assert len(plan) == 1_001_000
     assert plan[len(plan) - 1].values == {MASS: 1, "targets.0.frequency": 190}
-
-
-@pytest.mark.parametrize("sample", ["grid", "list"])
-def test_ranges_of_many_values_take_neither_time_nor_memory(tmp_path: Path, sample: str) -> None:
-    other = "targets.0.frequency: {min: 180 Hz, max: 190 Hz, count: 9999999}"
-    sweep = f"sample: {sample}, parameters: {{{MASS}: {{min: 0, max: 1, count: 9999999}}"
-    sweep += f", {other}" if sample == "list" else ""
-    arm = case(tmp_path, end=f"sweep: {{{sweep}}}}}\n")
-    with within(100.0):
-        plan = plan_of([arm])
-        assert len(plan) == 9_999_999
-        assert plan[4_999_999].values[MASS] == 0.5

@@ -48,25 +48,6 @@ def test_values_of_a_range_are_rounded_once() -> None:
     assert rows(given(f"{MASS}=0..300 g:4")) == [["0 g"], ["100 g"], ["200 g"], ["300 g"]]
 
 
-def test_a_list_takes_the_values_of_all_keys_together(tmp_path: Path) -> None:
-    text = f"  sample: list\n  parameters:\n    {MASS}: [1, 2]\n    {WANTED}: [180 Hz, 190 Hz]\n"
-    assert rows(swept(tmp_path, text)) == [[1, "180 Hz"], [2, "190 Hz"]]
-
-
-@pytest.mark.parametrize("sample", ["latin_hypercube", "sobol"])
-def test_samples_fill_their_ranges_and_are_those_of_the_seed(tmp_path: Path, sample: str) -> None:
-    text = (
-        f"  sample: {sample}\n  count: 16\n  parameters:\n    {MASS}: {{min: 0, max: 1 kg}}\n"
-        f"    assignment.max_error: {{min: 0.01, max: 0.02}}\n"
-    )
-    found = swept(tmp_path, text)
-    masses = sorted(float(str(row[0]).removesuffix(" kg")) for row in rows(found))
-    assert [int(16 * mass) for mass in masses] == list(range(16))  # one in each sixteenth
-    assert rows(swept(tmp_path, text)) == rows(found)
-    assert rows(swept(tmp_path, f"{text}  seed: 1\n")) != rows(found)
-    assert swept(tmp_path, f"{text}  seed: 1\n")[0] != found[0]
-
-
 def test_the_rows_of_a_file_are_variants(tmp_path: Path) -> None:
     (tmp_path / "runs.csv").write_text(f"# two\n{MASS};{WANTED}\n100 g;180 Hz\n\n0.2;190 Hz\n")
     found = swept(tmp_path, "  file: runs.csv\n")
@@ -95,27 +76,16 @@ def test_a_wrong_file_of_variants_is_refused_with_its_line(
 @pytest.mark.parametrize(
     ("sweep", "says"),
     [
-        ("  count: 3\n", "sweep: give either parameters or file"),
+        ("  {}\n", "sweep: give either parameters or file"),
         ("  parameters: {}\n", "sweep.parameters: needs at least 1 entries"),
         (f"  parameters: {{{MASS}: []}}\n", "needs at least 1 entries"),
         (f"  parameters: {{{MASS}: 3}}\n", "expected a list of values or a range"),
-        (f"  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many values"),
-        (f"  sample: sobol\n  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many variants"),
-        (f"  sample: sobol\n  count: 3\n  parameters: {{{MASS}: [1]}}\n", "needs a range"),
-        (
-            "  sample: latin_hypercube\n  count: 9999999\n  parameters:\n"
-            f"    {{{MASS}: {{min: 1, max: 2}}, {WANTED}: {{min: 1, max: 2}}}}\n",
-            "sweep.count: of 2 parameters at most 5000000 points can be drawn",
-        ),
-        (f"  sample: list\n  parameters: {{{MASS}: [1, 2], {WANTED}: [1]}}\n", "equally many"),
-        (
-            f"  sample: list\n  parameters: {{{MASS}: [1, 2, 1]}}\n",
-            "variant 3 has the values of variant 1",
-        ),
+        (f"  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "count: required key is missing"),
+        (f"  parameters: {{{MASS}: {{min: 1, max: 2, count: 1}}}}\n", "must be >= 2, got 1"),
         (f"  parameters: {{{MASS}: [1, '1']}}\n", "'1' is given twice"),
         (f"  parameters: {{{MASS}: [1 g, 1g]}}\n", "'1g' is given twice"),
         ("  parameters: {sweep.count: [1, 2]}\n", "other keys than its own"),
-        (f"  parameters: {{{MASS}: [1]}}\n  sampel: list\n", "did you mean 'sample'"),
+        (f"  parameters: {{{MASS}: [1]}}\n  fiel: a.csv\n", "did you mean 'file'"),
         (f"  parameters: {{{MASS}: {{min: 1 g, max: 2 kg, count: 2}}}}\n", "in the same unit"),
     ],
 )
