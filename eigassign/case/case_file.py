@@ -119,7 +119,7 @@ _Dumper.add_multi_representer(float, _Dumper.represent_float)  # `Written` too
 
 def to_yaml(content: Mapping[str, object]) -> str:
     """Block style, flow style for lists and mappings of scalars; None is left out."""
-    form = {"default_flow_style": None, "sort_keys": False, "allow_unicode": True}
+    form: dict[str, Any] = {"default_flow_style": None, "sort_keys": False, "allow_unicode": True}
     written: str = yaml.dump(plain(content), Dumper=_Dumper, width=_WIDTH, **form)
     return written
 
