@@ -16,7 +16,6 @@ OWNERS = {
     "yaml": {"case"},
     "pydantic": {"case"},
     "pydantic_core": {"case"},
-    "osqp": {"assignment"},
     "h5py": {"mechanism", "output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import Assignment
+from eigassign.assignment.one_shot import Assignment
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.brief import counted

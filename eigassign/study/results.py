@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.sequential import StepRecord
+from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile

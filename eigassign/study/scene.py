@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.requirements import Tolerances
-from eigassign.assignment.inputs import LinearConstraint
+from eigassign.assignment.program import LinearConstraint
 from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity
 from eigassign.assignment.requirements.sampling import design_limits
 from eigassign.assignment.requirements.static_limit import StaticLimit

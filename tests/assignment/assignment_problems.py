@@ -8,7 +8,6 @@ from scipy.optimize import lsq_linear
 
 from eigassign.assignment import (
     AssignedFrequency,
-    Bounds,
     LinearModel,
     hz_from_lam,
     lam_from_hz,
@@ -27,7 +26,7 @@ class Problem:
 
     @property
     def bounds(self):
-        return Bounds(self.lower, self.upper)
+        return (self.lower, self.upper)
 
     @property
     def weights(self):

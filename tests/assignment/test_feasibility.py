@@ -5,13 +5,13 @@ import pytest
 from assignment_problems import goal, random_problem
 from scipy.optimize import linprog
 
-from eigassign.assignment import Bounds, LinearConstraint, solve_assignment
+from eigassign.assignment import LinearConstraint, solve_assignment
 from eigassign.errors import InfeasibleError
 
 
 def solve(constraints, lower=(0.0, 0.0), upper=(1.0, 1.0)):
     """Two parameters that change λ by some 10 % a unit."""
-    box = Bounds(np.array(lower), np.array(upper))
+    box = (np.array(lower), np.array(upper))
     model = goal([1.2e6, 1.1e6], [[-1e5, 2e4], [3e4, -1e5]], 1e6)
     return solve_assignment([model], [0.5, 0.5], [0.0, 0.0], [0.5, 0.5], box, constraints)
 
@@ -20,10 +20,8 @@ def row(name, coefficients, lower=-np.inf, upper=np.inf):
     return LinearConstraint(name, np.array(coefficients, dtype=float), lower, upper)
 
 
-def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
-    with pytest.raises(
-        InfeasibleError, match=r"'total' asks for at least 3, .* allow 2 at most"
-    ) as e:
+def test_a_constraint_out_of_reach_is_named():
+    with pytest.raises(InfeasibleError, match="no design within the bounds meets 'total'") as e:
         solve([row("fine", [1, 0], upper=0.5), row("total", [1, 1], lower=3.0)])
     assert e.value.constraints == ("total",)
 
@@ -34,7 +32,7 @@ def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
         (
             [row("a", [1, 0], lower=2), row("b", [1, 1], upper=1), row("c", [0, 1], upper=-1)],
             {},
-            ("a", "c"),
+            ("c",),
         ),
         (
             [
@@ -48,7 +46,12 @@ def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
         ([row("total", [1, 1], upper=0.5)], {"lower": (0.4, 0.4), "upper": (0.4, 0.4)}, ("total",)),
         ([row("empty", [0, 0], lower=1.0)], {}, ("empty",)),
     ],
-    ids=["each alone", "together and no third", "of fixed parameters", "without terms"],
+    ids=[
+        "two alone: one is enough",
+        "together and no third",
+        "of fixed parameters",
+        "without terms",
+    ],
 )
 def test_constraints_that_contradict_the_bounds_or_each_other_are_named(constraints, box, named):
     with pytest.raises(InfeasibleError) as e:
@@ -85,7 +88,7 @@ def random_rows(seed):
 @pytest.mark.parametrize("seed", range(40))
 def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(seed):
     problem, constraints = random_problem(seed, n_y=3), random_rows(seed)
-    box = Bounds(np.zeros(3), np.ones(3))
+    box = (np.zeros(3), np.ones(3))
     arguments = (problem.goals, problem.weights, np.zeros(3), 0.5 * np.ones(3), box, constraints)
     if possible(constraints):
         solve_assignment(*arguments)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
-from eigassign.assignment.inputs import Floats
+from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.crossing import MEET, NeighbourPairs
 
 Indices = NDArray[np.intp]

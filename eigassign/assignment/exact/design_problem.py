@@ -19,10 +19,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from eigassign.assignment.inputs import Floats, LinearConstraint
-from eigassign.assignment.program import ScaledProgram
+from eigassign.assignment.program import Floats, LinearConstraint, Program, solve_program
 from eigassign.assignment.requirements.crossing import NeighbourPairs
-from eigassign.assignment.solver import solve_scaled
 
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies
@@ -219,8 +217,8 @@ class UnitBox:
             return z
         norms = np.linalg.norm(self.rows, axis=1)
         norms = np.where(norms > 0.0, norms, 1.0)
-        found = solve_scaled(
-            ScaledProgram(
+        found = solve_program(
+            Program(
                 A=np.eye(self.n),
                 b=-z,
                 G=np.vstack([np.eye(self.n), self.rows / norms[:, None]]),

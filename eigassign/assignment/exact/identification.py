@@ -37,7 +37,7 @@ import numpy as np
 
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import End, Optimum, has_way, minimise
-from eigassign.assignment.inputs import Floats, frozen
+from eigassign.assignment.program import Floats, frozen
 from eigassign.errors import EigassignError
 
 Bools = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]

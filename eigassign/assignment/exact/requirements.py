@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, Objective
-from eigassign.assignment.inputs import Floats
+from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.crossing import NeighbourPairs, joined
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,

@@ -40,8 +40,7 @@ from eigassign.assignment.exact.design_problem import (
     merit,
 )
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
-from eigassign.assignment.inputs import Floats, frozen
-from eigassign.assignment.program import SNAP
+from eigassign.assignment.program import SNAP, Floats, frozen
 from eigassign.errors import EigassignError
 from eigassign.facts import Fact, Unwritten, Violation
 

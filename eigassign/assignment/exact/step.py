@@ -20,9 +20,7 @@ import numpy as np
 
 from eigassign.assignment.exact.design_point import DesignPoint, Expected, Rows
 from eigassign.assignment.exact.design_problem import MET, TINY, DesignProblem, UnitBox, merit
-from eigassign.assignment.inputs import Floats
-from eigassign.assignment.program import ScaledProgram
-from eigassign.assignment.solver import solve_scaled
+from eigassign.assignment.program import Floats, Program, solve_program
 
 SMALLEST = 1e-10  # trust region, of the bounds
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off
@@ -178,7 +176,7 @@ class _Program:
             return None
         least = np.maximum(-place.z, -region.radius)
         most = np.minimum(1.0 - place.z, region.radius)
-        scaled = ScaledProgram(
+        scaled = Program(
             A=np.pad(self.root, ((0, 0), (0, 2))) / np.sqrt(scale),
             b=np.zeros(len(self.root)),
             G=np.vstack([np.eye(n + 2), G / norms[:, None]]),
@@ -186,11 +184,10 @@ class _Program:
             upper=np.concatenate([most, np.full(2, np.inf), upper / norms]),
             cost=cost / scale,
         )
-        # No step, with v and t as they are, is feasible: from there limits are walked along in a
-        # fraction of the time that OSQP takes, above all where they cannot all be met.
+        # no step, with v and t as they are, is feasible
         v, t = rows.levels(np.zeros(n), self.least)
         start = np.append(np.zeros(n), [v + MET if limited else 0.0, t / unit])
-        found = solve_scaled(scaled, start)
+        found = solve_program(scaled, start)
         if found is None:
             return None
         mu = (scale * found[1][n + 2 :] / norms)[len(offset) :]

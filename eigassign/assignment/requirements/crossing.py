@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.inputs import Floats
+from eigassign.assignment.program import Floats
 
 MEET = 1e-6  # relative distance in Hz below which two modes are at a kink
 TURNED = 0.8  # cosine of twice the angle from where a mode is no longer what it was

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.assignment.inputs import positive_hz
+from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,
-    Floats,
     Ints,
     Requirement,
     Solved,
@@ -36,17 +35,10 @@ from eigassign.case.schema.targets import (
 
 
 class AssignedFrequency(Requirement):
-    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign.
-
-    Raises UsageError for a frequency that is not finite and above 0.
-    """
+    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign."""
 
     form = FrequencyTarget
     columns = ("target", "initial", "one shot", "predicted", "exact")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        positive_hz(self.lower)
 
     @staticmethod
     def asked(target: FrequencyTarget) -> str:

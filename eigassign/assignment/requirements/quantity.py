@@ -9,10 +9,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from eigassign.assignment.inputs import LinearConstraint
+from eigassign.assignment.program import Floats, LinearConstraint
 from eigassign.assignment.requirements.requirement import (
     Edges,
-    Floats,
     Frequencies,
     Ints,
     Quantity,

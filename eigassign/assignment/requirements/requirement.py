@@ -8,8 +8,8 @@ missing (infinite) for a limit. Its error is
     f / f_d − 1                                   of a wanted frequency,
     1 − f / lower  or  f / upper − 1, above 0     of a limit: its relative violation.
 
-It hands over its rows: of the one shot those in λ, of the sequential method `EdgeRows`. A kind is
-a class in a module of its own that says in which of this it differs.
+It hands over its rows to the sequential method, `EdgeRows`. A kind is a class that says in which of
+this it differs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.inputs import LinearConstraint, LinearModel, frozen, lam_from_hz
+from eigassign.assignment.program import Floats, LinearConstraint, frozen
 from eigassign.assignment.requirements.crossing import NeighbourPairs
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import (
@@ -33,7 +33,6 @@ from eigassign.case.schema.targets import (
 )
 from eigassign.errors import UsageError
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Edges = tuple[Floats, Floats]
 # of a design y (n_y,): its value, or one at each sample, and the slopes ((n,) n_y)
@@ -240,14 +239,6 @@ class Requirement(Brief):
     def bands(self) -> tuple[Any, ...]:
         """Bands along each trajectory for itself, of which the program has a choice."""
         return ()
-
-    def lam_rows(self, model: LinearModel, weights: Floats) -> tuple[Floats, Floats]:
-        """A (n, n_y) and b (n,) of a wanted frequency: ‖A dy + b‖² = Σ ω (λ/λ_d − 1)².
-
-        ``model`` is λ at its rows, ``weights`` (n,) are ω.
-        """
-        root, lam_d = np.sqrt(weights), lam_from_hz(self.hz)
-        return root[:, None] * (model.l / lam_d[:, None]), root * (model.l0 / lam_d - 1.0)
 
     def value(
         self, y: Floats, found: Frequencies, terms: Terms | None = None

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from eigassign.assignment.inputs import sample_target, trapezoidal_weights
+from eigassign.assignment.program import Floats, frozen
 from eigassign.assignment.requirements.kinds import (
     AssignedFrequency,
     ForbiddenBand,
@@ -47,7 +47,6 @@ from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 
-Floats = NDArray[np.float64]
 _Curve = float | FrequencyProfile | FrequencyFile
 _Knots = tuple[ArrayLike, ArrayLike | None]
 _SLACK = 1e-9  # of the duration: rounding of a time grid, far below a step
@@ -141,6 +140,62 @@ def _instants(
         off = np.abs(chord - hz[own]) > _LINEAR * hz[own]
         interval = np.searchsorted(at, times[own])
         yield from times[own][np.isin(interval, interval[off])]
+
+
+def trapezoidal_weights(time_s: ArrayLike) -> Floats:
+    """Weights (n_t,) in s with ``∫ g dt ≈ weights @ g`` by the trapezoidal rule.
+
+    The weight of sample k is (t_{k+1} − t_{k−1})/2, one-sided at both ends; samples need not be
+    evenly spaced. A single sample has weight 1: the integral becomes the value there.
+
+    Raises:
+        UsageError: no samples, or times that do not increase.
+    """
+    time = _increasing(time_s)
+    if time.size == 1:
+        return frozen([1.0])
+    steps = np.diff(time)
+    return frozen(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
+
+
+def sample_target(
+    time_s: ArrayLike, frequency_hz: ArrayLike, knot_time_s: ArrayLike | None = None
+) -> Floats:
+    """The wanted frequency in Hz at the samples, (n_t,).
+
+    ``frequency_hz`` is one number, held throughout; or values at ``knot_time_s``, between which
+    the frequency in Hz runs linearly in time. Nothing is extrapolated.
+
+    Raises:
+        UsageError: a frequency that is not positive, knots that do not increase, or knots that do
+            not cover the samples.
+    """
+    time, values = _increasing(time_s), np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    bad = ~(np.isfinite(values) & (values > 0.0))
+    if bad.any():
+        k = int(bad.argmax())
+        raise UsageError(f"target frequency: {values[k]} Hz at {k}; must be above 0 Hz")
+    knots = time[:1] if knot_time_s is None else _increasing(knot_time_s)
+    slack = 1e-12 * np.abs(knots).max()  # rounding of a time grid's end
+    if knot_time_s is not None and not (
+        knots[0] - slack <= time[0] and time[-1] <= knots[-1] + slack
+    ):
+        raise UsageError(
+            f"target time: {knots[0]:g} … {knots[-1]:g} s does not cover the trajectory's "
+            f"{time[0]:g} … {time[-1]:g} s"
+        )
+    return frozen(np.interp(time, knots, values))
+
+
+def _increasing(time_s: ArrayLike) -> Floats:
+    time = np.asarray(time_s, dtype=np.float64)
+    if time.size == 0:
+        raise UsageError("time: no samples")
+    late = ~(np.diff(time) > 0.0)
+    if late.any():
+        sample = int(late.argmax()) + 1
+        raise UsageError(f"time: sample {sample} is not later than the one before it")
+    return time
 
 
 def time_weights(path: Trajectories) -> Floats:

@@ -12,8 +12,9 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.quantity import LimitedQuantity, said
-from eigassign.assignment.requirements.requirement import EdgeRows, Floats
+from eigassign.assignment.requirements.requirement import EdgeRows
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import PushedNode, StaticTarget
 from eigassign.errors import MechanismError

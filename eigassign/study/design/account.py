@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
+from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError

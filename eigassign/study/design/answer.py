@@ -13,11 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import Assignment, solve_assignment
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
-from eigassign.assignment.inputs import LinearModel, hz_from_lam
-from eigassign.assignment.program import Bounds
+from eigassign.assignment.one_shot import (
+    Assignment,
+    LinearModel,
+    hz_from_lam,
+    solve_assignment,
+)
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.brief import counted
@@ -131,7 +134,7 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
         time_weights(path),
         scene.expansions.linear.y0,
         scene.initial,
-        Bounds(*scene.bounds),
+        scene.bounds,
         scene.constraints,
         tuple(file.design.parameters),
     )
@@ -153,7 +156,7 @@ def _require_near(scene: Scene, l0: Floats) -> None:
 def solver_row(assignment: Assignment) -> SolverRow:
     """The solver's status and residuals, as plain numbers."""
     return SolverRow(
-        assignment.status,
+        "solved",
         assignment.iterations,
         assignment.primal_residual,
         assignment.dual_residual,

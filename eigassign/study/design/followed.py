@@ -16,7 +16,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.inputs import frozen
+from eigassign.assignment.program import frozen
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile

@@ -14,7 +14,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.inputs import Floats
+from eigassign.assignment.program import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.study.results import DesignRow
 from eigassign.study.scene import Scene

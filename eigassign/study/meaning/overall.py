@@ -20,9 +20,9 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.assign import ActiveLimit
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy

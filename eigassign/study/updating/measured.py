@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.inputs import frozen
+from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import shown, unknown
 from eigassign.case.schema.design import Tolerance

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import STOPPED, End, Optimum, Tally, minimise, worth
-from eigassign.assignment.inputs import frozen
-from eigassign.assignment.program import can_be_kept
+from eigassign.assignment.program import can_be_kept, frozen
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes

@@ -23,7 +23,7 @@ from eigassign.assignment.exact.design_problem import (
     best_first,
 )
 from eigassign.assignment.exact.requirements import Appraise, Requirements, with_scenarios
-from eigassign.assignment.program import Bounds, constraints_agree
+from eigassign.assignment.program import constraints_agree
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeGap
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
@@ -168,7 +168,7 @@ def variant_of(
         aims += band.kept_clear(k, above, Margin()) if aim == "widest" else ()
     # linear limits are kept by every step; where they contradict, they are missed least
     kept = not (missed or task.scenarios)
-    kept = kept and constraints_agree(scene.constraints, Bounds(lower, upper))
+    kept = kept and constraints_agree(scene.constraints, lower, upper)
     asked += (one for one in scene.limits if not kept or one.constraint is None)
     width = np.ptp(scene.bounds, axis=0)
     width = np.where(width > 0.0, width, 1.0)
