@@ -69,21 +69,6 @@ def as_image(made: Figure) -> Image.Image:
     return Image.open(data)
 
 
-def energies() -> Image.Image:
-    """Where mode 1 of the six-axis arm has its energy."""
-    made = json_of("modes", str(ROOT / "cases" / "arm_6r.yaml"), "--count", "1")
-    parts = made["anatomies"][0]["parts"]
-    parts = [one for one in parts if max(one["strain"], one["kinetic"]) > 0.01][::-1]
-    plot, axes = plotted("Six-axis arm, mode 1: shares of its energy", "share [%]", "")
-    place = np.arange(len(parts))
-    for shift, key, colour in ((0.2, "strain", BLUE), (-0.2, "kinetic", ORANGE)):
-        words = "motion" if key == "kinetic" else key
-        axes.barh(place + shift, [100.0 * p[key] for p in parts], 0.4, color=colour, label=words)
-    axes.set_yticks(place, [one["part"] for one in parts])
-    axes.legend(frameon=False)
-    return as_image(plot)
-
-
 def json_of(*command: str) -> dict:
     """What a command prints with --json."""
     said = io.StringIO()
@@ -149,7 +134,6 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "objective": figure("optimize", "camera_arm", "frequencies", *LIGHT),
     "imported-part": figure("modes", "superelement_arm", "mode_1", "--count", "1"),
     "solid-part": figure("modes", "casting_arm", "mode_1", "--count", "1"),
-    "what-would-help": energies,
     "static-stiffness": figure("optimize", "drilling_arm", "statics", *LIGHT),
     "keep-out-bands": figure("optimize", "milling_column", "frequencies", *LIGHT),
     "catalogue": combinations,

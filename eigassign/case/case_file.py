@@ -50,10 +50,8 @@ from eigassign.case.rules.files import (
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
     below,
-    is_place,
     known_property,
     least_and_largest,
-    properties_of,
     property_at,
     quantities,
     starts_outside,
@@ -61,7 +59,7 @@ from eigassign.case.rules.properties import (
     with_value,
 )
 from eigassign.case.rules.values import followed_designs
-from eigassign.case.schema.design import RESERVED, Design, Parameter, Tolerance
+from eigassign.case.schema.design import RESERVED, Design, Tolerance
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.mechanism import (
     Body,
@@ -367,21 +365,6 @@ class CaseFile:
                 else:
                     mechanism = with_value(mechanism, [head, *rest], factor * float(value))
         return replace(self, mechanism=mechanism, coordinates=coordinates)
-
-    def with_every_property(self, places: bool = True) -> CaseFile:
-        """The case with all numbers that may vary, and are not 0, as parameters at their values.
-
-        Without those that trajectories set, without limits, and where asked without ``places``:
-        lengths, places and angles.
-        """
-        entries = {
-            path: Parameter(parameter=path, min=value, max=value)
-            for path in properties_of(self)
-            if path not in self.loads
-            and (places or not is_place(path) or f"{path}.add" in self.loads)
-            if (value := self.value_at(path))
-        }
-        return replace(self, design=Design.model_construct(entries=FrozenDict(entries)))
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""

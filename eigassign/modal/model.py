@@ -23,11 +23,9 @@ from eigassign.mechanism.assembly.dynamics.under_load import (
     stiffness_under_load,
 )
 from eigassign.mechanism.assembly.mode_shapes import (
-    EnergyForms,
     NodeShape,
     StrandShape,
     TotalMass,
-    energy_forms,
     shapes,
 )
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -207,11 +205,6 @@ class Model:
         Raises UsageError for a wrong shape, and for properties that no mechanism can have.
         """
         return self.total_mass(self._design(y))[0]
-
-    @cached_property
-    def energies(self) -> EnergyForms:
-        """The energies of modes by links, drives, springs and bodies, `EnergyForms`."""
-        return energy_forms(self.poses.case, self.poses.parameters, self.motion)
 
     @cached_property
     def drives(self) -> DriveForces:

@@ -25,11 +25,9 @@ from eigassign.facts import (
 from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import (
     MET,
-    SEEN,
     Comparison,
     DesignRow,
     ErrorSummary,
-    ModeAnatomy,
     RunResults,
     TargetStudy,
     ValidationRow,
@@ -37,7 +35,6 @@ from eigassign.study.results import (
 )
 
 Floats = NDArray[np.float64]
-MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 _RANGES = "label lowest_hz highest_hz error"
 STAGES = {  # of a run, as they are named in results.json
@@ -280,21 +277,10 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 
 
 def _depends(results: RunResults) -> Iterator[Table]:
-    """Slopes; what more room gains; what missed modes are and would help; what can be reached."""
+    """Slopes; what more room gains; what can be reached."""
     found = results.meaning
     yield _sensitivity(results)
     yield facts_table("Limits", found.relaxed, "words")
-    every = (row for one in found.anatomies for row in one.parts)
-    parts = [row for row in every if 100.0 * max(abs(row.strain), row.kinetic) > SEEN]
-    names = "mode part strain strain_largest kinetic kinetic_largest"
-    caption = "Shares of the energies of missed modes, for the answer: mean over the samples, and "
-    caption += "the largest. The weight has a negative share of strain where it softens."
-    yield facts_table("What the missed modes are", parts, names, caption)
-    helps = [row for one in found.anatomies for row in one.properties[:MOST_HELPS]]
-    names = "mode property percent_per_percent percent_per_percent_largest"
-    caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
-    caption += "the coordinates unchanged. The most effective ones, by exact slopes."
-    yield facts_table("What would help", helps, names, caption)
     caption = "All designs within the bounds, at any sample (proved)."
     if any(row.how == "bounded" for row in found.reach):
         caption += " Distances of two modes lie in between, but may not reach the ends."
@@ -445,14 +431,13 @@ def modes_table(
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
     weight: WeightRow | None = None,
-    anatomies: Sequence[ModeAnatomy] = (),
     note: str = "",
 ) -> Table:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
-    mesh and reduced links raise each frequency, about, relative; ``weight`` is
-    what gravity changes; ``anatomies`` are what the modes are; ``note`` is below.
+    mesh and reduced links raise each frequency, about, relative; ``weight`` is what gravity
+    changes; ``note`` is below.
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
@@ -468,10 +453,6 @@ def modes_table(
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [
             f"{100 * e:.2g} %" if math.isfinite(e) else "may buckle or fall" for e in weight.change
         ]
-    if anatomies:
-        for kind, name in (("strain", "strain"), ("kinetic", "motion")):
-            columns[f"{name} most in"] = [one.most(kind, 1) for one in anatomies]
-        columns["1 % more of"] = [one.helped(1) for one in anatomies]
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
     caption += f" {capital(note)}." if note else ""
     rows = tuple(zip(*columns.values(), strict=True))

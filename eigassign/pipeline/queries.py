@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -22,7 +21,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
-from eigassign.errors import CaseError, EigassignError, Problem, UsageError
+from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.superelement import part_lines
@@ -37,10 +36,9 @@ from eigassign.study.checks.accuracy import digits_lines, judged_mesh, mesh_line
 from eigassign.study.checks.weight import GIVEN, study_weight
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
-from eigassign.study.meaning.overall import anatomies
 from eigassign.study.pictures import drawing
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
-from eigassign.study.results import ModeAnatomy, WeightRow
+from eigassign.study.results import WeightRow
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -69,7 +67,6 @@ class ModesAnswer:
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
     weight: Annotated[WeightRow | None, Fact("what gravity changes", optional=True)] = None
-    anatomies: Annotated[tuple[ModeAnatomy, ...], Fact("what each mode is, and would help it")] = ()
     notes: Words = ()  # of gravity
     warnings: Words = ()
 
@@ -169,10 +166,6 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     lost = model.truncation_error(q, y, every)[0] if model.is_reduced else None
     coarse = model.discretisation_error(q, y, every)[0] if model.is_meshed or model.solids else None
     weight = study_weight(file, model, every, q[None], y, GIVEN)
-    numbers = {f"mode {mode}": np.array([mode]) for mode in every}
-    found: tuple[ModeAnatomy, ...] = ()
-    with suppress(EigassignError):  # the frequencies stand without
-        found = tuple(anatomies(model, q[None], y, numbers))
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),
@@ -183,7 +176,6 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
         weight.row,
-        found,
         (*_between_nodes(case, q, y, len(hz)), *digits_lines(file), *weight.notes),
         (*_beyond_bounds(case, y), *weight.warnings),
     )

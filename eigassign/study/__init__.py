@@ -39,7 +39,7 @@ __all__, __getattr__, __dir__ = face(
         "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
         "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
-        "meaning.overall": "Studies anatomies study_meaning",
+        "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges reduced_ranges study_tolerance unreachable",
         "planning": (
             "Plan at_corners automatic_elements central_sample corners joint_map "

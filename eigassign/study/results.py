@@ -50,13 +50,8 @@ SCHEMA = 2  # of results.json: raised when a field goes or means something else
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 MET = 1e-8  # a violation below it is round-off
-SEEN = 0.5  # %: a smaller share of a mode's energy is not named
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
-EnergyShare = Annotated[
-    float, Fact(unit="fraction", digits=lambda s: f"{round(100 * s, 1) + 0.0:g} %", says_unit=True)
-]
-PerCent = Annotated[float, Fact(unit="% per %", digits=".3g")]
 
 
 def frozen(array: Floats) -> Floats:
@@ -793,61 +788,6 @@ class SensitivityRows:
 
 
 @dataclass(frozen=True)
-class PartRow:
-    """The share of a mode's energies that a part has, by its key path: means over the samples.
-
-    ``_largest`` are the ones of largest magnitude. That of the weight in what strains is negative
-    where it softens.
-    """
-
-    mode: Key
-    part: str
-    strain: Annotated[EnergyShare, Fact("of what drives, springs, links and the weight hold")]
-    strain_largest: EnergyShare
-    kinetic: Annotated[EnergyShare, Fact("of what links, bodies and drives move with")]
-    kinetic_largest: EnergyShare
-
-
-@dataclass(frozen=True)
-class EffectRow:
-    """The per cents by which a frequency rises for a per cent more of a property, (p/f) ∂f/∂p."""
-
-    mode: Key
-    property: str
-    percent_per_percent: Annotated[PerCent, Fact(heading="mean")]
-    percent_per_percent_largest: Annotated[PerCent, Fact(heading="largest")]
-
-
-@dataclass(frozen=True)
-class ModeAnatomy:
-    """What a mode is and what would help it: parts, and properties that are no parameters."""
-
-    mode: str
-    parts: tuple[PartRow, ...]
-    properties: Annotated[tuple[EffectRow, ...], Fact("the most effective first")]
-
-    def most(self, kind: str, few: int) -> str:
-        """The parts with most of an energy, ``coordinates.q1.drive 62 %, links.arm 21 %``."""
-        rows = sorted(self.parts, key=lambda one: -abs(getattr(one, kind)))[:few]
-        shares = ((one.part, 100.0 * getattr(one, kind)) for one in rows)
-        return ", ".join(f"{part} {share:.3g} %" for part, share in shares if abs(share) > SEEN)
-
-    def helped(self, few: int) -> str:
-        """What a per cent more of the most effective properties does to the frequency."""
-        rows = ((one.property, one.percent_per_percent) for one in self.properties[:few])
-        return ", ".join(f"{path} {change:+.2g} %" for path, change in rows if change)
-
-    @property
-    def words(self) -> str:
-        """The same in a sentence."""
-        said = f"{self.mode}: strain is in {self.most('strain', 3)}; motion in "
-        said += self.most("kinetic", 3)
-        helped = self.helped(3)
-        more = f"; 1 % more of these changes it by: {helped}" if helped else ""
-        return (said + more).replace(" -", " −")
-
-
-@dataclass(frozen=True)
 class RelaxedRow:
     """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order."""
 
@@ -902,7 +842,6 @@ class Meaning(Brief):
     reach: Annotated[tuple[RangeRow, ...], Fact("over all designs within the bounds")] = ()
     tolerance: Annotated[ToleranceRows | None, Fact("what deviations do to the targets")] = None
     unreachable: Annotated[tuple[str, ...], Fact("what is out of reach, in words")] = ()
-    anatomies: Annotated[tuple[ModeAnatomy, ...], Fact("modes that are missed: what they are")] = ()
     notes: Unwritten[tuple[str, ...]] = ()
 
     @property

@@ -91,23 +91,6 @@ def known_property(case: Any, path: str) -> Quantity | None:
         return None
 
 
-def properties_of(case: Any) -> Iterator[str]:
-    """The paths of all numbers of a mechanism that can vary."""
-    paths = [f"coordinates.{name}.drive.{key}" for name in case.coordinates for key in DRIVEN]
-    for group in _GROUPS:
-        for name, part in getattr(case.mechanism, group).items():
-            paths += [f"{group}.{name}.{key}" for key in quantities(type(part))]
-            for key in _VECTORS.get(group, ()):
-                own = f"{group}.{name}.{key}"
-                each = (
-                    [f"{own}.{node}" for node in getattr(part, key, ())]
-                    if key == "nodes"
-                    else [own]
-                )
-                paths += [f"{place}.{k}" for place in each for k in range(3)]
-    yield from (path for path in paths if known_property(case, path) is not None)
-
-
 def is_place(path: str) -> bool:
     """True where a property is a length, a place or an angle of the mechanism."""
     group, _, key, *_ = path.split(".")

@@ -8,7 +8,7 @@ Read in this order; each imports only from those above it:
     rigid_body_modes  free motions that no spring or weight resists, made columns of their own
     loads             the stiffness that loads add in a pose, above all the weight
     build             from a case to its pencil
-    mode_shapes       the total mass; energies of a mode; displacements of nodes and beams in [u; q̇]
+    mode_shapes       the total mass; displacements of nodes and beams in [u; q̇]
     dynamics          what motion and loads add to eq. (1), at a pose
     sagged            the mechanism as its weight has bent it, assembled anew
 """

@@ -266,11 +266,10 @@ def add_drives(
     parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
-    only: str | None = None,
 ) -> None:
     """½ k ṡ² of a held joint and ½ J ṡ² of any driven one, with its rate ṡ = r q̇."""
     for i, (name, coordinate) in enumerate(case.coordinates.items()):
-        if isinstance(coordinate.drive, str) or only not in (None, name):
+        if isinstance(coordinate.drive, str):
             continue
         r = motion.coordinates.rates[i]
         for target, key in ((stiffness, "stiffness"), (mass, "inertia")):

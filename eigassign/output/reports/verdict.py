@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -66,27 +65,13 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
 
 
 def _helps(results: RunResults) -> Iterator[str]:
-    """What would help where something is missed: what holds the modes, what limits cost."""
+    """What would help where something is missed: what limits cost."""
     met = all(target.satisfied for target in results.targets)
     if met and all(one.satisfied for one in results.assignment.limits):  # type: ignore[union-attr]
         return
-    for one in results.meaning.anatomies[:2]:
-        helped = one.helped(3).replace(" -", " −")
-        more = f" 1 % more of what is no parameter changes its frequency: {helped}." * bool(helped)
-        yield _plain(f"Strain energy of {one.mode}: {one.most('strain', 2)}.{more}")
     for row in results.meaning.relaxed[:2]:
         if f"{row.before:.3g}" != f"{row.after:.3g}":
             yield f"{capital(row.words)}."
-
-
-def _plain(text: str) -> str:
-    """Properties as people say them: ``length of forearm`` for ``links.forearm.length``."""
-
-    def said(path: re.Match[str]) -> str:
-        what = path[2].replace(".", " ").replace("_", " ").replace("youngs", "Young's").lstrip()
-        return f"{what} of {path[1]}" if what else path[1]
-
-    return re.sub(r"\b[a-z]+\.([^\s.]+)((?:\.\w+)*)", said, text)
 
 
 def _finding(target: TargetStudy, accepted: float) -> Finding:

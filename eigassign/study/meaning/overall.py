@@ -4,17 +4,13 @@ Both are read off the exact slopes that the answer was judged by; nothing is sol
 multiplier μ = −dF/db, relaxed by δ, lowers F to F − μδ to first order; F is the mean square of the
 relative errors, or the largest of them, so that the rms error falls from √F to √(F − μδ).
 
-All properties that the mechanism is made of and that are not 0 become parameters of a model of
-their own, whose exact slopes say by how many per cent a frequency rises for a per cent more of
-each, the coordinates as they are. Those of the design have slopes already.
-
 How much is studied is the user's choice and changes no answer. What follows from slopes already
 known, or from two exact solves a pose of a small model, is cheap; `all` adds those of a large one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -27,9 +23,6 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.errors import EigassignError
-from eigassign.modal.exact.solver import modes
-from eigassign.modal.model import Model
-from eigassign.study.build import build_model
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
@@ -41,10 +34,7 @@ from eigassign.study.meaning.reach import (
     unreachable,
 )
 from eigassign.study.results import (
-    EffectRow,
     Meaning,
-    ModeAnatomy,
-    PartRow,
     RelaxedRow,
     SensitivityRow,
     ToleranceRows,
@@ -155,62 +145,6 @@ def _room(variant: PosedProblem, row: ActiveLimit, amount: float, unit: str) -> 
     return f"{handy(amount, unit)} {more} at the {row.side} {named}"
 
 
-Ints = NDArray[np.intp]
-FEW = 21  # samples of a trajectory that modes are looked at
-
-
-def anatomies(
-    model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]
-) -> Iterator[ModeAnatomy]:
-    """Yield each mode's energies and what properties do to it, at poses q (n, n_q) of a design y.
-
-    ``numbers`` (n,) are by the mode's name those that it has there, 0 where it does not matter.
-    Raises EigassignError where the model has no such modes.
-    """
-    count, x = max(int(own.max()) for own in numbers.values()), model.x(q, y)
-    found = modes(model.pencil, x, count)
-    strain, kinetic = model.energies.shares(model.pencil, x, found.lam, found.phi)
-    effects = dict(_effects(model, q, y, count))
-    for name, own in numbers.items():
-        there = np.flatnonzero(own)
-
-        def row(values: Floats, k: Ints = there, mode: Ints = own) -> tuple[float, float]:
-            along = values[k, mode[k] - 1]
-            return float(along.mean()), float(along[np.abs(along).argmax()])
-
-        none = np.zeros_like(found.lam)
-        parts = tuple(
-            PartRow(name, key, *row(strain.get(key, none)), *row(kinetic.get(key, none)))
-            for key in dict.fromkeys((*strain, *kinetic))
-        )
-        rows = [EffectRow(name, path, *row(values)) for path, values in effects.items()]
-        # to six digits, so that round-off does not decide which of two alike stands first
-        rows.sort(key=lambda one: -float(f"{abs(one.percent_per_percent):.5e}"))
-        yield ModeAnatomy(name, parts, tuple(rows))
-
-
-def _effects(model: Model, q: Floats, y: Floats, count: int) -> Iterator[tuple[str, Floats]]:
-    """Yield (p/f) ∂f/∂p (n, count) of each property p that is no design parameter, by its path.
-
-    Without lengths, places and angles where loops cannot follow them.
-    """
-    case = model.poses.case
-    try:
-        every = case.with_design(y).with_every_property()
-        made = build_model(every)
-    except EigassignError:
-        every = case.with_design(y).with_every_property(places=False)
-        made = build_model(every)
-    p = np.array([every.value_at(path) for path in made.y_names])
-    x = made.x(q, p)
-    wanted = np.arange(x.shape[1]) >= made.pencil.n_joints
-    lam, slopes = made.slopes(q, p, count, wanted)
-    names = (*made.q_names, *made.y_names)
-    for k in np.flatnonzero(wanted):
-        if names[k] not in case.design_paths:
-            yield names[k], 0.5 * x[:, k, None] * slopes[:, :, k] / lam
-
-
 class Studies(StrEnum):
     """The studies of an answer that the user asks for."""
 
@@ -253,45 +187,8 @@ def study_meaning(
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
         unreachable=beyond,
-        anatomies=_anatomies(scene, answer.y, wanted, exact, max_error, notes),
         notes=tuple(notes),
     )
-
-
-def _anatomies(
-    scene: Scene,
-    y: Floats,
-    wanted: Sequence[Requirement],
-    exact: Solved,
-    max_error: float,
-    notes: list[str],
-) -> tuple[ModeAnatomy, ...]:
-    """The modes of the targets that are missed, where they are asked for, at some samples."""
-    samples = scene.path.spread(FEW)
-    numbers: dict[str, NDArray[np.intp]] = {}
-    for one in (w for w in wanted if misses(w, exact, max_error)):
-        worst = one.rows.start + int(np.abs(one.errors(exact)).argmax())
-        samples = np.union1d(samples, [worst])
-        named = {
-            f"mode {k}": np.full(len(exact.hz), k) for k in one.near(exact, exact) or one.modes
-        }
-        if one.followed:
-            shapes = zip(one.followed, one.followed_numbers, strict=True)
-            named = {mode.name: exact.numbers[:, k] for mode, k in shapes}
-        for name, own in named.items():
-            known = numbers.setdefault(name, np.zeros(len(exact.hz), dtype=np.intp))
-            known[one.rows] = own[one.rows]
-    if not numbers:
-        return ()
-    of_samples = {name: own[samples] for name, own in numbers.items()}
-    q = scene.path.at(y)[0][samples]
-    try:
-        found = tuple(anatomies(scene.model, q, y, of_samples))
-    except EigassignError as error:
-        notes.append(f"missed modes are not explained: {error}")
-        return ()
-    notes += (one.words for one in found)
-    return found
 
 
 def _tolerance(
