@@ -308,16 +308,13 @@ def _sensitivity(results: RunResults) -> Table:
 
 def _robustness(results: RunResults) -> Iterator[Table]:
     """Bands, with the modes below each; deviations of parameters; sag under the stated weight."""
-    row, found, weight = results.assignment, results.meaning.tolerance, results.weight
+    row, weight = results.assignment, results.weight
     caption = (
         "All modes, at every sample and between samples. Room is the distance to the nearest "
         "edge, relative to the edge, after the error of the model is subtracted."
     )
     bands = () if row is None else row.clearances
     yield facts_table("Clearance", bands, "label below room raised clear", caption)
-    if found is not None:
-        caption = f"{capital(found.words)}."
-        yield facts_table("Tolerance", found.targets, _RANGES, caption, error="worst error")
     if row is not None and (robust := row.robust) is not None:
         caption = (
             "Missed at the worst deviation that a search found within the tolerances, and at the "

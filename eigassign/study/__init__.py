@@ -40,7 +40,7 @@ __all__, __getattr__, __dir__ = face(
         "design.verdict": "Facts Verdict verdict",
         "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
         "meaning.overall": "Studies study_meaning",
-        "meaning.reach": "proved_ranges reduced_ranges study_tolerance unreachable",
+        "meaning.reach": "proved_ranges unreachable",
         "planning": (
             "Plan at_corners automatic_elements central_sample corners joint_map "
             "farthest plan_expansion scattered "
@@ -51,7 +51,7 @@ __all__, __getattr__, __dir__ = face(
             "Comparison DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "OtherModes RangeRow RunResults SensitivityRow SolverRow TargetAlong "
-            "TargetStudy ToleranceRows TrajectoryRow ValidationRow"
+            "TargetStudy TrajectoryRow ValidationRow"
         ),
         "scene": "Scene",
         "updating.fit": "UpdateResults solve_update update_problem",

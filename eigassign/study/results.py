@@ -808,8 +808,7 @@ class RelaxedRow:
 class RangeRow:
     """Between what values (n,) in Hz a target's curve lies over some designs; ``error`` over them.
 
-    ``how``: proved (nothing lies outside, both ends are reached), bounded (nothing lies outside),
-    sampled, or followed (a followed mode at the corners).
+    ``how``: proved (nothing lies outside, both ends are reached) or bounded (nothing lies outside).
     """
 
     label: Annotated[str, Fact("the target in words", "target")]
@@ -819,20 +818,6 @@ class RangeRow:
     error: Annotated[Share, Fact(digits=positive_percent)]
 
 
-@dataclass(frozen=True)
-class ToleranceRows:
-    """What deviations of the parameters within their tolerances do to the targets.
-
-    The error of each is its largest; ``before`` and ``after`` are the largest of those that the
-    headline counts, at the answer and with every tolerance at its worst.
-    """
-
-    targets: tuple[RangeRow, ...]
-    before: Share
-    after: Share
-    words: Annotated[str, Fact("the same in words")]
-
-
 @dataclass(frozen=True, repr=False)
 class Meaning(Brief):
     """The meaning of the answer: what it hangs on, what holds it back, how sure it is."""
@@ -840,7 +825,6 @@ class Meaning(Brief):
     sensitivity: Unwritten[tuple[SensitivityRow, ...]] = ()
     relaxed: Annotated[tuple[RelaxedRow, ...], Fact("what more room at limits gains")] = ()
     reach: Annotated[tuple[RangeRow, ...], Fact("over all designs within the bounds")] = ()
-    tolerance: Annotated[ToleranceRows | None, Fact("what deviations do to the targets")] = None
     unreachable: Annotated[tuple[str, ...], Fact("what is out of reach, in words")] = ()
     notes: Unwritten[tuple[str, ...]] = ()
 

@@ -30,7 +30,6 @@ from eigassign.study import (
     SolverRow,
     TargetAlong,
     TargetStudy,
-    ToleranceRows,
     TrajectoryRow,
 )
 
@@ -272,7 +271,6 @@ def studied(results: RunResults) -> RunResults:
     meaning = Meaning(
         sensitivity=sensitivity,
         reach=around(0.2),
-        tolerance=ToleranceRows(around(0.01), 0.01, 0.02, "worst error 1 → 2 %"),
     )
     return replace(results, meaning=meaning)
 

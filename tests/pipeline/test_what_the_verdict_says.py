@@ -200,14 +200,6 @@ def test_a_band_that_is_clear_but_for_what_the_mesh_leaves_open_says_both_shares
     assert "more elements" in reason
 
 
-def test_tolerances_are_told_of_bands_above_the_modes_that_are_shown() -> None:
-    design = {"k1": {**K1, "min": 2000, "tolerance": "5 %"}, "motor": MOTOR}
-    result = solve_case(case_of(design, [{"keep_out": [9, 9.2]}, {"keep_out": [60, 70]}]))
-    assert said(result)[0] == "reached"
-    assert result.results.meaning is not None
-    assert result.results.meaning.tolerance is not None
-
-
 def test_a_price_that_lowers_what_is_to_be_high_is_named() -> None:
     priced = {**K1, "price": 1e-4}
     aim = {"objective": {"highest": 1}, "starts": 1}

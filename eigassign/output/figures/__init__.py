@@ -7,7 +7,7 @@ In reading order; each imports from those above it only:
     paper          descriptions drawn with matplotlib, and figures as files
     curves         curves over time: what was asked, coordinates, drives; the steps of the search
     approximation  expansion against exact over time and over entries of q or y
-    meaning        sensitivities, reach and tolerance
+    meaning        sensitivities and reach
     scene          the mechanism as parts at places: links as thick as their sections, symbols
     mechanism      the parts drawn with matplotlib; poses
     screen         descriptions as Plotly's data; the scene for a page

@@ -1,4 +1,4 @@
-"""What an answer means: what it hangs on, what it can reach, what deviations do to it."""
+"""What an answer means: what it hangs on, and what it can reach."""
 
 from __future__ import annotations
 
@@ -31,16 +31,17 @@ from eigassign.study.results import (
 
 
 def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
-    """Sensitivities, reach and tolerance of each target."""
+    """Sensitivities, and the reach of each target."""
     found = results.meaning
     if any(row.percent_per_percent_largest for row in found.sensitivity):
         yield sensitivities(found.sensitivity)
     reach = {row.label: row for row in found.reach}
-    spread = {row.label: row for row in found.tolerance.targets} if found.tolerance else {}
     number = 0
     for target in results.targets:
-        shown = reach.get(target.label), spread.get(target.label)
-        for along in target.along if any(shown) and target.asked.terms else ():
+        shown = reach.get(target.label)
+        if shown is None or not target.asked.terms:
+            continue
+        for along in target.along:
             number += 1
             yield ranges(results, target, along, shown, number)
 
@@ -99,34 +100,25 @@ def ranges(
     results: RunResults,
     target: TargetStudy,
     along: TargetAlong,
-    shown: tuple[RangeRow | None, RangeRow | None],
+    row: RangeRow,
     number: int,
 ) -> FigurePlan:
-    """The answer inside the frequencies of all designs within the bounds, and the tolerances."""
+    """The answer inside the frequencies of all designs within the bounds."""
     several = len(results.trajectories) > 1
     place, clock = f" along {along.name!r}" if several else "", along.name if several else ""
-    said: list[str] = []
-    shades: list[Shade] = []
-    for row, colour, label, what, words in (
-        (shown[0], graph.GREY, "within the bounds", "All designs", "least error"),
-        (shown[1], graph.BLUE, "within the tolerances", "Deviations", "worst error"),
-    ):
-        if row is not None:
-            low, high = row.lowest_hz[along.rows], row.highest_hz[along.rows]
-            shades.append(Shade(low, high, colour, label, 0.35))
-            said.append(f"{what} {label} ({row.how}): {words} {percent(row.error)}.")
+    low, high = row.lowest_hz[along.rows], row.highest_hz[along.rows]
     curves = (
         Curve(target.exact_hz[along.rows], OPTIMAL, "answer"),
         Curve(target.target_hz[along.rows], TARGET, "wanted"),
     )
-    edges = tuple(e for shade in shades for e in (shade.low, shade.high) if e is not None)
-    panel = Panel(f"{target.asked.axis} [Hz]", (*shades, *curves), 2.4, holds=edges)
+    shade = Shade(low, high, graph.GREY, "within the bounds", 0.35)
+    panel = Panel(f"{target.asked.axis} [Hz]", (shade, *curves), 2.4, holds=(low, high))
     time_s = results.time_s[target.asked.rows][along.rows]
     return FigurePlan(
         f"range_{number}",
-        f"{capital(target.label)}: reach and tolerance{place}",
-        " ".join(said),
+        f"{capital(target.label)}: reach{place}",
+        f"All designs within the bounds ({row.how}): least error {percent(row.error)}.",
         "The answer's frequency over time inside the range of others.",
         Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,), clock=clock),
-        "depends" if shown[0] is not None else "robustness",
+        "depends",
     )

@@ -133,9 +133,6 @@ def _trust(results: RunResults) -> Iterator[str]:
         yield f"{capital(clear.label)}: {proof}, {below} below."
     if row.robust is not None:
         yield f"What robustness costs: {row.robust.words}."
-    found = results.meaning.tolerance
-    if found is not None:
-        yield f"{capital(found.words)}."
 
 
 def _cost(results: RunResults) -> Iterator[str]:

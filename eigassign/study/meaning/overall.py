@@ -22,7 +22,6 @@ from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
-from eigassign.errors import EigassignError
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
@@ -30,14 +29,12 @@ from eigassign.study.meaning.reach import (
     misses,
     proved_ranges,
     reach_rows,
-    study_tolerance,
     unreachable,
 )
 from eigassign.study.results import (
     Meaning,
     RelaxedRow,
     SensitivityRow,
-    ToleranceRows,
 )
 from eigassign.study.scene import Scene
 
@@ -64,6 +61,15 @@ def sensitivities(
                 percent_per_percent=float(share.mean()),
                 percent_per_percent_largest=_largest(share),
             )
+
+
+def deviations(scene: Scene, asked: Requirements, y: Floats, seen: Appraisal) -> Iterator[str]:
+    """Say how far frequencies move within the tolerances δ to first order, Σ_k |∂f/∂y_k| δ_k."""
+    lower, upper = scene.tolerances.box(y)
+    for own, _, slopes in asked.curves(seen):
+        most = float((np.abs(slopes) @ (0.5 * (upper - lower))).max())
+        if most > 0.0:
+            yield f"{own.label}: within the tolerances it moves by up to {most:.3g} Hz, about"
 
 
 def _largest(values: Floats) -> float:
@@ -174,7 +180,7 @@ def study_meaning(
     reach = () if ranges is None else tuple(reach_rows(wanted, ranges))
     if studies is Studies.NONE:
         return Meaning(unreachable=beyond)
-    found, notes = answer.found, list[str]()
+    found = answer.found
     variant = variant_of(Task(scene, tuple(wanted)), ()) if found is None else found.variant
     seen = variant.problem.appraise(answer.y) if found is None else found.best.seen
     relaxed: Iterator[RelaxedRow] = iter(())
@@ -185,21 +191,6 @@ def study_meaning(
         sensitivity=tuple(sensitivities(scene.file, variant.requirements, answer.y, seen)),
         relaxed=tuple(relaxed),
         reach=reach,
-        tolerance=_tolerance(scene, answer, wanted, exact, notes),
         unreachable=beyond,
-        notes=tuple(notes),
+        notes=tuple(deviations(scene, variant.requirements, answer.y, seen)),
     )
-
-
-def _tolerance(
-    scene: Scene, answer: Answer, wanted: Sequence[Requirement], exact: Solved, notes: list[str]
-) -> ToleranceRows | None:
-    """The spread within the tolerances; where it cannot be had, why not among the notes."""
-    try:
-        found = study_tolerance(scene, wanted, answer.y, exact)
-    except EigassignError as error:
-        notes.append(f"tolerances are not studied: {error}")
-        return None
-    if found is not None:
-        notes.append(found.words)
-    return found
