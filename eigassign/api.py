@@ -15,7 +15,7 @@ from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import ReducedModel
-from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
 from eigassign.pipeline.run import Result, solve_case

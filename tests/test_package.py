@@ -76,7 +76,7 @@ def test_help_says_what_objects_hold_and_in_which_units(case: ea.Case) -> None:
 
 
 def test_figures_show_themselves_in_a_notebook(case: ea.Case, result: Result) -> None:
-    figures: list[Any] = [case.plot(), case.plot_mode(2), result.plot(), result.plot("progress")]
+    figures: list[Any] = [case.plot(), case.plot_mode(2), result.plot(), result.plot("coordinates")]
     for figure in figures:
         assert figure._repr_png_().startswith(b"\x89PNG")
 

@@ -1,4 +1,4 @@
-"""Draw every shipped case: its first mode, and the first screen of its report.
+"""Draw the first screen of the report of every shipped case.
 
     python cases/gallery/draw.py              all of them: a quarter of an hour
     python cases/gallery/draw.py two_link     these
@@ -20,9 +20,6 @@ from PIL import Image
 
 import eigassign as ea
 from eigassign.cli import main as eigassign
-from eigassign.output import thumbnail
-from eigassign.study.pictures.drawing import draw_modes
-from eigassign.study.planning import with_middle_loads
 
 HERE = Path(__file__).parent
 WINDOW, WIDTH = (1240, 900), 660  # pixels of the window, and of the picture of it
@@ -32,13 +29,8 @@ QUIET = ("--headless=new", "--no-sandbox", "--no-first-run", "--disable-backgrou
 
 
 def main(names: list[str]) -> None:
-    """Two PNG a case, beside this file."""
+    """A PNG a case, beside this file."""
     paths = [path for path in sorted(HERE.parent.glob("*.yaml")) if not names or path.stem in names]
-    for path in paths:
-        case = ea.load_case(path)
-        q = with_middle_loads(case.file, case.file.expansion.q)
-        pictures = draw_modes(case.file, case.model(), q, case.initial_design, 1)
-        (HERE / f"{path.stem}.png").write_bytes(thumbnail(pictures))
     with tempfile.TemporaryDirectory() as folder, closing(Browser()) as browser:
         for path in paths:
             out = Path(folder, path.stem)

@@ -25,7 +25,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "console": "markdown print_assignment print_tables print_verdict progress",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
-        "figures.modes": "mode_figures thumbnail",
+        "figures.mechanism": "mode_figures",
         "figures.paper": "draw render",
         "figures.run": "run_figures",
         "figures.screen": "screen_figure",

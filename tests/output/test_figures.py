@@ -65,7 +65,6 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
         "frequencies",
         "mechanism",
         "coordinates",
-        "progress",
         "approximation_mode_1_time",
         "approximation_mode_1_q",
         "approximation_mode_1_q_2",
@@ -135,18 +134,6 @@ def test_all_that_is_forbidden_is_shaded(paper):
     assert "distance" in gap.get_ylabel()
 
 
-def test_the_progress_shows_every_step_and_the_one_shot(paper):
-    figure = drawn(paper, "progress")
-    assert legend(figure) == ["initial", "taken", "given up", "one shot"]
-    taken = [100.0 * np.sqrt(step.objective) for step in paper.assignment.steps if step.taken]
-    shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "taken")
-    np.testing.assert_allclose(shown.get_ydata(), taken)
-    found = with_limits(paper, ("at_least", paper.targets[0].asked.lower, np.full(152, np.inf)))
-    axes, below = drawn(found, "progress").axes
-    assert axes.get_ylabel() == "objective"
-    assert below.get_ylabel() == "limits missed [%]"  # by the initial design
-
-
 def test_sensitivities_are_lines_from_zero_to_the_mean_of_the_largest():
     results = studied(make_results(n_y=12, n_targets=2))
     figure = drawn(results, "sensitivity")
@@ -173,10 +160,10 @@ def test_the_mechanism_is_drawn_whole_at_one_scale_in_all_directions(spatial):
     assert width / (high - low)[0] == pytest.approx(height / (high - low)[1])
     assert legend(figure)[:3] == ["tip path", "elbow_mass", "tool_mass"]
     assert len(legend(figure)) == 3 + len(found.poses.lines)
-    links = [c for c in axes.collections if hasattr(c, "get_segments")]
-    links = [c for c in links if c.get_color()[0][:3].min() < 1.0]  # not the gaps around them
-    assert len(links) == len(found.poses.lines) * len(found.poses.lines[0])
-    for points in (piece for pose in links for piece in pose.get_segments()):
+    thick = [line for line in axes.get_lines() if line.get_linewidth() > 2.0]
+    links = [line.get_xydata() for line in thick if line.get_color() != "white"]  # no gaps
+    assert len(links) == 8 * len(found.poses.lines) * len(found.poses.lines[0])  # they taper
+    for points in links:
         assert ((points >= low) & (points <= high)).all()
     if not spatial:
         tip = next(line for line in axes.get_lines() if line.get_color() == VERMILLION)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -15,7 +14,6 @@ from eigassign.output import (
     draw,
     mode_figures,
     render,
-    thumbnail,
     write_modes,
 )
 from eigassign.study import ModePictures, draw_modes, with_middle_loads
@@ -37,10 +35,10 @@ def pixels(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
-def segments(figure: Figure, colour: str) -> list[np.ndarray]:
-    """The links that are drawn in this colour, in order."""
-    drawn = [c for c in figure.axes[0].collections if to_hex(c.get_color()[0]) == colour.lower()]
-    return [piece for collection in drawn for piece in collection.get_segments()]
+def links(figure: Figure, colour: str) -> list[np.ndarray]:
+    """The links that are drawn in this colour, in order: what is thicker than any symbol."""
+    lines = [line for line in figure.axes[0].get_lines() if line.get_color() == colour]
+    return [line.get_xydata() for line in lines if line.get_linewidth() > 1.2]
 
 
 @pytest.mark.parametrize(
@@ -65,31 +63,19 @@ def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it()
     found = pictures("four_bar")
     figure = draw(mode_figures(found)[1])
     assert figure.get_suptitle().endswith(f"mode 2, {found.frequencies_hz[1]:.5g} Hz")
-    for drawn, line in zip(segments(figure, "#d4d4d4"), found.rest.lines[0], strict=True):
+    for drawn, line in zip(links(figure, "#d4d4d4"), found.rest.lines[0], strict=True):
         np.testing.assert_allclose(drawn, line)
-    for drawn, line in zip(segments(figure, BLUE), found.deformed.lines[1], strict=True):
+    for drawn, line in zip(links(figure, BLUE), found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn, line)
     other = [line for line in figure.axes[0].get_lines() if line.get_color() == SKY]
     for drawn, rest, moved in zip(other, found.rest.lines[0], found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn.get_xydata(), 2.0 * rest - moved)
     assert figure.axes[0].get_aspect() == 1.0
-    where = ", ".join(text.get_text() for text in figure.texts)
-    assert f"{found.q[0][0]} = " in where
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_the_gallery_has_a_small_picture_of_every_shipped_case(name: str) -> None:
-    file = GALLERY / f"{name}.png"
-    assert file.stat().st_size < 40_000
-    drawn = pixels(thumbnail(pictures(name, 1)))
-    committed = pixels(file.read_bytes())
-    assert committed.shape == drawn.shape
-    # letters may differ by the version of matplotlib; what is drawn is the same
-    assert (np.abs(committed - drawn).max(axis=2) > 40).mean() < 0.01, "run cases/gallery/draw.py"
+    assert f"{found.q[0][0]} = " in figure.axes[0].get_xlabel()
 
 
 def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> None:
-    expected = {f"{name}{end}.png" for name in ALL for end in ("", "_report")}
+    expected = {f"{name}_report.png" for name in ALL}
     assert {path.name for path in GALLERY.glob("*.png")} == expected, "run cases/gallery/draw.py"
     assert sum(path.stat().st_size for path in GALLERY.glob("*.png")) < 2_000_000
     listed = (CASES / "README.md").read_text(encoding="utf-8")

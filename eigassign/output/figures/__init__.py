@@ -3,15 +3,13 @@
 In reading order; each imports from those above it only:
 
     graph          what a graph shows, whoever draws it: curves, shades, rules; its limits
-    style          matplotlib: the style sheet, an empty figure, file formats
-    paper          descriptions drawn with matplotlib, and figures as files
-    curves         curves over time: what was asked, coordinates, drives; the steps of the search
+    paper          graphs drawn with matplotlib in one style, and figures as files
+    curves         curves over time: what was asked, coordinates, drives
     approximation  expansion against exact over time and over entries of q or y
     meaning        sensitivities and reach
     scene          the mechanism as parts at places: links as thick as their sections, symbols
-    mechanism      the parts drawn with matplotlib; poses
+    mechanism      the parts as curves at one scale: poses, mode shapes
     screen         descriptions as Plotly's data; the scene for a page
-    modes          mode shapes
     run            which figures a run has
     update         measured frequencies against the model, parameters with intervals
     front          time against error of a chart's methods

@@ -1,4 +1,4 @@
-"""The figures that are curves over time: coordinates, what was asked before and after, the search.
+"""The figures that are curves over time: coordinates, what was asked before and after.
 
 Each function plans one figure. Panels stand one above the other over a common abscissa; frequencies
 in Hz, errors in % of the frequency in Hz.
@@ -29,12 +29,11 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.study.results import AssignmentRow, OtherModes, RunResults, TargetStudy
+from eigassign.study.results import OtherModes, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
 
 TARGET = Look(graph.BLACK, 1.6, "dotted")
-ONE_SHOT = Look(graph.PURPLE, 0.9)
 OPTIMAL = Look(graph.SKY, 3.2)
 LEVEL = Look(graph.BLACK, 0.8)
 EDGE = Look(graph.VERMILLION, 1.0)
@@ -277,78 +276,3 @@ def before_and_after(shown: OtherModes) -> tuple[Curve, ...]:
         found.append(Curve(shown.initial_hz[:, k], before, hover=f"{name}, initial design"))
         found.append(Curve(shown.optimal_hz[:, k], after, end=name))
     return tuple(found)
-
-
-# --- The steps of the sequential method
-
-
-def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
-    """√F of least squares, F of the worst case, in %, from the initial design on.
-
-    Steps that were given up are hollow. Without a wanted frequency F is no error, and is drawn as
-    it is. Where limits were missed on the way, what is left of that stands below: it comes first,
-    so that F may rise while it falls.
-    """
-    values = np.array([row.objective_initial, *(step.objective for step in row.steps)])
-    taken = np.array([step.taken for step in row.steps])
-    missed = results.violation.initial if results.violation else 0.0
-    violations = [missed, *(step.violation for step in row.steps)]
-    percents = 100.0 * np.array(violations)
-    several = bool((percents > 1e-6).any())  # %; less is round-off
-    kind = "rms" if row.objective == "least_squares" else "worst"
-    wanted = [t for t in results.targets if t.asked.is_goal]
-    error = results.error if wanted else None
-    label = "objective"
-    if error is not None:
-        values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
-        uneven = any(t.asked.weight != 1.0 for t in wanted)
-        label = f"{'weighted ' if uneven else ''}{kind} error [%]"
-    marks: list[Mark] = [*_steps(values, taken, named=True)]
-    if error is not None and error.one_shot is not None:
-        marks.append(Rule(100.0 * _one_shot_error(wanted, kind), ONE_SHOT, "one shot"))
-    height = 2.2 if several else 2.4
-    panels = [Panel(label, tuple(marks), height, logarithmic=error is not None)]
-    if several:
-        below = tuple(_steps(percents, taken, named=False))
-        panels.append(Panel("limits missed [%]", below, 1.2, logarithmic=True))
-    return FigurePlan(
-        "progress",
-        "Progress of the sequential method",
-        f"Exact objective of every design tried from the best start: {len(row.steps)} steps, "
-        f"{taken.sum()} of them taken; {row.optimality.words}.",
-        "The objective against the number of the step.",
-        Graph(
-            title="Progress of the sequential method",
-            x_label="step",
-            x=np.arange(values.size, dtype=np.float64),
-            panels=tuple(panels),
-            x_limits=(-0.5, values.size - 0.5),
-            counted=True,
-        ),
-    )
-
-
-def _one_shot_error(wanted: list[TargetStudy], kind: str) -> float:
-    """Rms or worst error of the one shot, weighted as the objective is."""
-    own = [
-        (t.asked.weight, t.asked.weight * t.weight_s, t.error.one_shot)
-        for t in wanted
-        if t.error.one_shot is not None
-    ]
-    if kind == "worst":
-        return max(weight * error.max_relative for weight, _, error in own)
-    total = sum(share for _, share, _ in own)
-    return float(np.sqrt(sum(share * e.rms_relative**2 for _, share, e in own) / total))
-
-
-def _steps(values: Floats, taken: NDArray[np.bool_], named: bool) -> Iterator[Curve]:
-    """The initial design, then a dot a step, hollow where it was given up."""
-    number = np.arange(1.0, values.size)
-    start, step = Look(graph.BLACK, 0.0, marker="s"), Look(graph.BLUE, 0.0, marker="o")
-    yield Curve(values[:1], start, "initial" if named else "", np.zeros(1))
-    for own, look, label in (
-        (taken, step, "taken"),
-        (~taken, replace(step, filled=False), "given up"),
-    ):
-        if own.any():
-            yield Curve(values[1:][own], look, label if named else "", number[own])

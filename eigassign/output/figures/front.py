@@ -1,9 +1,8 @@
 """The figures of a chart: time against error on each front, elements, and ways to a design.
 
-Every figure is a scatter over two logarithmic axes. The first has three families, and what to write
-in the case. Methods that differ by a setting are joined by a line: eigassign's filled, the others
-hollow and dashed. A colour is a kind of method; the legend names the kinds. A broad band joins the
-methods that no other beats.
+Every figure is a scatter over two logarithmic axes. Methods that differ by a setting are joined by
+a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
+names the kinds. A broad band joins the methods that no other beats.
 """
 
 from __future__ import annotations
@@ -20,80 +19,61 @@ from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
-WHOSE = {True: "eigassign", False: "others"}  # groups of the legend
 BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
-CHOICE = ("exact", "Taylor, full", "reduced, 1 point")  # families of it
 RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """The figures that this chart has something to show for; what to write in the case first."""
-    plans = [_front(chart, each, True) for each in chart.fronts if each.evaluations is None]
-    plans += [_front(chart, each) for each in chart.fronts]
+    """The figures that this chart has something to show for; the time of a sample first."""
+    plans = [_front(chart, f) for f in sorted(chart.fronts, key=lambda f: bool(f.evaluations))]
     plans += [_mesh(chart)] if chart.mesh else []
     plans += [_designs(chart)] if chart.designs else []
     return tuple(plans)
 
 
-def _front(chart: Chart, front: Front, few: bool = False) -> FigurePlan:
-    """The methods by family, over the band through the best; what auto takes is ringed.
-
-    Of ``few`` families the method that the advice names, and the accuracy that it is for.
-    """
-    asked, n, first = chart.asked, front.evaluations, next(iter(chart.advice), None)
+def _front(chart: Chart, front: Front) -> FigurePlan:
+    """The methods by family, over the band through the best; what auto takes is ringed."""
+    asked, n = chart.asked, front.evaluations
     what = "time of a sample" if n is None else f"set-up and {n:,.0f} evaluations"
     name = "".join(c if c.isalnum() else "_" for c in front.name)
-    name = "choice" if few else name if n is None else f"cost_{name}"
     shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
     lost = len(chart.points) - len(shown)
     verb = "method is" if lost == 1 else "methods are"
     beyond = f" {lost} {verb} wrong by over 100 % somewhere and not drawn." if lost else ""
-    where = (
-        f"over {asked.random_points} random samples of trajectory × design box and "
-        f"{asked.designs} × {asked.samples_per_design} samples along the trajectory at several "
-        "designs."
-    )
     caption = (
-        f"Worst |f / f exact − 1| {where} Filled: eigassign's; hollow: what people do without it; "
-        "the band: no charted method is both quicker and more accurate; ringed: taken by "
+        f"Worst |f / f exact − 1| over {asked.random_points} random samples of trajectory × design "
+        f"box and {asked.designs} × {asked.samples_per_design} samples along the trajectory at "
+        "several designs. Filled: eigassign's; hollow: what people do without it; the band: no "
+        "charted method is both quicker and more accurate; ringed: taken by "
         f"`expansion.order: auto`.{beyond}"
     )
-    if few:
-        shown = [p for p in shown if p.family in CHOICE or (first and p.method == first.key_method)]
-        caption = (
-            "A point of the series is an `order`. Reduced models are drawn to compare: no key of a "
-            f"case asks for them. Worst error {where}"
-        )
+    floor = asked.floor_hz / asked.typical_hz
 
-    def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
-        x = np.array([p.cost_s(n) / size for p in points])
+    def curve(points: Sequence[ChartPoint], look: Look, label: str = "") -> Curve:
+        x = np.array([p.cost_s(n) for p in points])
         y = np.array([100.0 * max(p.everywhere.worst_relative, floor) for p in points])
-        return Curve(y, look, label, x, group=whose, names=tuple(p.method for p in points))
+        return Curve(y, look, label, x, names=tuple(p.method for p in points))
 
-    floor, unit, size = asked.floor_hz / asked.typical_hz, "µs" if few else "s", 1e-6**few
-    below: list[Mark] = [Rule(100.0 * floor, PLAIN, note="round-off of exact solves")]
-    if few:
-        taken, ring = {first.key_method if first else None}, "to write in the case"
-        if first and first.accuracy:
-            below.append(Rule(100.0 * first.accuracy, PLAIN, note="asked for"))
-    else:
-        taken = {a.auto.method for a in chart.advice if a.auto is not None}
-        ring = "taken by order: auto"
-        best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
-        below.append(curve(best, BAND))
+    taken = {a.auto.method for a in chart.advice if a.auto is not None}
+    best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
     ringed = [p for p in shown if p.method in taken]
     curves = [
-        curve([p for p in shown if p.family == family], PLAIN, kind_of(family), WHOSE[ours])
+        (ours, curve([p for p in shown if p.family == family], PLAIN, kind_of(family)))
         for family, ours in dict.fromkeys((p.family, p.ours) for p in shown)
     ]
-    marks = (*below, *([curve(ringed, RING, ring)] if ringed else ()), *_coloured(curves))
+    marks: list[Mark] = [
+        Rule(100.0 * floor, PLAIN, note="round-off of exact solves"),
+        curve(best, BAND),
+        *([curve(ringed, RING, "taken by order: auto")] if ringed else ()),
+        *_coloured(curves),
+    ]
     room = (np.array([50.0 * floor]),)  # for the name of the level
     heading = f"{capital(what)} against worst error"
-    alt = f"Scatter of worst error in % over {what} for {'a few' if few else 'all'} methods."
-    panel = Panel("worst error [%]", marks, 3.8, True, None, room)
-    section = "answer" if few else "appendix"
-    graph = _scatter(heading, f"time [{unit}]", panel)
-    return FigurePlan(name, heading, caption, alt, graph, section)
+    alt = f"Scatter of worst error in % over {what} for all methods."
+    panel = Panel("worst error [%]", tuple(marks), 3.8, True, None, room)
+    section = "answer" if n is None else "appendix"
+    name = name if n is None else f"cost_{name}"
+    return FigurePlan(name, heading, caption, alt, _scatter(heading, "time [s]", panel), section)
 
 
 def _mesh(chart: Chart) -> FigurePlan:
@@ -129,7 +109,7 @@ def _designs(chart: Chart) -> FigurePlan:
     for run in chart.designs:
         seconds, found = np.array(run.trace or ((run.seconds.median_s, run.objective),)).T
         excess = [max(excess_over(best.objective, value), LEAST_EXCESS) for value in found]
-        curves.append(Curve(np.array(excess), PLAIN, run.method, seconds, group=WHOSE[run.ours]))
+        curves.append((run.ours, Curve(np.array(excess), PLAIN, run.method, seconds)))
     heading = "Time to a design against the objective it reaches"
     panel = Panel("objective above the best [relative]", (*_coloured(curves),), 3.8, True, None)
     alt = "Scatter of excess objective over seconds for every way to a design."
@@ -140,13 +120,13 @@ def _scatter(title: str, x: str, *panels: Panel) -> Graph:
     return Graph(title, x, np.zeros(0), panels, x_logarithmic=True, beside=True)
 
 
-def _coloured(curves: Sequence[Curve]) -> Iterator[Curve]:
+def _coloured(curves: Sequence[tuple[bool, Curve]]) -> Iterator[Curve]:
     """The others first, hollow and dashed; of one label all look alike, and one has it."""
-    colours = dict(zip(dict.fromkeys(c.label for c in curves), cycle(graph.SERIES), strict=False))
-    for ours in (False, True):
-        named = set[str]()
+    names = dict.fromkeys(curve.label for _, curve in curves)
+    colours = dict(zip(names, cycle(graph.SERIES), strict=False))
+    named = set[tuple[bool, str]]()
+    for ours, curve in sorted(curves, key=lambda pair: pair[0]):
         dash, marker = ("solid", "o") if ours else ("fine", "s")
-        for curve in [each for each in curves if each.group == WHOSE[ours]]:
-            look = Look(colours[curve.label], 0.9, dash, marker, 6.0, ours)
-            yield replace(curve, look=look, label="" if curve.label in named else curve.label)
-            named.add(curve.label)
+        look = Look(colours[curve.label], 0.9, dash, marker, 6.0, ours)
+        yield replace(curve, look=look, label="" if (ours, curve.label) in named else curve.label)
+        named.add((ours, curve.label))

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import math
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
 Dash = str  # solid | dashed | dotted | dash-dotted | fine
@@ -26,6 +22,8 @@ DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted", "dash-dotted")
 # Okabe and Ito: can be distinguished with every kind of colour vision
 BLACK, ORANGE, SKY, GREEN = "#1a1a1a", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8c8c8c"
+WIDTH = 8.0  # inches: 880 pixels at 110 dpi, the width of the text in a report
+LEFT, RIGHT = 0.8, 0.15  # beside the panels
 SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 
@@ -36,9 +34,10 @@ class Look:
     colour: str
     width: float = 1.4
     dash: Dash = "solid"
-    marker: str = ""  # o, s, D, ^, p; none
+    marker: str = ""  # o, s; none
     size: float = 6.0  # of the marker
     filled: bool = True
+    area: str = ""  # the colour inside a closed line
 
 
 def series(number: int) -> Look:
@@ -49,14 +48,13 @@ def series(number: int) -> Look:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """``y`` over the graph's abscissa, or over its own ``x``; ``end`` stands at its right end."""
+    """``y`` over the graph's abscissa, or over its own ``x``; ``end`` stands at its end."""
 
     y: Floats
     look: Look
     label: str = ""  # in the legend
     x: Floats | None = None
     end: str = ""
-    group: str = ""  # of the legend
     names: tuple[str, ...] = ()  # of its points, where each has one
     hover: str = ""  # its name under the pointer, where it has no other
 
@@ -169,8 +167,8 @@ class Graph:
     panels: tuple[Panel, ...]
     x_limits: tuple[float, float] | None = None
     x_logarithmic: bool = False
-    counted: bool = False  # the abscissa: whole numbers
     beside: bool = False  # where the legend stands; else above
+    sheet: str = ""  # on paper only, at one scale in all directions: with axes, or bare
     clock: str | None = None  # the trajectory whose time the abscissa is, "" of a single one
 
 
@@ -178,15 +176,14 @@ class Graph:
 class FigurePlan:
     """One figure: its file's name without ending, heading, caption, alternative text, content.
 
-    ``shows`` describes it, or draws it where matplotlib alone can. ``section`` is that of the page
-    that it stands in; a table of this ``title`` has its numbers.
+    ``section`` is that of the page that it stands in; a table of this ``title`` has its numbers.
     """
 
     name: str
     heading: str
     caption: str
     alt: str
-    shows: Graph | Callable[[], Figure]
+    shows: Graph
     section: str = "appendix"
     title: str = ""
 

@@ -1,15 +1,25 @@
-"""Descriptions drawn with matplotlib, and all figures of a plan as files."""
+"""Figures on paper: graphs drawn with matplotlib, in one style, as files of several formats.
+
+Figures are drawn through matplotlib's `Figure` and `Axes` on an Agg canvas; pyplot and its global
+state are never used. matplotlib is imported only where a figure is made: a run without figures
+does not load it. The user's own settings change nothing, and the same findings give the same bytes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import io
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import graph, style
+from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
+    BLACK,
+    GREY,
     Curve,
     FigurePlan,
     Graph,
@@ -25,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
+FORMATS = ("png", "svg", "pdf")
 _DASHES: dict[str, Any] = {
     "solid": "solid",
     "dashed": (0, (5.0, 1.8)),
@@ -32,71 +43,131 @@ _DASHES: dict[str, Any] = {
     "dash-dotted": (0, (6.0, 1.5, 1.4, 1.5)),
     "fine": (0, (3.0, 3.0)),
 }
+STYLE: dict[str, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": GREY,
+    "axes.formatter.useoffset": False,  # a number on an axis is the number itself
+    "axes.grid": True,
+    "axes.labelcolor": BLACK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9.0,
+    "axes.xmargin": 0.0,
+    "figure.dpi": 110.0,
+    "figure.titlesize": 10.0,
+    "figure.titleweight": "bold",
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same everywhere
+    "font.size": 9.0,
+    "grid.color": "#e3e3e3",
+    "legend.borderaxespad": 0.2,
+    "legend.columnspacing": 1.6,
+    "legend.fontsize": 9.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "legend.labelspacing": 0.35,
+    "lines.dash_capstyle": "butt",
+    "lines.solid_capstyle": "round",
+    "patch.linewidth": 0.8,
+    "svg.hashsalt": "eigassign",  # else the names inside an SVG are random
+    "text.color": BLACK,
+    "text.parse_math": False,  # names of the user's may hold any character
+    "xtick.color": GREY,
+    "xtick.labelcolor": BLACK,
+    "ytick.color": GREY,
+    "ytick.labelcolor": BLACK,
+}
+# the date, and who wrote the file, in the words of each format
+_METADATA: dict[str, dict[str, str | None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
 
 
-def render(
-    plans: Sequence[FigurePlan], formats: Sequence[str] = style.FORMATS[:1]
-) -> dict[str, bytes]:
+def render(plans: Sequence[FigurePlan], formats: Sequence[str] = FORMATS[:1]) -> dict[str, bytes]:
     """Files of each figure in each format of `FORMATS` asked for, by name."""
-    files: dict[str, bytes] = {}
     if not plans or not formats:
-        return files
-    with style.applied():
-        for plan in plans:
-            figure = _drawn_plan(plan)
-            for kind in formats:
-                files[f"{plan.name}.{kind}"] = style.encoded(figure, kind)
-    return files
+        return {}
+    with applied():
+        drawn = [(plan.name, _graph(plan.shows)) for plan in plans]
+        return {f"{name}.{kind}": encoded(one, kind) for name, one in drawn for kind in formats}
 
 
 def draw(plan: FigurePlan) -> Figure:
     """The figure of a plan, in `STYLE`."""
-    with style.applied():
-        return _drawn_plan(plan)
+    with applied():
+        return _graph(plan.shows)
 
 
-def _drawn_plan(plan: FigurePlan) -> Figure:
-    shown = plan.shows
-    return _graph(shown) if isinstance(shown, Graph) else shown()
+def encoded(figure: Figure, kind: str) -> bytes:
+    """The figure as a file of one of `FORMATS`, without date: the same bytes every time."""
+    data = io.BytesIO()
+    figure.savefig(data, format=kind, metadata=_METADATA[kind])
+    return data.getvalue()
+
+
+@contextlib.contextmanager
+def applied() -> Iterator[None]:
+    """Draw with `STYLE` over matplotlib's defaults, whatever the user's own settings are."""
+    import matplotlib
+
+    settings: Any = dict(matplotlib.rcParamsDefault)
+    settings = {k: v for k, v in settings.items() if not k.startswith("backend")} | STYLE
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=matplotlib.MatplotlibDeprecationWarning)
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        with matplotlib.rc_context(settings):
+            yield
 
 
 # --- Graphs
 
-LEFT, RIGHT, BOTTOM, GAP = 0.8, 0.15, 0.55, 0.15  # inches around the panels, and between them
+BOTTOM, GAP = 0.55, 0.15  # inches below the panels, and between them
 ROW, LETTER = 0.18, 0.075  # inches of a line of the legend, and of a letter
 
 
 def _graph(shown: Graph) -> Figure:
+    """What is put into a figure is placed in inches.
+
+    matplotlib's own layouts measure every letter twice, a third of the time of a figure.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     heights = [panel.height for panel in shown.panels]
     labels = [mark.label for panel in shown.panels for mark in panel.marks if mark.label]
     labels += [name for panel in shown.panels for name, _ in panel.key]
-    rows = 0 if shown.beside else -(-len(labels) // style.columns(labels))
+    rows = 0 if shown.beside else -(-len(labels) // _columns(labels))
     above = 0.4 + ROW * rows  # with the title
     tall = above + sum(heights) + GAP * (len(heights) - 1) + BOTTOM
     if shown.beside:
-        tall = max(tall, 0.8 + ROW * (len(labels) + 3))
-    figure = style.new_figure(shown.title, tall)
+        tall = max(tall, 0.8 + ROW * len(labels))
+    figure = Figure((graph.WIDTH, tall))
+    FigureCanvasAgg(figure)
+    place = {"x": 0.1 / graph.WIDTH, "y": 1.0 - 0.1 / tall, "ha": "left", "va": "top"}
+    figure.suptitle(short(shown.title, 88), **place)  # more letters seldom fit
     panels = _placed(figure, shown, tall - above)
-    for axes, panel in zip(panels, shown.panels, strict=True):
-        _ordinate(axes, panel)
     if shown.x_limits is not None:
         panels[0].set_xlim(shown.x_limits)
     if shown.x_logarithmic:
         own = [curve.x for panel in shown.panels for curve in panel.curves if curve.x is not None]
         _logarithmic(panels[0], "x", graph.decades(own))
-    if shown.counted:
-        low, high = panels[0].get_xlim()
-        panels[0].set_xticks(range(int(np.ceil(low)), int(high) + 1, max(1, int(high - low) // 10)))
-    handles: list[tuple[str, Any]] = []
+    handles: list[Any] = []
     for axes, panel in zip(panels, shown.panels, strict=True):
+        _ordinate(axes, panel)
         handles += _drawn(axes, panel, shown)
     if shown.beside:
-        _key_beside(figure, panels, handles)
+        at = (1.0 - 0.05 / graph.WIDTH, 1.0 - 0.35 / tall)
+        key = figure.legend(handles=handles[::-1], loc="upper right", bbox_to_anchor=at)
+        end = key.get_window_extent().x0 / figure.bbox.width - 0.1 / graph.WIDTH
+        for axes in panels:
+            box = axes.get_position()
+            axes.set_position((box.x0, box.y0, end - box.x0, box.height))
     elif handles:
         panels[0].legend(
-            handles=[handle for _, handle in handles], loc="lower left", bbox_to_anchor=(0.0, 1.0),
-            ncols=style.columns(labels),
-        )  # fmt: skip
+            handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(labels)
+        )
     return figure
 
 
@@ -104,9 +175,9 @@ def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
     """Axes one below the other from ``top`` inches, with room for names at their sides."""
     width, tall = figure.get_size_inches()
     names = [short(name) for panel in shown.panels for name in panel.names]
-    ends = [curve.end for panel in shown.panels for curve in panel.curves]
-    left = max(LEFT, 0.2 + LETTER * max(map(len, names), default=0))
-    wide = width - left - RIGHT - LETTER * max(map(len, ends), default=0)
+    ends = [c.end for panel in shown.panels for c in panel.curves if not shown.sheet]
+    left = max(graph.LEFT, 0.2 + LETTER * max(map(len, names), default=0))
+    wide = width - left - graph.RIGHT - LETTER * max(map(len, ends), default=0)
     found: list[Axes] = []
     for panel in shown.panels:
         box = (left / width, (top - panel.height) / tall, wide / width, panel.height / tall)
@@ -117,6 +188,11 @@ def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
         top -= panel.height + GAP
     found[-1].set_xlabel(shown.x_label)
     found[-1].xaxis.set_label_coords(0.5, -0.37 / shown.panels[-1].height)
+    if shown.sheet:
+        axes.set_aspect("equal")
+    if shown.sheet == "bare":
+        axes.set(xticks=(), yticks=())
+        axes.spines[:].set_visible(False)
     return found
 
 
@@ -131,28 +207,26 @@ def _ordinate(axes: Axes, panel: Panel) -> None:
     axes.yaxis.set_offset_position("right")  # a power of ten, away from the legend
 
 
-def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[tuple[str, Any]]:
-    """Draw all marks; the entries of the legend with their groups."""
+def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[Any]:
+    """Draw all marks; the entries of the legend."""
     from matplotlib.lines import Line2D
 
-    entries: list[tuple[str, Any]] = []
+    entries = [Line2D([], [], **_line(look), label=name) for name, look in panel.key]
     for at, mark in enumerate(panel.marks):
-        above = 2.0 + 1e-3 * at
-        group = ""
         if isinstance(mark, Curve):
-            handle, group = _curve(axes, panel, mark, shown.x, above), mark.group
+            handle = _curve(axes, panel, mark, shown, 2.0 + 1e-3 * at)
         elif isinstance(mark, Shade):
             handle = _shade(axes, panel, mark, shown.x)
         else:
             handle = _rule(axes, mark)
         if mark.label:
-            entries.append((group, handle))
-    for name, place, colour in panel.ends():
+            entries.append(handle)
+    for name, place, colour in () if shown.sheet else panel.ends():
         axes.annotate(
             name, (1.0, place), (6.0, 0.0), color=colour, va="center",
             xycoords=("axes fraction", "data"), textcoords="offset points",
         )  # fmt: skip
-    return entries + [("", Line2D([], [], **_line(look), label=name)) for name, look in panel.key]
+    return entries
 
 
 def _line(look: Look) -> dict[str, Any]:
@@ -168,14 +242,18 @@ def _line(look: Look) -> dict[str, Any]:
     }
 
 
-def _curve(axes: Axes, panel: Panel, curve: Curve, x: Floats, above: float) -> Any:
+def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -> Any:
     """A single point of a line is a dot."""
-    at, look = x if curve.x is None else curve.x, _line(curve.look)
+    at, look = shown.x if curve.x is None else curve.x, _line(curve.look)
     if at.size == 1 and not curve.look.marker:
         look["marker"] = "o"
+    if curve.look.area:
+        axes.fill(at, curve.y, color=curve.look.area, zorder=above, clip_on=False)
+    if shown.sheet and curve.end:
+        axes.annotate(curve.end, (at[-1], curve.y[-1]), (3.0, 0.0), textcoords="offset points")
     return axes.plot(
         at, panel.shown(curve), **look, label=short(curve.label, 60), zorder=above,
-        clip_on=not curve.look.marker,
+        clip_on=not curve.look.marker and not shown.sheet,
     )[0]  # fmt: skip
 
 
@@ -194,36 +272,9 @@ def _rule(axes: Axes, rule: Rule) -> Any:
     if rule.note:
         axes.annotate(
             short(rule.note, 60), (0.0, rule.at), (4.0, 2.0), textcoords="offset points",
-            va="bottom", xycoords=("axes fraction", "data"), size=style.SMALL_PT,
+            va="bottom", xycoords=("axes fraction", "data"), size=8.0,
         )  # fmt: skip
     return line
-
-
-def _key_beside(figure: Figure, panels: Sequence[Axes], handles: Sequence[tuple[str, Any]]) -> None:
-    """A legend to the right, its groups headed by their names where there are several.
-
-    What lies on top comes first.
-    """
-    from matplotlib.lines import Line2D
-
-    groups = dict.fromkeys(group for group, _ in handles if group)
-    entries: list[Any] = []
-    bold: list[int] = []
-    for group in [*reversed(groups), ""]:
-        own = [handle for of, handle in handles if of == group]
-        if group and len(groups) > 1:
-            bold.append(len(entries))
-            entries.append(Line2D([], [], linestyle="none", label=group))
-        entries += own
-    width, tall = figure.get_size_inches()
-    at = (1.0 - 0.05 / width, 1.0 - 0.35 / tall)
-    key = figure.legend(handles=entries, loc="upper right", bbox_to_anchor=at, handlelength=1.6)
-    for place in bold:
-        key.get_texts()[place].set_fontweight("bold")
-    end = key.get_window_extent().x0 / figure.bbox.width - 0.1 / width
-    for axes in panels:
-        box = axes.get_position()
-        axes.set_position((box.x0, box.y0, end - box.x0, box.height))
 
 
 def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bool = False) -> None:
@@ -239,3 +290,12 @@ def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bo
     axis.set_major_formatter(
         FuncFormatter(lambda at, _: ("≤" if cut and at <= low else "") + graph.power(at))
     )
+
+
+def _columns(labels: Sequence[str]) -> int:
+    """As many columns of a legend above its axes as fit."""
+    for count in range(len(labels), 1, -1):  # matplotlib fills one after the other
+        parts = np.array_split([len(label) for label in labels], count)
+        if sum(max(part) + 8 for part in parts) <= 92:  # characters
+            return count
+    return 1

@@ -27,8 +27,6 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     yield from meaning_figures(results)
     yield from (curves.drives(one) for one in each if asked)
     yield from (curves.coordinates(one) for one in each if one.q.size)
-    if results.assignment is not None and results.assignment.steps:
-        yield curves.progress(results, results.assignment)
     for k, study in enumerate(results.studies):
         for one in each:
             comparison = one.studies[k].over_time

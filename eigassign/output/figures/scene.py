@@ -93,11 +93,6 @@ def thickening(poses: DrawnPoses) -> float:
     return min(float(least), MOST_SHARE * extent / most)
 
 
-def thickest(poses: DrawnPoses) -> float:
-    """The thickness of the thickest link as it is drawn, m."""
-    return max((thick for part in _links(poses) for thick in part.ends), default=0.0)
-
-
 def extent_of(poses: DrawnPoses) -> float:
     """The diagonal of the box around the links in the first pose, m."""
     every = np.concatenate(poses.lines[0]) if poses.lines[0] else np.zeros((1, 2))
@@ -116,7 +111,7 @@ def scale_words(poses: DrawnPoses) -> str:
 
 def parts(poses: DrawnPoses) -> tuple[Part, ...]:
     """All parts, those that lie on top last."""
-    return (*ground(poses), *_springs(poses), *_links(poses), *_joints(poses))
+    return (*ground(poses), *_springs(poses), *links(poses), *_joints(poses))
 
 
 def ground(poses: DrawnPoses) -> Iterator[Part]:
@@ -159,7 +154,8 @@ def zigzagged(along: Floats) -> Floats:
     return np.asarray(at[:, None] * along + side[:, None] * across)
 
 
-def _links(poses: DrawnPoses) -> Iterator[Part]:
+def links(poses: DrawnPoses) -> Iterator[Part]:
+    """Yield the links as lines, as thick as they are drawn."""
     times, nominal = thickening(poses), NOMINAL_SHARE * extent_of(poses)
     depths = poses.depths or ((0.0, 0.0),) * len(poses.line_links)
     for k, (name, pair) in enumerate(zip(poses.line_links, depths, strict=True)):

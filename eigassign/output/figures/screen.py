@@ -36,7 +36,7 @@ _DASHES = {
     "fine": "4px,4px",
 }
 _NAMED = "%{text}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
-_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "p": "pentagon"}
+_MARKERS = {"o": "circle", "s": "square"}
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
@@ -125,8 +125,7 @@ def _abscissa(shown: Graph) -> Json:
         own = [c.x for panel in shown.panels for c in panel.curves if c.x is not None]
         return _decades(graph.decades(own))
     if shown.x_limits is not None:
-        found: Json = {"range": _numbers(shown.x_limits)}
-        return {**found, "dtick": max(1, int(shown.x.size // 10))} if shown.counted else found
+        return {"range": _numbers(shown.x_limits)}
     low, high = (shown.x.min(), shown.x.max()) if shown.x.size else (0.0, 1.0)
     return {"range": _numbers((low, high))} if high > low else {}
 

@@ -74,7 +74,7 @@ def _measurements(results: UpdateResults) -> Graph:
     )
     ends = 0.4, at.size + 0.6
     title = "Measured frequencies and the model"
-    return Graph(title, "measurement", at, panels, x_limits=ends, counted=True)
+    return Graph(title, "measurement", at, panels, x_limits=ends)
 
 
 def _deviations(at: Floats, bars: Floats) -> Mark:

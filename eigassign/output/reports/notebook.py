@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 def drawn(plan: FigurePlan) -> Figure:
     """The figure of a plan; a notebook shows it, though pyplot never hears of it."""
-    from eigassign.output.figures.paper import draw
-    from eigassign.output.figures.style import applied, encoded
+    from eigassign.output.figures.paper import applied, draw, encoded
 
     figure = draw(plan)
 

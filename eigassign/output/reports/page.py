@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from eigassign._version import __version__
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figure
@@ -70,7 +70,7 @@ def page(
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
-    graphs = {p.name: screen_figure(p.shows) for p in plans if full and not callable(p.shows)}
+    graphs = {p.name: screen_figure(p.shows) for p in plans if full and not p.shows.sheet}
     moving = run.moving if run is not None and full else ()
     kept = full and len(content) <= 400_000
     figures = list(_shown(plans, graphs, files, 900_000))
