@@ -34,7 +34,7 @@ __all__, __getattr__, __dir__ = face(
         "imports.parts": "imported_part matrix_of read_contents",
         "inverse_kinematics.chain": "TipChain TipEvaluation reduced tip_chain",
         "inverse_kinematics.follow": "follow",
-        "inverse_kinematics.tip_path": "Course planar_attitude spatial_attitude spline straight",
+        "inverse_kinematics.tip_path": "Course planar_attitude spatial_attitude tip_path",
         "kinematics.forward": "Placement build_link_frames",
         "kinematics.joints": "joint_motion turned",
         "kinematics.loop_closure": "all_moving",
@@ -42,7 +42,7 @@ __all__, __getattr__, __dir__ = face(
         "kinematics.topology": "JointEdge",
         "solids.mesh_file": "read_mesh",
         "solids.part": "Coupling joined solid_part",
-        "trajectory.motion": "PointMotion read_samples timing_law",
+        "trajectory.motion": "read_samples sampled_motion timing_law",
         "trajectory.trajectory": "NamedTrajectory Trajectories Trajectory build_trajectory rates",
     },
 )

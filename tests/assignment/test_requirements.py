@@ -39,7 +39,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture
 def path() -> Trajectories:
     parts = [
-        NamedTrajectory(name, Trajectory(time, np.column_stack([time, 2 * time]), None))
+        NamedTrajectory(name, Trajectory(time, np.column_stack([time, 2 * time])))
         for name, time in (("a", T_A), ("b", T_B))
     ]
     return Trajectories(tuple(parts))

@@ -26,7 +26,7 @@ WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
 
 def timed(time_s: np.ndarray, q: np.ndarray) -> Any:
     """The rates of plain samples."""
-    return rates(Trajectory(np.array(time_s, float), np.array(q, float), None))
+    return rates(Trajectory(np.array(time_s, float), np.array(q, float)))
 
 
 class RestToRest:

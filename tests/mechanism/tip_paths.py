@@ -12,9 +12,8 @@ from eigassign.mechanism import (
     TipChain,
     planar_attitude,
     spatial_attitude,
-    spline,
-    straight,
     tip_chain,
+    tip_path,
 )
 
 
@@ -31,7 +30,7 @@ def states(chain: TipChain, q: Any) -> np.ndarray:
 def course(
     points: Any, n: int, kind: str = "straight", angle: Any = None, orientation: Any = None
 ) -> Course:
-    path = {"straight": straight, "spline": spline}[kind](points)
+    path = tip_path(points, kind)
     attitude = None
     if angle is not None:
         attitude = planar_attitude(path, angle, kind)

@@ -59,7 +59,7 @@ def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
     model, path = case.model(), case.trajectory
 
     def timed(duration: float) -> Any:
-        return rates(Trajectory(path.time_s * duration, path.q.copy(), None))
+        return rates(Trajectory(path.time_s * duration, path.q.copy()))
 
     terms = velocity_terms(case.file, model.poses.parameters, model.motion)
     effects = [
@@ -145,7 +145,7 @@ def test_away_from_a_veering_the_effect_falls_with_the_square_of_the_speed() -> 
     changes = []
     for slower in (1.0, 2.0):
         part = case.trajectory.parts[0].trajectory
-        moving = rates(Trajectory(part.time_s * 5.0 * slower, part.q.copy(), None))
+        moving = rates(Trajectory(part.time_s * 5.0 * slower, part.q.copy()))
         at = (each[samples] for each in (moving.q, moving.rate, moving.acceleration))
         own = change_at(model.pencil, terms, *at, case.initial_design, (1, 2), model.under_load)
         changes.append(own)

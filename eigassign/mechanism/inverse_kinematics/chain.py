@@ -10,23 +10,24 @@ components of the tip's position, r = 1 or 3 of its turning.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import ADVANCING, FREEDOMS
-from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
-from eigassign.mechanism.kinematics.joints import Objects, multiply
+from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.topology import Topology, split
+from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays, compile_arrays
-from eigassign.series.expression import Recorder, derivative
+from eigassign.series.expression import Recorder
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -59,19 +60,28 @@ class TipChain:
     back), "screw" (rad, it does not) or "slide" (m).
     """
 
-    evaluate: Callable[[Floats], TipEvaluation]  # z (n, n_q + n_p)
+    evaluate: Callable[..., TipEvaluation]  # of z (n, n_q + n_p), and by_design: by y too
     joints: tuple[str, ...]  # of the coordinates, in their order
     relative_map: tuple[Floats, Floats]  # A (n_q, n_q), b (n_q,): joint coordinates A q + b
     kinds: tuple[str, ...]
     turned_by: tuple[int, ...] = ()  # the components of a rotation vector that a tip can have
     assembly: LoopAssembly | None = None
     y: Floats = field(default_factory=lambda: np.zeros(0))  # the design (n_y,) that it is of
-    design: TipTables | None = None  # how it changes with the design; None of a chain without one
+    tables: TipTables | None = None  # how it changes with the design; None: not at all
 
     @property
     def n_q(self) -> int:
         """Number of coordinates."""
         return len(self.joints)
+
+    @property
+    def y_names(self) -> tuple[str, ...]:
+        """The names of the design parameters (n_y,)."""
+        return () if self.tables is None else self.tables.parameters.design
+
+    def redesigned(self, y: Floats) -> TipChain:
+        """The chain at another design (n_y,)."""
+        return self if self.tables is None else self.tables.chain(y)
 
     def of_kind(self, kind: str) -> Bools:
         """Mask of the entries of a state that are of this kind, (n_q + n_p,)."""
@@ -128,10 +138,9 @@ def tip_chain(
 
     ``loads`` (n_loads,) are what the trajectory sets, where there are any.
     """
-    points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
-    set_ = np.zeros(0) if loads is None else loads / parameters.scales
-    own = (points, turns if oriented else (), set_)
-    return TipTables(case, parameters, motion, tip, *own).chain(y)
+    turns = (2,) if case.mechanism.space == "planar" else (0, 1, 2)
+    set_ = np.zeros(0) if loads is None else loads
+    return TipTables(case, parameters, motion, tip, turns if oriented else (), set_).chain(y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,22 +148,15 @@ class TipTables:
     """The chain's scalars over z and y, compiled once, and evaluated for all states together.
 
     The links are placed anew with open loops: passive freedoms are variables, closure is an
-    equation to be met, and every freedom moves by itself. Of the design only angles of joints then
-    turn links.
+    equation to be met, and every freedom moves by itself.
     """
 
     case: CaseFile
     parameters: ModelParameters
     motion: Kinematics
     tip: str
-    d: int
     turns: tuple[int, ...]
-    loads: Floats  # (n_loads,) as variables of the program: see ModelParameters
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The design parameters y."""
-        return self.parameters.design
+    loads: Floats  # (n_loads,)
 
     def chain(self, y: Floats) -> TipChain:
         """The chain at design y (n_y,)."""
@@ -166,129 +168,65 @@ class TipTables:
             turned_by=self.turns,
             assembly=self._assembly(y) if self.motion.passive else None,
             y=y,
-            design=self,
+            tables=self,
         )
-
-    @cached_property
-    def _passive_table(self) -> CompiledArrays:
-        """The passive freedoms of the model itself."""
-        return self.parameters.compiled(np.array(self.motion.passive, dtype=object))
 
     def _assembly(self, y: Floats) -> LoopAssembly:
         """The branch of the model itself: where it was chosen, and its passive freedoms."""
-
-        def passive(q: Floats) -> Floats:
-            return self._passive_table(self._variables(q, y))[0]
-
         gaps, sines = (2, 1) if self.case.mechanism.space == "planar" else (3, 3)
-        loops = len(self.motion.tree.loops)
-        turning = np.array(([False] * gaps + [True] * sines) * loops, dtype=bool)
-        return LoopAssembly(reference_coordinates(self.case), passive, turning)
-
-    def properties(self, y: Floats) -> Floats:
-        """The loads and the design y as variables of the program, behind s."""
-        return np.append(self.loads, y)
+        turning = np.array(([False] * gaps + [True] * sines) * len(self.motion.tree.loops))
+        return LoopAssembly(
+            reference_coordinates(self.case),
+            lambda q: self._passive(self._variables(q, y))[0],
+            turning,
+        )
 
     @cached_property
-    def _recorded(self) -> tuple[Recorder, list[Objects]]:
-        """Place (d,), rotation (9,) or nothing, J (d + r, n_z), F (n_e,) and ∂F/∂z."""
-        case, tree, A = self.case, self.motion.tree, self.motion.relative
-        n_z = len(tree.freedoms)
-        recorder = Recorder()
-        variables = self.parameters.rerecorded(recorder, len(tree.passive))
+    def _passive(self) -> CompiledArrays:
+        return self.parameters.compiled(np.array(self.motion.passive, dtype=object))
+
+    @cached_property
+    def _table(self) -> CompiledArrays:
+        """Place (d,), rotation (9,) or nothing, and F (n_e,)."""
+        case, tree, n_z = self.case, self.motion.tree, len(self.motion.tree.freedoms)
+        variables = self.parameters.rerecorded(Recorder(), len(tree.passive))
         values = [variables.freedom(k) for k in range(n_z)]
-        moving = walk(
-            case, variables, tree, self.motion.coordinates, values, np.eye(n_z, dtype=object)
-        )
+        still = np.zeros((n_z, 0), dtype=object)
+        moving = walk(case, variables, tree, self.motion.coordinates, values, still)
         link, node = split(self.tip)
         X = node_position(case, variables, tree, (link, node))
         rotation, place = moving.placement(link).at(X)
-        twist = shifted(moving.placement(link).twist, X)
-        velocity, spin = multiply(rotation, twist[:3]), multiply(rotation, twist[3:])
-        J = _per_coordinate(np.concatenate([velocity[: self.d], spin[list(self.turns)]]), A)
-        F, dF = _closure(moving, self.d == 2, len(self.parameters.varied), A)
-        turned = rotation.ravel() if self.turns else rotation[:0].ravel()
-        return recorder, [place[: self.d], turned, J, F, dF]
-
-    @property
-    def _n_y(self) -> int:
-        return len(self.parameters.design)
-
-    def _compiled(self, arrays: Sequence[Objects]) -> CompiledArrays:
-        n_variables = len(self.motion.tree.freedoms) + len(self.parameters.varied)
-        return compile_arrays(self._recorded[0], arrays, n_variables)
-
-    @cached_property
-    def _state_table(self) -> CompiledArrays:
-        return self._compiled(self._recorded[1])
-
-    @cached_property
-    def _design_table(self) -> CompiledArrays:
-        """∂(place)/∂y (d, n_y), ∂(rotation)/∂y (9 or 0, n_y) and ∂F/∂y (n_e, n_y)."""
-        place, rotation, _, F, _ = self._recorded[1]
-        first = len(self.motion.offset) + len(self.loads)
-        columns = range(first, first + self._n_y)
-        parts = [
-            np.array([[derivative(f, k) for k in columns] for f in of], dtype=object)
-            for of in (place, rotation, F)
-        ]
-        return self._compiled([part.reshape(-1, self._n_y) for part in parts])
-
-    def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
-        """Evaluate the tip at states z (n, n_z) and design y."""
-        point, turned, J, F, dF = self._state_table(self._variables(z, y))
-        R = turned.reshape(len(z), 3, 3) if self.turns else None
-        return TipEvaluation(point, R, J, F, dF)
-
-    def evaluate_with_design(self, z: Floats, y: Floats) -> TipEvaluation:
-        """The same with derivatives by (q, y, p) instead of (q, p)."""
-        seen = self.evaluate(z, y)
-        place, turning, closing = self._design_table(self._variables(z, y))
-        J = np.zeros((*seen.jacobian.shape[:2], self._n_y))
-        J[:, : self.d] = place
-        if seen.rotation is not None:  # ω per y of Ṙ Rᵀ = [ω]×
-            W = np.einsum("nijy,nkj->nyik", turning.reshape(len(z), 3, 3, -1), seen.rotation)
-            spin = [W[:, :, 2, 1], W[:, :, 0, 2], W[:, :, 1, 0]]
-            J[:, self.d :] = np.stack([spin[k] for k in self.turns], axis=1)
-        after = [len(self.motion.offset)]
-        parted = [np.split(both, after, axis=2) for both in (seen.jacobian, seen.closure)]
-        tip, closure = (
-            np.concatenate([by_q, by_y, by_p], axis=2)
-            for (by_q, by_p), by_y in zip(parted, (J, closing), strict=True)
+        planar = case.mechanism.space == "planar"
+        F = closure_rows(moving, planar)[0] if tree.passive else []
+        arrays = place[: 2 if planar else 3], rotation[: 3 if self.turns else 0].ravel()
+        return compile_arrays(
+            variables.recorder,
+            (*arrays, np.array(F, dtype=object)),
+            variables.count + len(tree.passive),
         )
-        return seen._replace(jacobian=tip, closure=closure)
+
+    def evaluate(self, z: Floats, y: Floats, by_design: bool = False) -> TipEvaluation:
+        """The tip at states z (n, n_z) and design y, with derivatives ``by_design`` behind q."""
+        to_z, n_q, n = self.parameters.to_z, len(self.motion.offset), len(z)
+        columns = [*range(n_q), *(range(n_q + len(self.loads), len(to_z)) if by_design else ())]
+        moves = block_diag(to_z[:, columns], np.eye(z.shape[1] - n_q))
+        variables = np.hstack([self._variables(z, y), np.repeat(moves, n, axis=1)])
+        found = self._table(variables, Tangents(n, moves.shape[1]))
+        place, turned, F = (each.reshape(len(each) // n, n, *each.shape[1:]) for each in found)
+        J, R = place[1:], None
+        if self.turns:
+            R, *turning = turned.reshape(-1, n, 3, 3)
+            W = np.einsum("knij,nlj->ilkn", turning, R)  # Ṙ Rᵀ = [ω]×
+            spin = [(W[2, 1], W[0, 2], W[1, 0])[k] for k in self.turns]
+            J = np.concatenate([J, np.stack(spin, axis=2)], axis=2)
+        jacobian, closure = (np.moveaxis(each, 0, 2) for each in (J, F[1:]))
+        return TipEvaluation(place[0], R, jacobian, F[0], closure)
 
     def _variables(self, z: Floats, y: Floats) -> Floats:
-        """s = A q + b, loads, y and p as rows."""
-        A, b, given = self.motion.relative, self.motion.offset, self.properties(y)
-        n_q = len(b)
-        at = np.empty((z.shape[1] + len(given), len(z)))
-        at[:n_q] = (z[:, :n_q] @ A.T + b).T
-        at[n_q : n_q + len(given)] = given[:, None]
-        at[n_q + len(given) :] = z[:, n_q:].T
-        return at
-
-
-def _per_coordinate(rates: Objects, A: Floats) -> Objects:
-    """Derivatives by (s, p) as derivatives by (q, p), s = A q + b."""
-    n_q = len(A)
-    if np.array_equal(A, np.eye(n_q)):
-        return rates
-    return np.concatenate([multiply(rates[:, :n_q], A), rates[:, n_q:]], axis=1)
-
-
-def _closure(motion: Kinematics, planar: bool, n: int, A: Floats) -> tuple[Objects, Objects]:
-    """F (n_e,) and ∂F/∂(q, p) (n_e, n_z) of loops that passive freedoms close.
-
-    Between the variables of q and of p are those of ``n`` properties.
-    """
-    n_q, n_z = len(A), len(motion.tree.freedoms)
-    if not motion.tree.passive:
-        return np.zeros(0, dtype=object), np.zeros((0, n_z), dtype=object)
-    F, _ = closure_rows(motion, planar)
-    variables = [*range(n_q), *range(n_q + n, n_z + n)]
-    dF = np.array([[derivative(f, k) for k in variables] for f in F], dtype=object)
-    return np.array(F, dtype=object), _per_coordinate(dF, A)
+        """The joint coordinates, loads, y and p as rows."""
+        q, p = np.split(z, [len(self.motion.offset)], axis=1)
+        given = np.broadcast_to(np.append(self.loads, y), (len(z), len(self.loads) + len(y)))
+        return np.concatenate([self.parameters.z(np.hstack([q, given])), p.T])
 
 
 def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:

@@ -34,8 +34,7 @@ from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 def pose(ik: TipProblem, u: Floats) -> str:
     """The coordinates of a state in words."""
-    q = (u * ik.scale)[: ik.n_q]
-    return "q = (" + ", ".join(f"{value:.6g}" for value in q) + ")"
+    return "q = (" + ", ".join(f"{value:.6g}" for value in ik.coordinates(u[None])[0]) + ")"
 
 
 def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
@@ -59,7 +58,7 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
 
 def _bound(ik: TipProblem, course: Course) -> str:
     """A word about tips that have fewer freedoms than the path asks for."""
-    wanted = course.path.coefficients.shape[2] + len(ik.chain.turned_by)
+    wanted = ik.task(course, 0.0).shape[1]
     if ik.rank >= wanted:
         return ""
     return (
@@ -97,12 +96,6 @@ def other_assembly(ik: TipProblem, course: Course) -> TrajectoryError:
     return TrajectoryError(WAYPOINTS, message, 0)
 
 
-def lost_assembly(ik: TipProblem, course: Course, k: int, u: Floats, why: str) -> TrajectoryError:
-    """The model itself cannot follow sample k, for it comes from its own reference."""
-    message = f"{course.label(k)} is reached at {pose(ik, u)}, but {why}"
-    return TrajectoryError(WAYPOINTS, message, k)
-
-
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
@@ -110,10 +103,9 @@ _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which la
 
 @dataclass(frozen=True)
 class Followed:
-    """The coordinates q (n, n_q) in rad or m along a course, and the tip (n, 2 or 3) there."""
+    """The coordinates q (n, n_q) in rad or m along a course."""
 
     q: Floats
-    tip: Floats
     notes: tuple[str, ...]
     problem: TipProblem
     u: Floats  # its states (n, n_q + n_p)
@@ -154,9 +146,7 @@ def follow(
         except TrajectoryError as error:
             failures.append(error)
             continue
-        q = np.ascontiguousarray((u * ik.scale)[:, : ik.n_q])
-        q.setflags(write=False)
-        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates), ik, u, path)
+        return Followed(ik.coordinates(u), _notes(ik, candidates), ik, u, path)
     if not failures:
         raise other_assembly(ik, course)
     raise max(failures, key=lambda error: error.sample)
@@ -206,17 +196,15 @@ def _off(ik: TipProblem, course: Course, u: Floats, tolerance: float) -> Bools:
 
 def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
     """The same with the passive freedoms as the model has them; TrajectoryError if others."""
-    if ik.chain.assembly is None:
-        return u
-    try:
-        own = _own(ik, u)
-    except SingularityError:
-        raise _first_lost(ik, course, u) from None
+    own = _own(ik, u)
     other = _off(ik, course, own, 100.0 * RESIDUAL)
     if other.any():
         k = int(np.argmax(other))
-        why = "on the straight way there the model puts its loops together otherwise"
-        raise lost_assembly(ik, course, k, u[k], f"{why}: choose mechanism.assembly.at nearer")
+        message = (
+            f"{course.label(k)} is reached at {pose(ik, u[k])}, but on the straight way there the "
+            "model puts its loops together otherwise: choose mechanism.assembly.at nearer"
+        )
+        raise TrajectoryError(WAYPOINTS, message, k)
     return own
 
 
@@ -227,18 +215,8 @@ def _own(ik: TipProblem, u: Floats) -> Floats:
     """
     if ik.chain.assembly is None:
         return u
-    q = (u * ik.scale)[:, : ik.n_q]
+    q = ik.coordinates(u)
     return np.hstack([q, ik.chain.assembly.passive(q)]) / ik.scale
-
-
-def _first_lost(ik: TipProblem, course: Course, u: Floats) -> TrajectoryError:
-    """The first sample whose loops the model cannot close."""
-    for k in range(len(u)):
-        try:
-            _own(ik, u[k : k + 1])
-        except SingularityError as error:
-            return lost_assembly(ik, course, k, u[k], str(error))
-    return lost_assembly(ik, course, 0, u[0], "its loops cannot be closed together with the rest")
 
 
 def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryError:
@@ -250,7 +228,7 @@ def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryE
     # a dead point, where two assemblies meet, can be come as near to as 1e-6 of L
     if miss[best] > (1e-6 if dead else RESIDUAL) * ik.lever:
         return out_of_reach(ik, course, k, u[best])
-    where = ", ".join(f"{x:.6g}" for x in course.path.point(path.s[-1])[0])
+    where = ", ".join(f"{x:.6g}" for x in course.path.value(path.s[-1])[0])
     why = (
         "the loops are at a dead point"
         if dead

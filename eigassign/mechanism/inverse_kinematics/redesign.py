@@ -19,13 +19,13 @@ Shapes: n samples, n_q coordinates, n_y design parameters, n_z entries of a stat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, TipTables, reduced
+from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, reduced
 from eigassign.mechanism.inverse_kinematics.follow import (
     RESIDUAL,
     Followed,
@@ -38,12 +38,10 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     ROUND_OFF,
     TipProblem,
     handedness,
-    least_norm,
     levenberg,
     lost,
     newton,
     singular,
-    within,
 )
 from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
@@ -55,13 +53,7 @@ class PathOfDesign:
     course: Course
     problem: TipProblem  # at the initial design y0
     u: Floats  # states (n, n_z) at y0
-
-    @property
-    def design(self) -> TipTables:
-        """The chain as a function of the design; MechanismError where it is not known."""
-        if self.problem.chain.design is None:
-            raise MechanismError("design", "this chain is not known as a function of the design")
-        return self.problem.chain.design
+    loads: Floats = field(default_factory=lambda: np.zeros(0))  # (n_loads,) behind q
 
     def __call__(self, y: Floats) -> tuple[Floats, Floats]:
         """q (n, n_q) in rad or m and dq/dy (n, n_q, n_y) at design y (n_y,), SI.
@@ -73,22 +65,21 @@ class PathOfDesign:
         try:
             u = self.u if np.array_equal(y, self.problem.chain.y) else self.states(y)
         except TrajectoryError as error:
-            values = dict(zip(self.design.names, y.tolist(), strict=True))
+            values = dict(zip(self.problem.chain.y_names, y.tolist(), strict=True))
             design = ", ".join(f"{name} = {values[name]:.6g}" for name in self.moving)
             message = f"with {design}: {error.message}"
             raise TrajectoryError(error.path, message, error.sample) from None
-        n_q = self.problem.n_q
-        q = (u * self.problem.scale)[:, :n_q]
-        slopes = self._slopes(y, u)[:, :n_q] * self.problem.scale[:n_q, None]
-        for array in (q, slopes):
-            array.setflags(write=False)
-        return q, slopes
+        n_q, ik = self.problem.n_q, self.problem_at(y)
+        slopes = _slopes(ik, u)[:, :n_q] * ik.scale[:n_q, None]
+        still = [(0, 0), (0, len(self.loads)), (0, 0)]
+        return behind(ik.coordinates(u), self.loads), np.pad(slopes, still)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """The parameters that move the tip, or what its loops consist of."""
-        moves = np.abs(self._slopes(self.problem.chain.y, self.u)).max(axis=(0, 1)) > 0.0
-        return tuple(name for name, one in zip(self.design.names, moves, strict=True) if one)
+        ik = self.problem_at(self.problem.chain.y)
+        moves = np.abs(_slopes(ik, self.u)).max(axis=(0, 1)) > 0.0
+        return tuple(name for name, one in zip(ik.chain.y_names, moves, strict=True) if one)
 
     @property
     def said(self) -> str:
@@ -108,22 +99,21 @@ class PathOfDesign:
         return np.asarray(np.swapaxes(rows[:, : ik.rank], 1, 2))
 
     def problem_at(self, y: Floats) -> TipProblem:
-        """The problem at another design, in the measure of the first one."""
-        return replace(self.problem, chain=self.design.chain(y))
+        """The problem at a design, in the measure of the first one, and in its directions."""
+        chain = self.problem.chain.redesigned(y)
+        return replace(self.problem, chain=chain, directions=self.directions)
 
     def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""
         y0, target = self.problem.chain.y, self.course.target(self.course.s)
-        u, done, step = self.u, 0.0, 1.0
-        seen = self.problem.evaluate(u)
-        motion = within(reduced(seen, self.problem.n_q), self.directions)
-        sense = handedness(self.problem, seen, motion)
+        u, done, step, ik = self.u, 0.0, 1.0, self.problem_at(y0)
+        sense = handedness(ik, u)
         while done < 1.0:
             ahead = min(1.0, done + step)
+            slopes = _slopes(self.problem_at(y0 + done * (y - y0)), u)
             ik = self.problem_at(y0 + ahead * (y - y0))
-            slopes = self._slopes(y0 + done * (y - y0), u)
             guess = u + (ahead - done) * (slopes @ (y - y0))
-            found = newton(ik, guess, target, ROUND_OFF, self.directions)
+            found = newton(ik, guess, target, ROUND_OFF)
             # a corrector that moves by 0.1 rad, or of L, may have left the branch, as in tracing
             strayed = lost(ik, found, guess, 0.1, sense) | singular(ik, found)
             if not strayed.any():
@@ -154,43 +144,41 @@ class PathOfDesign:
         )
         return TrajectoryError(WAYPOINTS, message, k)
 
-    def _slopes(self, y: Floats, u: Floats) -> Floats:
-        """du/dy (n, n_z, n_y) where the samples are at their points and the loops are closed."""
-        ik, n_q, n_y = self.problem, self.problem.n_q, len(y)
-        motion = reduced(ik.evaluate_with_design(u, self.design, y), n_q + n_y)
-        by_q, by_y = np.split(motion.J, [n_q], axis=2)
-        J = by_q if self.directions is None else by_q @ self.directions
-        change = np.stack([least_norm(J, -by_y[:, :, j], ik.rank) for j in range(n_y)], axis=2)
-        if self.directions is not None:
-            change = self.directions @ change
-        follow_q, follow_y = np.split(motion.following, [n_q], axis=2)
-        return np.concatenate([change, follow_q @ change + follow_y], axis=1)
+
+def behind(values: Floats, loads: Floats) -> Floats:
+    """Loads (n_loads,), or their rates, behind coordinates (n, n_q)."""
+    return np.hstack([values, np.broadcast_to(loads, (len(values), len(loads)))])
+
+
+def _slopes(ik: TipProblem, u: Floats) -> Floats:
+    """du/dy (n, n_z, n_y) where the samples are at their points and the loops are closed."""
+    n_y = len(ik.chain.y)
+    motion = ik.motion(ik.evaluate(u, by_design=True), n_y)
+    both = motion.J, motion.following
+    (by_q, by_y), (follow_q, follow_y) = (np.split(of, [of.shape[2] - n_y], 2) for of in both)
+    change = ik.change(replace(motion, J=by_q, following=follow_q), -by_y)
+    change[:, ik.n_q :] += follow_y
+    return change
 
 
 def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
     """How the solution that was followed along the course changes with the design.
 
-    Raises MechanismError for a parameter that moves the tip away from all that it can reach.
+    Raises MechanismError for a parameter that moves the tip where no coordinate can bring it back.
     """
-    path = PathOfDesign(course, followed.problem, followed.u)
-    _require_within_reach(path)
-    return path
-
-
-def _require_within_reach(path: PathOfDesign) -> None:
-    """Refuse parameters whose effect on the tip no coordinate can undo, by their names."""
-    ik, design = path.problem, path.design
-    n_q, n_y = ik.n_q, len(ik.chain.y)
-    moved = reduced(ik.evaluate_with_design(path.u, design, ik.chain.y), n_q + n_y).J
-    left = moved[:, :, n_q:] + moved[:, :, :n_q] @ path._slopes(ik.chain.y, path.u)[:, :n_q]
+    ik, u = followed.problem, followed.u
+    n_q, chain = ik.n_q, ik.chain
+    J = ik.motion(ik.evaluate(u, by_design=True), len(chain.y)).J
+    left = J[:, :, n_q:] + J[:, :, :n_q] @ _slopes(ik, u)[:, :n_q]
     # what moves the tip is in m or rad, and may be 0: it counts as L or 1 at least
-    size = np.maximum(np.abs(ik.chain.y), min(ik.lever, 1.0))
+    size = np.maximum(np.abs(chain.y), min(ik.lever, 1.0))
     off = np.linalg.norm(left, axis=1).max(axis=0) * size
-    for name, length in zip(design.names, off, strict=True):
+    for name, length in zip(chain.y_names, off, strict=True):
         # 1e-6 of L, per relative change of the parameter, is round-off
         if length > 1e-6 * ik.lever:
             raise MechanismError(
                 f"design.{name}.parameter",
                 f"moves the tip where no coordinate can bring it back: they move {ik.rank} of "
-                f"{moved.shape[1]} components of the path. Give samples of the coordinates instead",
+                f"{J.shape[1]} components of the path. Give samples of the coordinates instead",
             )
+    return PathOfDesign(course, ik, u)

@@ -16,10 +16,12 @@ state, m task components.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import (
@@ -28,7 +30,6 @@ from eigassign.mechanism.inverse_kinematics.chain import (
     Reduced,
     TipChain,
     TipEvaluation,
-    TipTables,
     reduced,
 )
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
@@ -52,23 +53,50 @@ class TipProblem:
     scale: Floats  # c (n_q + n_p,) in rad or m
     lever: float  # L in m
     rank: int  # of J, in general position
+    directions: Floats | None = None  # V (n, n_q, rank), in which alone n states move; None: in all
 
     @property
     def n_q(self) -> int:
         """Number of coordinates."""
         return self.chain.n_q
 
-    def evaluate(self, u: Floats) -> TipEvaluation:
-        """The chain's evaluation with metres and radians in one measure."""
-        return self._measured(self.chain.evaluate(u * self.scale), self.scale)
+    def coordinates(self, u: Floats) -> Floats:
+        """q (n, n_q) in rad or m, or rates of it."""
+        return np.ascontiguousarray((u * self.scale)[:, : self.n_q])
 
-    def evaluate_with_design(self, u: Floats, design: TipTables, y: Floats) -> TipEvaluation:
-        """The same at design y, with its columns, per unit of y, after those of q."""
-        scale = np.insert(self.scale, self.n_q, np.ones(len(y)))
-        return self._measured(design.evaluate_with_design(u * self.scale, y), scale)
+    def task(self, course: Course, s: ArrayLike, order: int = 1) -> Floats:
+        """dp/ds or d²p/ds² (n, m): the point in m, the turning times the lever."""
+        velocity, spin = course.rates(s, order)
+        return np.hstack([velocity, self.lever * spin[:, list(self.chain.turned_by)]])
 
-    def _measured(self, seen: TipEvaluation, scale: Floats) -> TipEvaluation:
-        chain, J, r = self.chain, seen.jacobian * scale, len(self.chain.turned_by)
+    def moved(self, u: Floats, task: Floats) -> Floats:
+        """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
+        return self.change(self.motion(self.evaluate(u)), task[:, :, None])[:, :, 0]
+
+    def motion(self, seen: TipEvaluation, n_more: int = 0) -> Reduced:
+        """`reduced`, with J V (n, m, rank) in place of J by coordinates; ``n_more`` are behind."""
+        found, V = reduced(seen, self.n_q + n_more), self.directions
+        if V is None:
+            return found
+        by_q, more = np.split(found.J, [self.n_q], axis=2)
+        return replace(found, J=np.concatenate([by_q @ V, more], axis=2))
+
+    def change(self, motion: Reduced, task: Floats) -> Floats:
+        """The changes (n, n_z, k) of states that move the tip by tasks (n, m, k), loops closed."""
+        own = least_norm(motion.J, task, self.rank)
+        own = own if self.directions is None else self.directions @ own
+        return np.concatenate([own, motion.following @ own], axis=1)
+
+    def evaluate(self, u: Floats, by_design: bool = False) -> TipEvaluation:
+        """The chain's evaluation with metres and radians in one measure.
+
+        Derivatives ``by_design``, per unit of y, are after those by q.
+        """
+        chain, scale, z = self.chain, self.scale, u * self.scale
+        seen = chain.evaluate(z, by_design=True) if by_design else chain.evaluate(z)
+        if by_design:
+            scale = np.insert(scale, self.n_q, np.ones(len(chain.y)))
+        J, r = seen.jacobian * scale, len(chain.turned_by)
         if r:
             J[:, -r:] *= self.lever
         if chain.assembly is None:
@@ -288,40 +316,25 @@ class Corrected(NamedTuple):
     settled: Bools
 
 
-def newton(
-    ik: TipProblem,
-    u: Floats,
-    target: TipTarget,
-    tolerance: float,
-    directions: Floats | None = None,
-) -> Corrected:
+def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Corrected:
     """Newton for tip(u) = target with closed loops.
 
-    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point. With
-    ``directions`` V (n, n_q, rank) the coordinates move in these only, and J returned is J V.
+    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
     """
     for _ in range(8 if ik.rank == target.point.shape[1] + len(ik.chain.turned_by) else 40):
         seen = ik.evaluate(u)
-        motion = within(reduced(seen, ik.n_q), directions)
+        motion = ik.motion(seen)
         error = ik.error(seen, target) - motion.drift
         settled = _settled(ik, error, motion, tolerance)
         if settled.all():
             break
-        step = least_norm(motion.J, error, ik.rank)
-        if directions is not None:
-            step = np.einsum("nqr,nr->nq", directions, step)
-        passive = motion.closing + np.einsum("npq,nq->np", motion.following, step)
-        step = np.hstack([step, passive])
+        step = ik.change(motion, error[:, :, None])[:, :, 0]
+        step[:, ik.n_q :] += motion.closing
         settled |= np.abs(step).max(axis=1) <= tolerance
         if settled.all():
             break
         u = u + np.clip(step, -1.0, 1.0)
     return Corrected(u, seen, motion, settled)
-
-
-def within(motion: Reduced, directions: Floats | None) -> Reduced:
-    """The motion with J V (n, m, rank) in place of J: coordinates move in directions V only."""
-    return motion if directions is None else replace(motion, J=motion.J @ directions)
 
 
 def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -> Bools:
@@ -333,42 +346,34 @@ def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -
     )
 
 
-def least_norm(J: Floats, error: Floats, rank: int) -> Floats:
-    """J⁺ e (n, n_q) for J (n, m, n_q) and e (n, m): least error first, least norm second."""
+def least_norm(J: Floats, tasks: Floats, rank: int) -> Floats:
+    """J⁺ e (n, n_q, k) for J (n, m, n_q) and e (n, m, k): least error first, least norm second."""
     m, n_q = J.shape[1:]
-    Jt, e = np.swapaxes(J, 1, 2), error[:, :, None]
-    try:
+    Jt = np.swapaxes(J, 1, 2)
+    with suppress(np.linalg.LinAlgError):  # exactly singular somewhere
         if rank == m == n_q:
-            step = np.linalg.solve(J, e)
-        elif rank == m:
-            step = Jt @ np.linalg.solve(J @ Jt, e)
-        elif rank == n_q:
-            step = np.linalg.solve(Jt @ J, Jt @ e)
-        else:
-            step = np.linalg.pinv(J, rcond=1e-9) @ e
-    except np.linalg.LinAlgError:  # exactly singular somewhere
-        step = np.linalg.pinv(J, rcond=1e-9) @ e
-    return np.asarray(step[:, :, 0])
+            return np.asarray(np.linalg.solve(J, tasks))
+        if rank == m:
+            return np.asarray(Jt @ np.linalg.solve(J @ Jt, tasks))
+        if rank == n_q:
+            return np.asarray(np.linalg.solve(Jt @ J, Jt @ tasks))
+    return np.asarray(np.linalg.pinv(J, rcond=1e-9) @ tasks)
 
 
-def moved(motion: Reduced, task: Floats, rank: int) -> Floats:
-    """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
-    own = least_norm(motion.J, task, rank)
-    return np.hstack([own, np.einsum("npq,nq->np", motion.following, own)])
-
-
-def handedness(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
+def handedness(ik: TipProblem, u: Floats) -> Floats:
     """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
 
     0 for what is not square.
     """
-    m, n_q = motion.J.shape[1:]
-    F_p = seen.closure[:, :, n_q:]
-    signs = np.zeros((len(motion.J), 2))
-    if ik.rank == m == n_q:
-        signs[:, 0] = np.sign(np.linalg.det(motion.J))
-    if F_p.shape[2] and F_p.shape[1] == F_p.shape[2]:
-        signs[:, 1] = np.sign(np.linalg.det(F_p))
+    seen = ik.evaluate(u)
+    return _signs(ik, seen, ik.motion(seen))
+
+
+def _signs(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
+    F_p, signs = seen.closure[:, :, ik.n_q :], np.zeros((len(motion.J), 2))
+    for k, square in enumerate((motion.J, F_p)):
+        if square.shape[2] and square.shape[1] == square.shape[2]:
+            signs[:, k] = np.sign(np.linalg.det(square))
     return signs
 
 
@@ -407,10 +412,9 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
     It steps onto every corner of the path, lest it cuts one that is out of reach.
     """
     stops = np.append(course.corners(), course.s[-1])
-    seen = ik.evaluate(u0[None])
-    motion = reduced(seen, ik.n_q)
-    sense = handedness(ik, seen, motion)[0]
-    s, u, slope = [float(course.s[0])], [u0], [_slope(ik, course, float(course.s[0]), motion)]
+    sense = handedness(ik, u0[None])[0]
+    s, u = [float(course.s[0])], [u0]
+    slope = [ik.moved(u0[None], ik.task(course, s[0]))[0]]
     advance, bend = _MAX_ADVANCE, np.zeros_like(u0)
     # below 1e-8 of the path the joints turn faster and faster without advancing
     while s[-1] < stops[-1] and advance >= 1e-8:
@@ -425,7 +429,7 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
             advance = 0.5 * min(advance, stop - s[-1])
             continue
         s, u = [*s, there], [*u, found.u[0]]
-        slope.append(_slope(ik, course, there, found.motion))
+        slope.append(ik.moved(found.u, ik.task(course, there))[0])
         bend = 0.5 * (slope[-1] - slope[-2]) / step * (there < stop)
         advance = min(2.0 * advance, _MAX_ADVANCE)
     return Trace(np.array(s), np.array(u), np.array(slope), sense)
@@ -435,7 +439,7 @@ def lost(ik: TipProblem, found: Corrected, guess: Floats, most: float, sense: Fl
     """True where a corrector did not settle or moved by over ``most`` from its guess, or where a
     branch other than that of ``sense`` has been met, (n,).
     """
-    crossed = (handedness(ik, found.seen, found.motion) * sense < 0.0).any(axis=1)
+    crossed = (_signs(ik, found.seen, found.motion) * sense < 0.0).any(axis=1)
     return np.asarray(~found.settled | (np.abs(found.u - guess).max(axis=1) > most) | crossed)
 
 
@@ -443,13 +447,6 @@ def singular(ik: TipProblem, found: Corrected) -> Bools:
     """True where the chain is stretched or folded, or its loops at a dead point, (n,)."""
     regularity = np.linalg.svd(found.motion.J, compute_uv=False)[:, ik.rank - 1] / ik.lever
     return np.asarray((regularity < _SINGULAR) | (loop_regularity(ik, found.seen) < DEAD))
-
-
-def _slope(ik: TipProblem, course: Course, s: float, motion: Reduced) -> Floats:
-    """du/ds (n_z,) along the path at parameter s."""
-    velocity, spin = course.rates(s)
-    spin = ik.lever * spin[:, list(ik.chain.turned_by)]
-    return np.asarray(moved(motion, np.hstack([velocity, spin]), ik.rank)[0])
 
 
 def interpolated(path: Trace, s: Floats) -> Floats:

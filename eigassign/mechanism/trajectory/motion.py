@@ -10,34 +10,29 @@ Point to point, q(t) runs between joint coordinates, each segment by the same ti
     path of a tip    u̇ = W(u) ṗ,   ü = (∂W/∂u · u̇) ṗ + W(u) p̈,   p(t) = path(s(t/T))
 
 u holds the coordinates and the passive freedoms of loops, p the position and the turning of the
-tip; W(u) = J⁺ closes the loops and takes the least motion where there is a choice. ∂W/∂u · u̇ is
-its derivative along u̇, by differences of fourth order in u, in which W is analytic.
+tip; W(u) = J⁺ closes the loops and takes the least motion where there is a choice.
 
 Shapes: n times, m points, n_q coordinates, n_z entries of a state u. SI units, angles in rad.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import polynomial
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from eigassign.case.table import CsvColumn, CsvTable, read_table
+from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
-from eigassign.mechanism.inverse_kinematics.chain import reduced
 from eigassign.mechanism.inverse_kinematics.follow import Followed, at_parameters
-from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign
-from eigassign.mechanism.inverse_kinematics.solver import TipProblem, moved
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, smooth
+from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign, behind
+from eigassign.mechanism.inverse_kinematics.solver import TipProblem
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, Curve, through
 
 Floats = NDArray[np.float64]
 _KEY = "trajectory.file"
@@ -46,22 +41,12 @@ TIP_COLUMNS = ("tip x", "tip y", "tip z")
 _KINDS = {"rad": "angle", "m": "length"}
 
 
-@dataclass(frozen=True)
-class SampleTable:
-    """Samples as a file gives them, in SI units."""
+class SampleTable(NamedTuple):
+    """Samples as a file gives them, in SI units, with notes on what was ignored."""
 
-    time_s: Floats  # (n,)
+    time_s: Floats  # (n,) strictly increasing
     q: Floats  # (n, n_q) in rad or m
-    table: CsvTable
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes on what was ignored."""
-        return self.table.notes
-
-    def where(self, k: int) -> str:
-        """``file:line`` of sample k."""
-        return self.table.where(k)
+    notes: tuple[str, ...]
 
 
 def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
@@ -79,7 +64,8 @@ def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()
     ``q_units`` are those of the coordinates, "rad" or "m"; all rad if empty.
 
     Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
-    TrajectoryError for a line that does not hold one finite number a column; both name the line.
+    TrajectoryError for a line that does not hold one finite number a column, or goes back in time;
+    both name the line.
     """
     columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
     table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
@@ -87,79 +73,44 @@ def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()
         message = f"{file.name}: {len(table.lines)} samples; at least two are needed"
         raise MechanismError(_KEY, message)
     values = np.column_stack([table.numbers[column.name] for column in columns])
-    return SampleTable(values[:, 0].copy(), np.ascontiguousarray(values[:, 1:]), table)
+    time_s = values[:, 0].copy()
+    for k in np.flatnonzero(np.diff(time_s) <= 0.0).tolist():
+        before, after = time_s[k : k + 2]
+        message = f"time must increase, and goes from {before:g} s to {after:g} s"
+        raise TrajectoryError(_KEY, f"{table.where(k + 1)}: {message}", k + 1)
+    return SampleTable(time_s, np.ascontiguousarray(values[:, 1:]), table.notes)
 
 
-@dataclass(frozen=True)
-class TimingLaw:
-    """Polynomials s(τ) = Σ c_k (τ − τ_i)^k on τ_i ≤ τ ≤ τ_{i+1}, from s(0) = 0 to s(1) = 1.
+# --- timing laws s(τ) on 0 ≤ τ ≤ 1
 
-    Defined on 0 ≤ τ ≤ 1 only; ``ends`` are the τ_{i+1} of all pieces but the last.
-    """
-
-    name: str
-    pieces: tuple[tuple[float, ...], ...]  # c_0, c_1, ... of each
-    ends: tuple[float, ...] = ()
-
-    def position(self, tau: ArrayLike) -> Floats:
-        """s(τ), dimensionless, same shape as ``tau``; UsageError outside [0, 1]."""
-        return self._derivative(0, tau)
-
-    def velocity(self, tau: ArrayLike) -> Floats:
-        """ds/dτ, dimensionless (divide by the duration for 1/s); UsageError outside [0, 1]."""
-        return self._derivative(1, tau)
-
-    def acceleration(self, tau: ArrayLike) -> Floats:
-        """d²s/dτ² (divide by the duration squared for 1/s²), from the right where it jumps."""
-        return self._derivative(2, tau)
-
-    def _derivative(self, order: int, tau: ArrayLike) -> Floats:
-        relative_time = np.asarray(tau, dtype=np.float64)
-        if not np.all((relative_time >= 0.0) & (relative_time <= 1.0)):
-            raise UsageError(f"the {self.name} timing law is defined for 0 <= tau <= 1 only")
-        value = np.zeros_like(relative_time)
-        for start, piece in zip((0.0, *self.ends), self.pieces, strict=True):
-            own = polynomial.polyval(relative_time - start, polynomial.polyder(piece, order))
-            value = np.where(relative_time >= start, own, value)
-        return value
+_POLYNOMIALS = {
+    "linear": (0.0, 1.0),
+    "cubic": (0.0, 0.0, 3.0, -2.0),
+    "quintic": (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
+}
 
 
-POLYNOMIALS: Mapping[str, TimingLaw] = MappingProxyType(
-    {
-        "linear": TimingLaw("linear", ((0.0, 1.0),)),
-        "cubic": TimingLaw("cubic", ((0.0, 0.0, 3.0, -2.0),)),
-        "quintic": TimingLaw("quintic", ((0.0, 0.0, 0.0, 10.0, -15.0, 6.0),)),
-    }
-)
-
-
-def trapezoidal(share: float) -> TimingLaw:
-    """Constant acceleration for the ``share`` a of the time, constant velocity, and braking for a.
-
-    s = v τ²/(2a), then v (τ − a/2), then 1 − v (1 − τ)²/(2a), at the peak velocity v = 1/(1 − a).
-    UsageError unless 0 < a ≤ 1/2.
-    """
-    if not 0.0 < share <= 0.5:
-        raise UsageError(f"the share of time spent accelerating must be in (0, 0.5], got {share:g}")
-    v, a = 1.0 / (1.0 - share), share
-    ramp = 0.5 * v * a  # covered while accelerating, and while braking
-    pieces = ((0.0, 0.0, 0.5 * v / a), (ramp, v), (1.0 - ramp, v, -0.5 * v / a))
-    return TimingLaw("trapezoidal", pieces, (a, 1.0 - a))
-
-
-def timing_law(name: str, acceleration_share: float = 1.0 / 3.0) -> TimingLaw:
+def timing_law(name: str, acceleration_share: float = 1.0 / 3.0) -> Curve:
     """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
-    trapezoidal with the share of its time that it accelerates.
+    trapezoidal, which accelerates for the share a of its time, and brakes for a:
+
+        s = v τ²/(2a), then v (τ − a/2), then 1 − v (1 − τ)²/(2a), at the peak v = 1/(1 − a).
 
     All but linear start and stop at rest, quintic also without acceleration. UsageError for other
-    names.
+    names, and unless 0 < a ≤ 1/2.
     """
-    if name == "trapezoidal":
-        return trapezoidal(acceleration_share)
-    if name not in POLYNOMIALS:
-        known = ", ".join((*POLYNOMIALS, "trapezoidal"))
+    if name in _POLYNOMIALS:
+        return Curve(np.array([0.0, 1.0]), np.array(_POLYNOMIALS[name])[:, None, None])
+    if name != "trapezoidal":
+        known = ", ".join((*_POLYNOMIALS, "trapezoidal"))
         raise UsageError(f"unknown timing law {name!r}; there are {known}")
-    return POLYNOMIALS[name]
+    a = acceleration_share
+    if not 0.0 < a <= 0.5:
+        raise UsageError(f"the share of time spent accelerating must be in (0, 0.5], got {a:g}")
+    v = 1.0 / (1.0 - a)
+    ramp = 0.5 * v * a  # covered while accelerating, and while braking
+    pieces = np.array([[0.0, ramp, 1.0 - ramp], [0.0, v, v], [0.5 * v / a, 0.0, -0.5 * v / a]])
+    return Curve(np.array([0.0, a, 1.0 - a, 1.0]), pieces[..., None])
 
 
 # --- point to point
@@ -183,7 +134,6 @@ def shared_times(points: Floats, duration: float) -> Floats:
 OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
 SOLUTIONS = 400  # between which the spline is off the path by some 1e-9 of its length
-_STEP = 1e-3  # of u: differences of fourth order err by its fourth power, round-off is 1e-13
 
 
 class Moving(NamedTuple):
@@ -194,17 +144,17 @@ class Moving(NamedTuple):
     acceleration: Floats
 
 
+@dataclass(frozen=True, eq=False)
 class Motion:
-    """q(t) of given coordinates, the same for every design; `TipMotion` and `Loaded` differ."""
+    """q(t) as a curve, the same for every design; `TipMotion` differs."""
 
-    @property
-    def breaks_s(self) -> Floats:
-        """Times inside it at which q̇ or q̈ jumps, (k,) ascending."""
-        raise NotImplementedError
+    curve: Curve  # of q (n_q,) in rad or m over the time in s
+    breaks_s: Floats  # times inside it at which q̇ or q̈ jumps, (k,) ascending
 
-    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
+    def moving(self, time_s: Floats, _y: Floats | None = None) -> Moving:
         """At times (n,) within the motion and a design y (n_y,), the initial one if None."""
-        raise NotImplementedError
+        time_s = np.clip(time_s, *self.curve.knots[[0, -1]])
+        return Moving(*(self.curve.value(time_s, order) for order in range(3)))
 
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone."""
@@ -218,96 +168,59 @@ class Motion:
         """How q at times (n,) follows the design; None where it does not."""
         return None
 
+    def joined(self, loads: Floats) -> Motion | TipMotion:
+        """With ``loads`` (n_loads,), which neither time nor design change, behind q."""
+        c = np.pad(self.curve.coefficients, [(0, 0), (0, 0), (0, len(loads))])
+        c[0, :, c.shape[2] - len(loads) :] = loads
+        return Motion(Curve(self.curve.knots, c), self.breaks_s)
 
-# --- points, and samples
 
-
-@dataclass(frozen=True, eq=False)
-class PointMotion(Motion):
+def point_motion(points: Floats, reached_s: Floats, law: Curve) -> Motion:
     """From point to point (m, n_q), reached at these times, each move by the same timing law."""
-
-    points: Floats
-    reached_s: Floats
-    law: TimingLaw
-
-    @property
-    def breaks_s(self) -> Floats:
-        """Where the law's own pieces meet, and the points between."""
-        ends = np.array([0.0, *self.law.ends])
-        times = self.reached_s[:-1, None] + np.diff(self.reached_s)[:, None] * ends
-        return np.asarray(times.ravel()[1:])
-
-    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
-        """q, q̇ and q̈ at times (n,), the same for every design."""
-        k = np.searchsorted(self.reached_s, time_s, side="right") - 1
-        k = np.clip(k, 0, len(self.points) - 2)
-        took = np.diff(self.reached_s)[k]
-        tau = np.clip((time_s - self.reached_s[k]) / took, 0.0, 1.0)
-        way = (self.points[k + 1] - self.points[k]) / took[:, None]
-        s, rate, push = (
-            each[:, None]
-            for each in (self.law.position(tau), self.law.velocity(tau), self.law.acceleration(tau))
-        )
-        # this form gives both ends exactly
-        q = (1.0 - s) * self.points[k] + s * self.points[k + 1]
-        return Moving(q, rate * way, push * way / took[:, None])
+    took, c = np.diff(reached_s)[:, None], law.coefficients
+    knots = (reached_s[:-1, None] + took * law.knots[:-1]).ravel()
+    shares = c[:, None, :, 0] / took ** np.arange(len(c))[:, None, None]
+    moves = np.diff(points, axis=0)
+    pieces = shares.reshape(len(c), -1, 1) * np.repeat(moves, c.shape[1], axis=0)
+    pieces[0] += np.repeat(points[:-1], c.shape[1], axis=0)
+    return Motion(Curve(np.append(knots, reached_s[-1]), pieces), knots[1:])
 
 
-@dataclass(frozen=True, eq=False)
-class SampledMotion(Motion):
-    """The cubic spline through samples q (n, n_q), one for each part between known corners."""
+def sampled_motion(time_s: Floats, q: Floats, corners_s: Sequence[float] | Floats = ()) -> Motion:
+    """The cubic spline through samples q (n, n_q), one for each part between corners on samples.
 
-    time_s: Floats
-    q: Floats
-    corners_s: tuple[float, ...] = ()
-
-    @property
-    def breaks_s(self) -> Floats:
-        """The corners."""
-        return np.array(self.corners_s)
-
-    @cached_property
-    def parts(self) -> list[tuple[float, float, TipPath]]:
-        """From when to when, and the spline over its share of that."""
-        cuts = [self.time_s[0], *self.corners_s, self.time_s[-1]]
-        near, found = BESIDE * float(np.ptp(self.time_s)), []
-        for start, end in pairwise(cuts):
-            own = (self.time_s >= start - near) & (self.time_s <= end + near)
-            if own.sum() > 1:
-                times = self.time_s[own]
-                share = (times - times[0]) / (times[-1] - times[0])
-                found.append((float(times[0]), float(times[-1]), smooth(share, self.q[own])))
-        return found
-
-    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
-        """q, q̇ and q̈ at times (n,), the same for every design; a lone sample is at rest."""
-        shape = len(time_s), self.q.shape[1]
-        q, rate, push = np.broadcast_to(self.q[0], shape).copy(), np.zeros(shape), np.zeros(shape)
-        starts = [start for start, _, _ in self.parts]
-        for k, (start, end, spline) in enumerate(self.parts):
-            last = np.inf if k + 1 == len(starts) else starts[k + 1]
-            own = (time_s < last) & ((time_s >= start) | (k == 0))
-            took = end - start
-            share = np.clip((time_s[own] - start) / took, 0.0, 1.0)
-            q[own], rate[own] = spline.point(share), spline.derivative(share) / took
-            push[own] = spline.derivative(share, 2) / took**2
-        # what q rounded to 1e-16 leaves of second differences where the velocity does not change
-        step = np.diff(self.time_s).min(initial=np.inf)
-        push[np.abs(push) <= 4e-15 * np.abs(self.q).max(axis=0) / step**2] = 0.0
-        return Moving(q, rate, push)
+    A lone sample is at rest.
+    """
+    if len(time_s) == 1:
+        return Motion(Curve(time_s + np.arange(2.0), q[None].copy()), np.zeros(0))
+    near = BESIDE * float(np.ptp(time_s))
+    cuts = [0, *(np.searchsorted(time_s, np.array(corners_s) - near)), len(time_s) - 1]
+    parts = [
+        through(time_s[a : b + 1], q[a : b + 1], "spline").coefficients for a, b in pairwise(cuts)
+    ]
+    c = np.concatenate(parts, axis=1)
+    # what q rounded to 1e-16 leaves of second differences where the velocity does not change
+    step, size = np.diff(time_s)[:, None], 4e-15 * np.abs(q).max(axis=0)
+    least = size / step.min() ** 2
+    c[2:][:, np.maximum(2.0 * np.abs(c[2]), np.abs(2.0 * c[2] + 6.0 * c[3] * step)) <= least] = 0.0
+    return Motion(Curve(time_s, c), np.array(corners_s))
 
 
 # --- along a path of the tip
 
 
 @dataclass(frozen=True, eq=False)
-class TipMotion(Motion):
-    """The motion of a tip along its path, as it was followed, by a timing law over its duration."""
+class TipMotion:
+    """The motion of a tip along its path, as it was followed, by a timing law over its duration.
+
+    With ``loads`` (n_loads,), which neither time nor design change, behind q.
+    """
 
     followed: Followed
     course: Course  # with the samples of the trajectory
-    law: TimingLaw
+    law: Curve
     follows_design: bool
+    loads: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def duration_s(self) -> float:
@@ -317,41 +230,42 @@ class TipMotion(Motion):
     @property
     def breaks_s(self) -> Floats:
         """Where the path or the law has a corner, or a jump of its curvature."""
-        s = self.course.corners()
-        of_path = np.array([self.when(each) for each in s]) * self.duration_s
-        return np.union1d(of_path, np.array(self.law.ends) * self.duration_s)
+        of_path = [self.when(each) for each in self.course.corners()]
+        return np.asarray(np.union1d(of_path, self.law.knots[1:-1]) * self.duration_s)
 
     def when(self, s: float) -> float:
         """τ at which the law has come to s, by bisection; s(τ) does not fall."""
         low, high = 0.0, 1.0
         for _ in range(60):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.law.position(middle) < s else (low, middle)
+            low, high = (middle, high) if self.law.value(middle)[0, 0] < s else (low, middle)
         return high
 
     def course_at(self, time_s: Floats) -> Course:
         """The course with other instants (n,)."""
         tau = np.clip(time_s / self.duration_s, 0.0, 1.0)
-        s = np.clip(self.law.position(tau), 0.0, 1.0)
+        s = np.clip(self.law.value(tau)[:, 0], 0.0, 1.0)
         return replace(self.course, s=s, time_s=time_s)
 
     def tip(self, time_s: Floats) -> Floats:
-        """On the path."""
-        course = self.course_at(time_s)
-        return self.followed.problem.evaluate(at_parameters(self.followed, course)).point
+        """Where the tip is at the initial design, (n, 2 or 3) in m."""
+        u = at_parameters(self.followed, self.course_at(time_s))
+        return self.followed.problem.evaluate(u).point
 
     def of_design(self, time_s: Floats) -> PathOfDesign | None:
         """How q at times (n,) follows the design, where that moves the tip."""
-        if not self.follows_design:
-            return None
-        course = self.course_at(time_s)
-        return PathOfDesign(course, self.followed.problem, at_parameters(self.followed, course))
+        return self._path(self.course_at(time_s)) if self.follows_design else None
+
+    def joined(self, loads: Floats) -> TipMotion:
+        """With ``loads`` (n_loads,) behind q."""
+        return replace(self, loads=loads)
 
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone."""
         if self.has_choice:
             return self.moving(time_s, y).q
-        return self._states(time_s, y)[1]
+        ik, u = self._states(self.course_at(time_s), y)
+        return behind(ik.coordinates(u), self.loads)
 
     def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
         """q, q̇ and q̈ at times (n,) and design y (n_y,), the initial one if None.
@@ -359,102 +273,39 @@ class TipMotion(Motion):
         Where the tip leaves a choice they are those of the spline, in s, through `SOLUTIONS` poses.
         Raises TrajectoryError where the tip cannot follow its path with that design.
         """
-        ds, dds, course = *self._speed(time_s), self.course_at(time_s)
+        course, T = self.course_at(time_s), self.duration_s
+        tau = np.clip(time_s / T, 0.0, 1.0)
+        ds, dds = self.law.value(tau, 1) / T, self.law.value(tau, 2) / T**2
         if self.has_choice:
-            s = np.union1d(np.linspace(0.0, 1.0, SOLUTIONS), self.course.corners())
-            q = self._states(s, y, replace(self.course, s=s, time_s=s))[1]
-            found = SampledMotion(s, q, tuple(self.course.corners())).moving(course.s)
-            push = found.acceleration * ds**2 + found.rate * dds
-            return Moving(found.q, found.rate * ds, push)
-        ik, q, u = self._states(time_s, y)
-        rates = self._rates(ik, course, u, ds, dds)
-        return Moving(q, *(np.array((each * ik.scale)[:, : ik.n_q]) for each in rates))
+            corners = self.course.corners()
+            s = np.union1d(np.linspace(0.0, 1.0, SOLUTIONS), corners)
+            ik, u = self._states(replace(self.course, s=s, time_s=s), y)
+            q, first, second = sampled_motion(s, ik.coordinates(u), corners).moving(course.s)
+            rate, push = first * ds, second * ds**2 + first * dds
+        else:
+            ik, u = self._states(course, y)
+            first, second = (ik.task(course, course.s, order) for order in (1, 2))
+            task, push = first * ds, second * ds**2 + first * dds
+            u_rate = ik.moved(u, task)
+            # W is analytic: a rate along the imaginary axis gives its derivative exactly
+            turning = ik.moved(u + 1e-20j * u_rate, task).imag * 1e20
+            u_push = turning + ik.moved(u, push)
+            q, rate, push = (ik.coordinates(each) for each in (u, u_rate, u_push))
+        still = np.zeros_like(self.loads)
+        return Moving(behind(q, self.loads), behind(rate, still), behind(push, still))
 
     @property
     def has_choice(self) -> bool:
         """True where the tip fixes fewer directions than there are coordinates."""
         return self.followed.problem.rank < self.followed.problem.n_q
 
-    def _states(
-        self, time_s: Floats, y: Floats | None, course: Course | None = None
-    ) -> tuple[TipProblem, Floats, Floats]:
-        """The problem at design y, q (n, n_q) and the states u (n, n_z), at times or a course."""
-        course = self.course_at(time_s) if course is None else course
-        u, ik = at_parameters(self.followed, course), self.followed.problem
-        if y is not None and self.follows_design:
-            path = PathOfDesign(course, ik, u)
-            u, ik = path.states(y), path.problem_at(y)
-        return ik, np.array((u * ik.scale)[:, : ik.n_q]), u
+    def _path(self, course: Course) -> PathOfDesign:
+        u = at_parameters(self.followed, course)
+        return PathOfDesign(course, self.followed.problem, u, self.loads)
 
-    def _speed(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """ṡ and s̈ (n, 1), in 1/s and 1/s²."""
-        tau, T = np.clip(time_s / self.duration_s, 0.0, 1.0), self.duration_s
-        return self.law.velocity(tau)[:, None] / T, self.law.acceleration(tau)[:, None] / T**2
-
-    def _rates(
-        self, ik: TipProblem, course: Course, u: Floats, ds: Floats, dds: Floats
-    ) -> tuple[Floats, Floats]:
-        """u̇ and ü (n, n_z); see the module."""
-        first, second = self._task(ik, course, 1), self._task(ik, course, 2)
-        rate, push = first * ds, second * ds**2 + first * dds
-
-        def along(state: Floats, task: Floats) -> Floats:
-            return moved(reduced(ik.evaluate(state), ik.n_q), task, ik.rank)
-
-        u_rate = along(u, rate)
-        size = np.abs(u_rate).max(axis=1, initial=0.0, keepdims=True)
-        h = _STEP / np.where(size > 0.0, size, 1.0)
-        at = {k: along(u + k * h * u_rate, rate) for k in (-2, -1, 1, 2)}
-        turning = (8.0 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12.0 * h)
-        return u_rate, turning + along(u, push)
-
-    def _task(self, ik: TipProblem, course: Course, order: Literal[1, 2]) -> Floats:
-        """dp/ds or d²p/ds² (n, m): the point in m, the turning times the lever."""
-        velocity, spin = course.rates(course.s, order)
-        return np.hstack([velocity, ik.lever * spin[:, list(ik.chain.turned_by)]])
-
-
-# --- with more behind q
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded(Motion):
-    """A motion with ``loads`` (n_loads,), which neither time nor design change, behind q."""
-
-    motion: Motion
-    loads: Floats
-
-    @property
-    def breaks_s(self) -> Floats:
-        """Those of the motion."""
-        return self.motion.breaks_s
-
-    def behind(self, q: Floats) -> Floats:
-        """The loads behind coordinates q (n, n_q)."""
-        return np.hstack([q, np.broadcast_to(self.loads, (len(q), len(self.loads)))])
-
-    def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
-        """q (n, n_q) alone, with the loads."""
-        return self.behind(self.motion.poses(time_s, y))
-
-    def tip(self, time_s: Floats) -> Floats | None:
-        """That of the motion."""
-        return self.motion.tip(time_s)
-
-    def of_design(self, time_s: Floats) -> OfDesign | None:
-        """With slopes of the loads, which are 0."""
-        own = self.motion.of_design(time_s)
-        if own is None:
-            return None
-
-        def loaded(y: Floats) -> tuple[Floats, Floats]:
-            q, slopes = own(y)
-            return self.behind(q), np.pad(slopes, [(0, 0), (0, len(self.loads)), (0, 0)])
-
-        return loaded
-
-    def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
-        """q with the loads behind, which do not move."""
-        q, *rates = self.motion.moving(time_s, y)
-        still = [(0, 0), (0, len(self.loads))]
-        return Moving(self.behind(q), *(np.pad(each, still) for each in rates))
+    def _states(self, course: Course, y: Floats | None) -> tuple[TipProblem, Floats]:
+        """The problem at design y, and the states u (n, n_z) along a course."""
+        path = self._path(course)
+        if y is None or not self.follows_design:
+            return path.problem, path.u
+        return path.problem_at(y), path.states(y)

@@ -32,29 +32,24 @@ from eigassign.case.schema.trajectory import (
 from eigassign.errors import TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import follow
-from eigassign.mechanism.inverse_kinematics.redesign import path_of_design
+from eigassign.mechanism.inverse_kinematics.redesign import behind, path_of_design
 from eigassign.mechanism.inverse_kinematics.tip_path import (
     Course,
-    TipPath,
     planar_attitude,
     spatial_attitude,
-    spline,
-    straight,
+    tip_path,
 )
 from eigassign.mechanism.trajectory.motion import (
     BESIDE,
-    Loaded,
     Motion,
     OfDesign,
-    PointMotion,
-    SampledMotion,
     TipMotion,
+    point_motion,
     read_samples,
+    sampled_motion,
     shared_times,
     timing_law,
 )
-
-_PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -67,23 +62,34 @@ FINELY = 200
 class Trajectory(Brief):
     """Where the mechanism is when, at the initial design.
 
-    ``tip`` is None unless the case gives a path of the tip, which is the same for every design.
     ``sampled`` is the trajectory without the instants that were put between its samples.
     """
 
     time_s: Floats  # (n,) strictly increasing; one alone is a pose at rest
     q: Floats  # (n, n_q) in rad or m
-    tip: Floats | None  # (n, 2 or 3) in m
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
-    corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
-    of_design: OfDesign | None = None  # how q follows y; None where it does not
+    known: Motion | TipMotion | None = None  # None where it is known at its samples only
     sampled: Trajectory | None = None
-    known: Motion | None = None  # None where it is known at its samples only
 
     def __post_init__(self) -> None:
-        for array in (self.time_s, self.q, self.tip):
-            if array is not None:
-                array.setflags(write=False)
+        for array in (self.time_s, self.q):
+            array.setflags(write=False)
+
+    @cached_property
+    def motion(self) -> Motion | TipMotion:
+        """q, q̇ and q̈ at any time: as it is known, else the spline through the samples."""
+        return self.known or sampled_motion(self.time_s, self.q)
+
+    @cached_property
+    def tip(self) -> Floats | None:
+        """Where the tip is (n, 2 or 3) in m, for every design; None without its path."""
+        tip = self.motion.tip(self.time_s) if self.known else None
+        return None if tip is None else _stacked([tip])
+
+    @cached_property
+    def of_design(self) -> OfDesign | None:
+        """How q follows the design; None where it does not."""
+        return self.motion.of_design(self.time_s) if self.known else None
 
     def at(self, y: Floats) -> tuple[Floats, Floats]:
         """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; slopes 0 where q is given."""
@@ -91,18 +97,15 @@ class Trajectory(Brief):
             return self.q, np.zeros((*self.q.shape, len(y)))
         return self.of_design(y)
 
-    @cached_property
-    def motion(self) -> Motion:
-        """q, q̇ and q̈ at any time: as it is known, else the spline through the samples."""
-        return self.known or SampledMotion(self.time_s, self.q, self.corners_s)
-
     def joined(self, loads: Floats) -> Trajectory:
         """The same with ``loads`` (n_loads,), which neither time nor design change, behind q."""
-        return self._at_times(self.time_s, Loaded(self.motion, loads))
+        known = self.known and self.known.joined(loads)
+        return replace(self, q=behind(self.q, loads), known=known)
 
     def chosen(self, samples: Ints) -> Trajectory:
         """Some of the samples only, given by ascending numbers."""
-        return replace(self._at_times(self.time_s[samples], self.motion), sampled=None)
+        some = self.time_s[samples], self.q[samples]
+        return Trajectory(*some, self.notes, self.motion)
 
     @property
     def given(self) -> Trajectory:
@@ -119,17 +122,9 @@ class Trajectory(Brief):
         time_s = np.union1d(self.time_s, times_s)
         if len(time_s) == len(self.time_s):
             return self
-        return replace(self._at_times(time_s, self.motion), sampled=self.given)
-
-    def _at_times(self, time_s: Floats, motion: Motion) -> Trajectory:
-        """The motion at these times; where they are known q and the tip stay as they are."""
-        q = motion.poses(time_s)
-        known, at = np.isin(time_s, self.time_s), np.searchsorted(self.time_s, time_s)
-        n_q = self.q.shape[1]
-        q[known, :n_q] = self.q[at[known]]
-        tip = None if self.tip is None else motion.tip(time_s)
-        of_design = motion.of_design(time_s)
-        return replace(self, time_s=time_s, q=q, tip=tip, of_design=of_design, known=motion)
+        q = self.motion.poses(time_s)
+        q[np.isin(time_s, self.time_s)] = self.q
+        return Trajectory(time_s, q, self.notes, self.motion, self.given)
 
 
 def build_trajectory(
@@ -162,7 +157,7 @@ def _from_tip_path(
     moved: Callable[[str, bool], bool],
 ) -> Trajectory:
     """q(t) with tip(q(t)) = p(s(t/T)), turned as asked for, at equal steps in time."""
-    path, attitude = _PATHS[spec.path](spec.waypoints), None
+    path, attitude = tip_path(spec.waypoints, spec.path), None
     if spec.angle is not None:
         attitude = planar_attitude(path, spec.angle, spec.path)
     elif spec.orientation is not None:
@@ -170,34 +165,21 @@ def _from_tip_path(
     chain = tip_chain(spec.tip, attitude is not None)
     tau = np.linspace(0.0, 1.0, spec.samples)
     law = timing_law(spec.timing, spec.acceleration_share)
-    s = law.position(tau)
+    s = law.value(tau)[:, 0]
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
     course = Course(path, s, spec.duration * tau, attitude)
     followed = follow(chain, course, spec.branch, spec.start)
-    corners = np.interp(course.corners(), course.s, course.time_s)
-    of_design, notes = None, followed.notes
-    if moved(spec.tip, attitude is not None):
-        of_design = path_of_design(followed, course)
-        notes = (*notes, f"{of_design.said}; q is written for the initial design")
-    return Trajectory(
-        course.time_s,
-        followed.q,
-        followed.tip,
-        notes,
-        tuple(corners.tolist()),
-        of_design,
-        known=TipMotion(followed, course, law, of_design is not None),
-    )
+    follows, notes = moved(spec.tip, attitude is not None), followed.notes
+    if follows:
+        said = path_of_design(followed, course).said
+        notes = (*notes, f"{said}; q is written for the initial design")
+    motion = TipMotion(followed, course, law, follows)
+    return Trajectory(course.time_s, followed.q, notes, motion)
 
 
 def _from_file(spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str]) -> Trajectory:
     table = read_samples(Path(spec.file), q_names, q_units)
-    for k in np.flatnonzero(np.diff(table.time_s) <= 0.0).tolist():
-        before, after = table.time_s[k : k + 2]
-        message = f"time must increase, and goes from {before:g} s to {after:g} s"
-        raise TrajectoryError("trajectory.file", f"{table.where(k + 1)}: {message}", k + 1)
-    notes = (*table.notes, *_jumps(table.q, q_names, q_units))
-    return Trajectory(table.time_s, table.q, None, notes)
+    return Trajectory(table.time_s, table.q, (*table.notes, *_jumps(table.q, q_names, q_units)))
 
 
 def _from_samples(
@@ -209,7 +191,7 @@ def _from_samples(
     if spec.time is not None:
         time_s = np.array(spec.time, dtype=np.float64)
     notes = () if len(q) == 1 else _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
-    return Trajectory(time_s, q, None, notes)
+    return Trajectory(time_s, q, notes)
 
 
 def _from_points(spec: PointTrajectory) -> Trajectory:
@@ -223,11 +205,9 @@ def _from_points(spec: PointTrajectory) -> Trajectory:
         )
     else:
         reached, said = np.array(spec.times, dtype=np.float64), ()
-    motion = PointMotion(points, reached, timing_law(spec.timing, spec.acceleration_share))
+    motion = point_motion(points, reached, timing_law(spec.timing, spec.acceleration_share))
     time_s = np.linspace(reached[0], reached[-1], spec.samples)
-    corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
-    said = said if len(points) > 2 else ()
-    return Trajectory(time_s, motion.moving(time_s).q, None, said, corners, known=motion)
+    return Trajectory(time_s, motion.poses(time_s), said if len(points) > 2 else (), motion)
 
 
 def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
@@ -480,8 +460,7 @@ def _stacked(arrays: Sequence[Floats]) -> Floats:
 # --- rates q̇ and q̈
 
 
-@dataclass(frozen=True, eq=False)
-class Rates:
+class Rates(NamedTuple):
     """q, q̇ and q̈ (m, n_q) at ``samples`` (m,); a sample on a corner stands there for both sides."""
 
     samples: Ints
@@ -503,10 +482,10 @@ def rates(trajectory: Trajectory, y: Floats | None = None) -> Rates:
     samples = np.repeat(np.arange(n), sides)
     first = np.append(True, np.diff(samples) > 0)
     aside = np.where(first, -2.0, 2.0) * (sides[samples] - 1) * beside
-    q, rate, push = motion.moving(time_s[samples] + aside, y)
+    found = motion.moving(time_s[samples] + aside, y)
     if y is None:
-        q = trajectory.q[samples]
-    return Rates(samples, q, rate, push)
+        found = found._replace(q=trajectory.q[samples])
+    return Rates(samples, *found)
 
 
 def rates_at(trajectory: Trajectory, y: Floats, slopes: bool = True) -> tuple[Rates, Rates]:
@@ -524,11 +503,6 @@ def rates_at(trajectory: Trajectory, y: Floats, slopes: bool = True) -> tuple[Ra
             for side in (1, -1):
                 with suppress(TrajectoryError):  # beyond what the tip reaches
                     sides[side] = rates(trajectory, y + side * step)
-            ahead, behind = sides.get(1, found), sides.get(-1, found)
-            pairs = zip(_values(ahead), _values(behind), strict=True)
+            pairs = zip(sides.get(1, found)[1:], sides.get(-1, found)[1:], strict=True)
             by_y[..., j] = [(a - b) / (max(len(sides), 1) * step[j]) for a, b in pairs]
     return found, Rates(found.samples, *by_y)
-
-
-def _values(found: Rates) -> tuple[Floats, Floats, Floats]:
-    return found.q, found.rate, found.acceleration

@@ -42,7 +42,7 @@ def with_target(*targets: str) -> CaseFile:
 
 
 def asked(*targets: str) -> tuple[Requirement, ...]:
-    motion = Trajectory(np.linspace(0.0, 1.0, 11), np.zeros((11, 2)), None)
+    motion = Trajectory(np.linspace(0.0, 1.0, 11), np.zeros((11, 2)))
     path = Trajectories((NamedTrajectory("1", motion),))
     return requirements_of(with_target(*targets), path)
 

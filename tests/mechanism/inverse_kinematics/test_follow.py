@@ -1,6 +1,7 @@
 """Inverse kinematics along paths, against closed forms: arms that turn, and that slide as well."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,13 @@ from eigassign.mechanism import (
     Course,
     TipChain,
     follow,
-    spline,
-    straight,
+    tip_path,
 )
 
 # --- Inverse kinematics along paths, against closed forms
 
 
+straight, spline = (partial(tip_path, kind=kind) for kind in ("straight", "spline"))
 TAU = 2.0 * np.pi
 UP, DOWN = {"elbow": (0.0, np.pi)}, {"elbow": (np.pi, TAU)}
 
@@ -44,7 +45,7 @@ def reachable_path(seed: int, l1: float, l2: float) -> Any:
         theta = np.cumsum(rng.uniform(-1.2, 1.2, 5))
         points = np.stack([r * np.cos(theta), r * np.sin(theta)], axis=1)
         path = (spline, straight)[seed % 2](points)
-        radius = np.linalg.norm(path.point(np.linspace(0.0, 1.0, 2000)), axis=1)
+        radius = np.linalg.norm(path.value(np.linspace(0.0, 1.0, 2000)), axis=1)
         if radius.min() > inner + 0.02 * outer and radius.max() < 0.98 * outer:
             return path
 
@@ -59,7 +60,7 @@ def test_two_links_follow_random_paths_as_the_law_of_cosines_says(seed, absolute
     q = follow(arm, samples, branch).q
     relative = q @ arm.relative_map[0].T
     # 1e-10 of the tip over a singular value of at least 0.02: 1e-8 rad
-    assert away(relative, two_link_angles(path.point(samples.s), l1, l2, sign)) < 1e-8
+    assert away(relative, two_link_angles(path.value(samples.s), l1, l2, sign)) < 1e-8
 
 
 @pytest.mark.parametrize("absolute", [True, False])
@@ -89,7 +90,7 @@ def test_the_first_sample_is_normalised_to_one_turn_or_near_the_start():
 
 def test_the_first_sample_is_the_solution_nearest_to_any_start():
     arm, path = serial_arm(0.6, 0.45, absolute=False), straight([(0.5, 0.2), (0.45, 0.3)])
-    both = [two_link_angles(path.point(0.0), 0.6, 0.45, sign)[0] for sign in (1.0, -1.0)]
+    both = [two_link_angles(path.value(0.0), 0.6, 0.45, sign)[0] for sign in (1.0, -1.0)]
     for start in np.random.default_rng(3).uniform(-8.0, 8.0, (25, 2)):
         near = [start + (q - start + np.pi) % TAU - np.pi for q in both]
         nearest = min(near, key=lambda q: np.linalg.norm(q - start))
@@ -107,7 +108,7 @@ def test_without_branch_or_start_the_elbow_bends_anticlockwise_and_a_note_says_s
 def test_another_first_solution_is_tried_if_the_preferred_one_leaves_the_branch():
     # elbows from 60 to 300 deg allow both solutions; narrowed on one side only the other one stays
     path = straight([(0.5, 0.2), (0.9, 0.3)])
-    elbow = np.degrees(two_link_angles(path.point([0.0, 1.0]), 0.6, 0.45, 1.0)[:, 1])
+    elbow = np.degrees(two_link_angles(path.value([0.0, 1.0]), 0.6, 0.45, 1.0)[:, 1])
     branch = {"elbow": (np.radians(elbow[1] + 5.0), np.radians(360.0 - elbow[1] + 5.0))}
     q = follow(serial_arm(0.6, 0.45, absolute=False), timed_course(path), branch).q
     assert (q[:, 1] > np.pi).all()
@@ -125,12 +126,12 @@ def failure(arm: TipChain, path: Any, n: int = 50, **wishes: object) -> Trajecto
 @pytest.mark.parametrize(("last", "reach"), [(1.3, 1.05), (0.05, 0.15)], ids=["far", "near"])
 def test_a_point_out_of_reach_is_named_with_its_distance(last, reach):
     path = straight([(0.5, 0.0), (last, 0.0)])
-    beyond = (path.point(np.linspace(0, 1, 50))[:, 0] - reach) * np.sign(last - reach)
+    beyond = (path.value(np.linspace(0, 1, 50))[:, 0] - reach) * np.sign(last - reach)
     sample = int(np.argmax(beyond > 0.0))
     error = failure(serial_arm(0.6, 0.45), path)
     assert error.sample == sample
     assert error.path == "trajectory.waypoints"
-    x = path.point(sample / 49)[0, 0]
+    x = path.value(sample / 49)[0, 0]
     assert (
         f"sample {sample} (t = {2 * sample / 49:.6g} s, point ({x:.6g}, 0) m) is" in error.message
     )
@@ -147,7 +148,7 @@ def test_an_excursion_out_of_reach_between_two_samples_is_found():
 
 def test_a_sample_outside_the_branch_is_named_with_its_angle():
     path = straight([(0.5, 0.2), (0.9, 0.4)])
-    elbow = np.degrees(two_link_angles(path.point(np.linspace(0, 1, 50)), 0.6, 0.45, 1.0)[:, 1])
+    elbow = np.degrees(two_link_angles(path.value(np.linspace(0, 1, 50)), 0.6, 0.45, 1.0)[:, 1])
     branch = {"elbow": (np.radians(elbow[20] - 0.01), np.pi)}
     error = failure(serial_arm(0.6, 0.45), path, branch=branch)
     assert error.sample == 21
@@ -179,7 +180,7 @@ def test_a_path_just_short_of_full_stretch_is_followed_on_its_branch():
     touch = 1.05 - 1e-5
     path = straight([(0.7, 0.0), (touch, 0.0), (0.6, 0.3)])
     q = follow(serial_arm(0.6, 0.45, absolute=False), timed_course(path, 200), DOWN).q
-    expected = two_link_angles(path.point(np.linspace(0, 1, 200)), 0.6, 0.45, -1.0)
+    expected = two_link_angles(path.value(np.linspace(0, 1, 200)), 0.6, 0.45, -1.0)
     assert away(q, expected) < 1e-7
 
 
@@ -194,7 +195,7 @@ def test_redundant_arms_follow_random_paths_and_say_so(lengths, seed):
     samples = timed_course(path, 80)
     followed = follow(arm, samples)
     tip = arm.evaluate(followed.q).point
-    np.testing.assert_allclose(tip, path.point(samples.s), atol=1e-10, rtol=0)
+    np.testing.assert_allclose(tip, path.value(samples.s), atol=1e-10, rtol=0)
     assert np.abs(np.diff(followed.q, axis=0)).max() < 0.5
     assert f"fixes 2 of {len(lengths)} coordinates" in followed.notes[0]
     assert (follow(arm, samples).q == followed.q).all()  # bit for bit
@@ -261,7 +262,7 @@ def test_a_slide_is_no_angle(sign: float) -> None:
     due = course(FAR, 40, "spline")
     branch = {"boom": (1.0, 10.0) if sign > 0 else (-10.0, -1.0)}
     q = follow(polar_arm(), due, branch).q
-    np.testing.assert_allclose(q, expected(due.path.point(due.s), sign), atol=1e-8)
+    np.testing.assert_allclose(q, expected(due.path.value(due.s), sign), atol=1e-8)
 
 
 def test_a_place_outside_its_range_is_named_in_metres() -> None:
@@ -304,7 +305,7 @@ def test_a_screw_turns_as_often_as_its_path_is_long() -> None:
     )
     due = course([(0, 0, 0.2), (0, 0, 0.9)], 21)
     q = follow(chain_of(built(tree), "table.end"), due).q[:, 0]
-    np.testing.assert_allclose(q, (due.path.point(due.s)[:, 2] - 0.1) * 2 * np.pi / 0.02, atol=1e-7)
+    np.testing.assert_allclose(q, (due.path.value(due.s)[:, 2] - 0.1) * 2 * np.pi / 0.02, atol=1e-7)
 
 
 def test_a_spherical_joint_and_a_slide_point_anywhere() -> None:
@@ -320,7 +321,7 @@ def test_a_spherical_joint_and_a_slide_point_anywhere() -> None:
     model = built(tree)
     due = course([(0.7, 0.3, 0.2), (0.5, -0.4, 0.5)], 30)
     followed = follow(chain_of(model, "tip.end"), due, start=[0.0, 0.0, 0.0, 0.1])
-    d = np.linalg.norm(due.path.point(due.s), axis=1) - 0.6
+    d = np.linalg.norm(due.path.value(due.s), axis=1) - 0.6
     np.testing.assert_allclose(followed.q[:, 3], d, atol=1e-9)
     assert "fixes 3 of 4 coordinates" in followed.notes[0]
     assert f"a slide of {due.size:.3g} m counting as 1 rad" in followed.notes[0]

@@ -98,7 +98,7 @@ def test_the_answer_depends_on_the_design_alone() -> None:
 
 def test_coordinates_that_are_given_do_not_follow() -> None:
     case = two_link_lengths()
-    given = replace(case.trajectory.parts[0].trajectory, of_design=None)
+    given = replace(case.trajectory.parts[0].trajectory, known=None)
     q, slopes = given.at(other_design(case))
     np.testing.assert_array_equal(q, given.q)
     assert slopes.shape == (24, 2, 3)

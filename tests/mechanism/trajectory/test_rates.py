@@ -5,7 +5,7 @@ import pytest
 from planar_arms import serial_arm
 
 from eigassign.case import PointTrajectory, TipTrajectory
-from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates
+from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates, sampled_motion
 
 LAWS = ("linear", "cubic", "quintic", "trapezoidal")
 
@@ -82,7 +82,7 @@ def test_samples_move_by_the_spline_through_them() -> None:
     """A polynomial of third degree is its own spline."""
     t = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 9))
     cubic = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7])
-    found = Trajectory(t, np.stack([cubic(t), 3.0 - t], axis=1), None)
+    found = Trajectory(t, np.stack([cubic(t), 3.0 - t], axis=1))
     at = np.linspace(t[0], t[-1], 50)
     q, rate, push = found.motion.moving(at)
     np.testing.assert_allclose(q, np.stack([cubic(at), 3.0 - at], axis=1), atol=1e-12)
@@ -105,7 +105,8 @@ def test_points_joined_at_constant_velocity_have_no_acceleration(samples: int) -
 
 def test_a_corner_on_a_sample_is_seen_from_both_sides() -> None:
     t = np.linspace(0.0, 1.0, 5)
-    found = rates(Trajectory(t, np.abs(t - 0.5)[:, None], None, (), (0.5,)))
+    q = np.abs(t - 0.5)[:, None]
+    found = rates(Trajectory(t, q, known=sampled_motion(t, q, (0.5,))))
     np.testing.assert_array_equal(found.samples, [0, 1, 2, 2, 3, 4])
     np.testing.assert_allclose(found.rate[:, 0], [-1, -1, -1, 1, 1, 1], atol=1e-12)
 

@@ -46,11 +46,6 @@ def test_degrees_become_radians(tmp_path, unit):
     np.testing.assert_allclose(table.q, [[np.pi, 1.0], [-np.pi / 2, 1.0]], rtol=1e-15)
 
 
-def test_samples_know_the_line_they_stand_in(tmp_path):
-    table = read_samples(written(tmp_path, "# x\ntime,q1,q2\n0,1,2\n\n1,1,2\n"), Q)
-    assert [table.where(k) for k in (0, 1)] == ["arm.csv:3", "arm.csv:5"]
-
-
 def test_extra_columns_are_ignored_with_a_note(tmp_path):
     table = read_samples(written(tmp_path, "time,q1,q2,torque [N m],\n0,1,2,x,\n1,1,2,,\n"), Q)
     assert table.q.shape == (2, 2)

@@ -24,8 +24,8 @@ def peak(drawn: dict[str, Any], mass: float) -> float:
     tau, way = np.linspace(0.0, 1.0, 20_001), drawn["end"] - drawn["start"]
     link, g = PER_LENGTH * L, 0.0 if drawn["gravity"] == "none" else 9.81
     inertia, lever = (link / 3.0 + mass) * L**2, (link / 2.0 + mass) * L
-    q = drawn["start"] + law.position(tau) * way
-    torque = inertia * law.acceleration(tau) * way / T**2 + lever * g * np.cos(q)
+    q = drawn["start"] + law.value(tau)[:, 0] * way
+    torque = inertia * law.value(tau, 2)[:, 0] * way / T**2 + lever * g * np.cos(q)
     return float(np.abs(torque).max())
 
 
