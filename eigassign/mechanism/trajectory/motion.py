@@ -29,8 +29,12 @@ from numpy.typing import NDArray
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
-from eigassign.mechanism.inverse_kinematics.follow import Followed, at_parameters
-from eigassign.mechanism.inverse_kinematics.redesign import PathOfDesign, behind
+from eigassign.mechanism.inverse_kinematics.follow import (
+    Followed,
+    PathOfDesign,
+    at_parameters,
+    behind,
+)
 from eigassign.mechanism.inverse_kinematics.solver import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, Curve, through
 

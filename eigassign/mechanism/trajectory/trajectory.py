@@ -31,8 +31,7 @@ from eigassign.case.schema.trajectory import (
 )
 from eigassign.errors import TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.inverse_kinematics.follow import follow
-from eigassign.mechanism.inverse_kinematics.redesign import behind, path_of_design
+from eigassign.mechanism.inverse_kinematics.follow import behind, follow, path_of_design
 from eigassign.mechanism.inverse_kinematics.tip_path import (
     Course,
     planar_attitude,
@@ -295,7 +294,7 @@ class Trajectories:
         return by_y + by_q @ of_design if self.follows_design else by_y
 
     def at(self, y: Floats) -> tuple[Floats, Floats]:
-        """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; see `redesign`.
+        """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI.
 
         Raises TrajectoryError where that design cannot follow a path of its tip.
         """
