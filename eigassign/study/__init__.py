@@ -31,7 +31,7 @@ __all__, __getattr__, __dir__ = face(
             "validate_expansions"
         ),
         "design.answer": "Answer find_answer",
-        "design.clearance": "BandMotion",
+        "design.clearance": "check_band",
         "design.followed": "followers named_design named_pose require_one_shape solve_design",
         "design.judgement": "crossing_warnings",
         "design.search.optimum": "Found find_optimum",

@@ -15,7 +15,8 @@ from random_assignments import load_text, random_case
 
 import eigassign as ea
 from eigassign.assignment import ForbiddenBand
-from eigassign.study import BandMotion
+from eigassign.mechanism import NamedTrajectory, Trajectories
+from eigassign.study import check_band
 
 SEEDS = range(200)
 QUICK = (0,)
@@ -65,16 +66,17 @@ def test_an_answer_called_clear_is_clear_at_random_instants_and_a_forged_one_is_
     model = case.model()
     for said, part in zip(row.clearances, case.trajectory.parts, strict=True):
         q = part.trajectory.given.q
+        path = Trajectories((NamedTrajectory("1", part.trajectory.given),))
         kind = "forged", "", (), slice(0, len(q)), np.full(len(q), low)
         band = ForbiddenBand(*kind, np.full(len(q), high))
         if not said.clear:
             continue
         assert (along(case, part.trajectory, y, low, high) == said.below).all()
         for k in {said.below + 1, max(said.below - 1, 0)} - {said.below}:
-            assert not BandMotion(model, band, k, q, y).judged().clear
+            assert not check_band(model, path, band, k, y).clear
         hz = model.frequencies(q, y, said.below + 1)[:, said.below]
         wide = ForbiddenBand(*kind, np.full(len(q), hz.min() * (1.0 + 1e-9)))
-        assert not BandMotion(model, wide, said.below, q, y).judged().clear
+        assert not check_band(model, path, wide, said.below, y).clear
 
 
 # --- Load cases, several trajectories, jumps, profiles, parts

@@ -8,8 +8,15 @@ from weighed_draws import DRAWS
 
 from eigassign.assignment import ForbiddenBand
 from eigassign.errors import EigassignError
-from eigassign.mechanism import refined, with_elements, with_reduction
-from eigassign.study import BandMotion, automatic_elements, build_model
+from eigassign.mechanism import (
+    NamedTrajectory,
+    Trajectories,
+    Trajectory,
+    refined,
+    with_elements,
+    with_reduction,
+)
+from eigassign.study import automatic_elements, build_model, check_band
 
 FINER = 8.0
 EACH = 6  # bands of one mechanism
@@ -43,6 +50,7 @@ def judged(seed: int) -> tuple[int, int, list[str]]:
         coarse = model.frequencies(q, y, min(6, model.n_dof - model.n_rigid))[0]
     except EigassignError:
         return 0, 0, []
+    path = Trajectories((NamedTrajectory("1", Trajectory(np.zeros(1), q)),))
     for _ in range(EACH):
         below = int(rng.integers(0, len(coarse)))
         upper = coarse[below] * (1.0 - 10.0 ** rng.uniform(-5.0, -0.5))
@@ -52,7 +60,7 @@ def judged(seed: int) -> tuple[int, int, list[str]]:
             continue
         band = ForbiddenBand("band", "", (), slice(0, 1), np.array([lower]), np.array([upper]))
         try:
-            found = BandMotion(model, band, below, q, y).judged()
+            found = check_band(model, path, band, below, y)
         except EigassignError:
             continue
         clear, open_ = clear + found.clear, open_ + (not found.clear)

@@ -19,8 +19,9 @@ from eigassign.study.checks.accuracy import Accuracy, finer, model_errors, raise
 from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
 from eigassign.study.checks.weight import weight_doubt
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.clearance import LIMIT, check_band, followed_between, lowest_room
+from eigassign.study.design.clearance import LIMIT, check_band, lowest_room
 from eigassign.study.design.conclusions import Conflict, aim_row, extreme
+from eigassign.study.design.followed import followers
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes
 from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found, Outcome
@@ -209,12 +210,12 @@ def _missed_between(
 
     The first of the designs is the answer, others are deviations.
     """
-    y = designs[0]
+    y, own = designs[0], followers(scene, [target.asked for target in targets])
     statics = [one for one in scene.followed_limits if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
-        error = -min(lowest_room(scene.model, one, scene.path, each).room for each in designs)
         try:
-            error = max(error, *(followed_between(scene, one, y) for y in designs))
+            rooms = (lowest_room(scene.model, one, scene.path, each, own) for each in designs)
+            error = -min(low.room for low in rooms)
         except LostModeError as lost:
             yield f"{one.label} is not known between the samples: {lost}"
             continue
@@ -345,7 +346,9 @@ def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
     for band, row in zip(found.task.bands, found.clearances, strict=True):
         if row.clear:
             continue
-        of_model = check_band(scene, found.task.followers, band, row.below, y, 0.0)
+        of_model = check_band(
+            scene.model, scene.path, band, row.below, y, found.task.followers, 0.0
+        )
         if not of_model.clear:
             yield row.label
             continue

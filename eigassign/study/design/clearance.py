@@ -21,14 +21,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.requirements.kinds import ForbiddenBand
+from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin
 from eigassign.assignment.requirements.quantity import DriveLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit
@@ -37,9 +36,8 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.checks.accuracy import judged_poses
-from eigassign.study.design.followed import Follower, follow_all, followers
+from eigassign.study.design.followed import Follower, follow_all, unfollowed
 from eigassign.study.results import ClearanceRow
-from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -56,25 +54,59 @@ STILL = (
 
 
 def check_band(
-    scene: Scene,
-    own: Sequence[Follower],
+    model: Model,
+    path: Trajectories,
     band: ForbiddenBand,
     below: int,
     y: Floats,
+    own: Sequence[Follower] = (),
     raised: float | None = None,
+    within: float | None = None,
 ) -> ClearanceRow:
-    """Judge a band along the trajectories of a scene at the design y, k = ``below``.
+    """Judge a band along one trajectory at the design y, k = ``below``.
 
-    e is ``raised``, or else what can be proved of it. A band of a followed mode is not clear where
-    the shape of its mode is lost between samples. Raises what the exact solves raise.
+    e is ``raised``, or else what can be proved of it. Of one that is clear the room is as
+    `least_along` has it. A band of a followed mode is not clear where the shape of its mode is lost
+    between samples. Raises what the exact solves raise.
     """
-    q, poses = scene.path.at(y)[0][band.rows], scene.path.between(band.rows, y)
-    shapes = (_Shape(band, scene.path, one, y) for one in own if one.mode in band.followed)
+    q = path.at(y)[0][band.rows]
+    above = mode_above(model, below, band.counted, q, y)
     try:
-        shape = next(shapes, None)
-        return BandMotion(scene.model, band, below, q, y, raised, shape, poses).judged()
+        e = _raised(model, path, own, band, above, q, y) if raised is None else raised
+        sides = list(band.kept_clear(below, above, Margin(0.0, e if np.isfinite(e) else 0.0)))
+        room = least_along(_room(model, path, sides, y, own), q, within).room
     except (LostModeError, TrajectoryError):
         return ClearanceRow(band.label, below, False, 0.0, False, None)
+    edges = np.column_stack([band.lower, band.upper])
+    found = () if band.counted else count_below(model.pencil, model.x(q, y), edges)
+    counted = bool(np.equal(found, below).all())  # of named modes only their order is known
+    if not np.isfinite(e):
+        return ClearanceRow(band.label, below, False, min(room, 0.0), counted, None)
+    return ClearanceRow(band.label, below, counted and room > 0.0, room, counted, e)
+
+
+def _raised(
+    model: Model,
+    path: Trajectories,
+    own: Sequence[Follower],
+    band: ForbiddenBand,
+    above: int | None,
+    q: Floats,
+    y: Floats,
+) -> float:
+    """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
+    if above == 0 or model.is_exact:
+        return 0.0
+    if above is None:
+        return float(np.inf)
+    modes: tuple[int, ...] = (above,)
+    if above < 0:
+        solved = _solved(model, path, [band], y, own)(np.arange(len(q), dtype=np.float64))
+        modes = tuple(set(solved.numbers[:, above].tolist()))
+    poses = judged_poses(model, q)
+    both = model.discretisation_error(poses, y, modes), model.truncation_error(poses, y, modes)
+    mesh, truncation = (float(error.max()) for error in both)
+    return (1.0 + mesh) * (1.0 + truncation) - 1.0
 
 
 def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Floats) -> int | None:
@@ -93,101 +125,91 @@ def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Flo
     return below + 1
 
 
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    """The mode of a band that is followed by its shape, at a design."""
+# --- Room, at places along the rows of one trajectory: 1.5 is midway between second and third
 
-    band: ForbiddenBand
-    path: Trajectories
-    follower: Follower
-    y: Floats
-
-    def at(self, places: Floats) -> tuple[Floats, Ints]:
-        """Its frequency (n,) and number at places along the samples of the band."""
-        path, at = _refined(self.path, self.band.rows, places)
-        needed = np.isin(np.arange(len(path.q)), at)
-        follower = replace(self.follower, path=path, needed=needed)
-        found = follow_all(follower.model, path, [follower], self.y, 1)
-        return found.solved.followed[at, 0], found.numbers[at, 0]
+Room = Callable[[Floats], Floats]
 
 
-def _refined(path: Trajectories, rows: slice, at: Floats) -> tuple[Trajectories, Ints]:
-    """One trajectory with instants at places along some of its rows, and their numbers (n,)."""
-    name = path.name_of(rows.start)
-    time_s = _between(at, path.time_s[rows, None])[:, 0]
-    fine = path.with_instants([time_s if one.name == name else () for one in path.parts])
-    own = fine.rows_of(name)
-    fine = fine.chosen(np.arange(own.start, own.stop))
-    return fine, np.searchsorted(fine.time_s, time_s)
+def _room(
+    model: Model,
+    path: Trajectories,
+    parts: Sequence[Requirement],
+    y: Floats,
+    own: Sequence[Follower] = (),
+) -> Room:
+    """The least room (n,) that parts of targets on the same rows leave; endless of none.
+
+    ``own`` are the followers of the modes that these follow.
+    """
+    solved = _solved(model, path, parts, y, own) if parts else None
+
+    def room(at: Floats) -> Floats:
+        least = np.full(len(at), np.inf)
+        if solved is None:
+            return least
+        found = solved(at)
+        for part in parts:
+            edges = _between(at, np.column_stack([part.lower, part.upper]))
+            fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=())
+            fine = replace(fine, rows=slice(0, len(at)))
+            curve = fine.curve(found)
+            beyond = [rows.scale * (curve - rows.edge) for rows in fine.edge_rows()]
+            missed = np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0)
+            least = np.minimum(least, -missed)
+        return least
+
+    return room
 
 
-@dataclass(frozen=True, eq=False)
-class BandMotion:
-    """A band, k, and the poses and the design at which it is looked at."""
+def _solved(
+    model: Model,
+    path: Trajectories,
+    parts: Sequence[Requirement],
+    y: Floats,
+    own: Sequence[Follower],
+) -> Callable[[Floats], Solved]:
+    """The modes that parts are on, solved at places along their rows, those followed too."""
+    rows, top, named = parts[0].rows, max(one.top for one in parts), parts[0].followed
+    poses, name = path.between(rows, y), path.name_of(rows.start)
 
-    model: Model
-    band: ForbiddenBand
-    below: int
-    q: Floats
-    y: Floats
-    given: float | None = None  # e
-    shape: _Shape | None = None
-    poses: Callable[[Floats], Floats] | None = None  # of places; None where q is linear between
+    def numbered(at: Floats) -> Solved:
+        return unfollowed(model.frequencies(poses(at), y, top))
 
-    def judged(self) -> ClearanceRow:
-        """What is found of it."""
-        counted, room = self.counted(), least_along(self.room, self.q).room
-        raised = self.raised if np.isfinite(self.raised) else None
-        clear = counted and room > 0.0
-        return ClearanceRow(self.band.label, self.below, clear, room, counted, raised)
+    def with_followed(at: Floats) -> Solved:
+        time_s = _between(at, path.time_s[rows, None])[:, 0]
+        fine = path.with_instants([time_s if one.name == name else () for one in path.parts])
+        fine = fine.chosen(np.arange(len(fine.q))[fine.rows_of(name)])
+        k = np.searchsorted(fine.time_s, time_s)
+        needed = np.isin(np.arange(len(fine.q)), k)
+        shapes = [replace(one, path=fine, needed=needed & (one.mode in named)) for one in own]
+        found = follow_all(model, fine, shapes, y, top).solved
+        return Solved(found.hz[k], found.followed[k], found.numbers[k])
 
-    @cached_property
-    def above(self) -> int | None:
-        """The mode that has to stay above the band."""
-        return mode_above(self.model, self.below, self.band.counted, self.q, self.y)
+    return with_followed if named else numbered
 
-    @cached_property
-    def raised(self) -> float:
-        """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
-        if self.given is not None:
-            return self.given
-        if self.above == 0 or self.model.is_exact:
-            return 0.0
-        if self.above is None:
-            return float(np.inf)
-        q, modes = judged_poses(self.model, self.q), (self.above,)
-        if self.shape is not None:
-            modes = tuple(set(self.shape.at(np.arange(len(self.q), dtype=np.float64))[1].tolist()))
-        mesh, truncation = (
-            float(error(q, self.y, modes).max())
-            for error in (self.model.discretisation_error, self.model.truncation_error)
-        )
-        return (1.0 + mesh) * (1.0 + truncation) - 1.0
 
-    def counted(self) -> bool:
-        """k modes below both edges at every sample; of named modes only their order is known."""
-        if self.band.counted:
-            return True
-        edges = np.column_stack([self.band.lower, self.band.upper])
-        found = count_below(self.model.pencil, self.model.x(self.q, self.y), edges)
-        return bool((found == self.below).all())
+def _drive_room(model: Model, asked: DriveLimit, trajectory: Trajectory, y: Floats) -> Room:
+    """1 − |τ|/max (n,) of one drive."""
 
-    def room(self, at: Floats) -> Floats:
-        """g (n,) at places ``at`` along the samples: 1.5 is midway between second and third."""
-        k, above = self.below, self.above
-        q = _between(at, self.q) if self.poses is None else self.poses(at)
-        lower, upper = (_between(at, e[:, None])[:, 0] for e in (self.band.lower, self.band.upper))
-        if self.shape is None:
-            low = self.band.counted[k - 1] if self.band.counted and k else k
-            hz = self.model.frequencies(q, self.y, max(low, above or 0, 1))
-        else:
-            low, above, hz = 1, above and 1, self.shape.at(at)[0][:, None]
-        g = np.full(len(at), np.inf)
-        if k:
-            g = np.minimum(g, 1.0 - hz[:, low - 1] / lower)
-        if above:
-            g = np.minimum(g, hz[:, above - 1] / (1.0 + self.raised) / upper - 1.0)
-        return g if np.isfinite(self.raised) else np.minimum(g, 0.0)
+    def room(at: Floats) -> Floats:
+        times = trajectory.time_s
+        time_s = np.interp(at, np.arange(len(times)), times)
+        tau = model.drives.exerted(trajectory, time_s, y)
+        return np.asarray(1.0 - np.abs(tau[:, asked.load.column]) / asked.allowed[1])
+
+    return room
+
+
+def _static_room(asked: StaticLimit, poses: Room, y: Floats) -> Room:
+    """The room (n,) to a stiffness, a compliance or a sag."""
+
+    def room(at: Floats) -> Floats:
+        w, most = asked.way.at(poses(at), y), asked.upper[0]
+        if asked.way.target.limit == "at_least":  # of the stiffness, not of its inverse
+            return np.asarray(most / np.maximum(w, RIGID) - 1.0)
+        return np.asarray(1.0 - w / most)
+
+    return room
 
 
 class Lowest(NamedTuple):
@@ -260,81 +282,41 @@ def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
     return found
 
 
-def lowest_room(model: Model, asked: Requirement, path: Trajectories, y: Floats) -> Lowest:
+def lowest_room(
+    model: Model,
+    asked: Requirement,
+    path: Trajectories,
+    y: Floats,
+    own: Sequence[Follower] = (),
+) -> Lowest:
     """The least room that a target leaves along its trajectories, relative, and the place of it.
 
     At a design y (n_y,), within `WITHIN`; −∞ where that cannot follow the path. That of a wanted
     frequency is its error, negative; that of what shall be highest is its frequency in Hz. Bands
-    are checked for themselves, modes that are followed by their shape are known at samples only.
+    are checked for themselves. Modes that are followed by their shape are known at samples only,
+    unless their followers are given; raises LostModeError where a shape is lost between samples.
     """
-    if not asked.terms or asked.followed:
+    if not asked.terms or (asked.followed and not own):
         return Lowest(0.0, 0.0)
     q, found = path.at(y)[0], []
+    each: list[tuple[slice, Room]] = []
     if isinstance(asked, DriveLimit):
         for one, rows in zip(path.parts, path.rows, strict=True):
-            low = least_along(_DriveRoom(model, asked, one.trajectory, y), q[rows], WITHIN)
-            found.append(Lowest(low.room, rows.start + low.at))
-        return min(found)
-    for name, own in asked.along:
-        part = asked.part(name, own)
-        room = _Room(model, part, path.between(part.rows, y), y)
+            each.append((rows, _drive_room(model, asked, one.trajectory, y)))
+    for name, rows in asked.along:
+        part = asked.part(name, rows)
+        if isinstance(part, StaticLimit):
+            room = _static_room(part, path.between(part.rows, y), y)
+        else:
+            room = _room(model, path, [part], y, own)
+        each.append((part.rows, room))
+    for rows, room in each:
         try:
-            low = least_along(room, q[part.rows], WITHIN)
+            low = least_along(room, q[rows], WITHIN)
         except TrajectoryError as lost:
             low = Lowest(-np.inf, lost.place or 0.0)
-        found.append(Lowest(low.room, part.rows.start + low.at))
+        found.append(Lowest(low.room, rows.start + low.at))
     return min(found)
-
-
-@dataclass(frozen=True, eq=False)
-class _DriveRoom:
-    """1 − |τ|/max (n,) of one drive at places along the samples of a trajectory."""
-
-    model: Model
-    asked: DriveLimit
-    trajectory: Trajectory
-    y: Floats
-
-    def __call__(self, at: Floats) -> Floats:
-        times = self.trajectory.time_s
-        time_s = np.interp(at, np.arange(len(times)), times)
-        tau = self.model.drives.exerted(self.trajectory, time_s, self.y)
-        return np.asarray(1.0 - np.abs(tau[:, self.asked.load.column]) / self.asked.allowed[1])
-
-
-@dataclass(frozen=True, eq=False)
-class _Room:
-    """The room (n,) of one part of a target at places along its samples."""
-
-    model: Model
-    asked: Requirement
-    poses: Callable[[Floats], Floats]
-    y: Floats
-
-    def __call__(self, at: Floats) -> Floats:
-        edges = _between(at, np.column_stack([self.asked.lower, self.asked.upper]))
-        fine = replace(self.asked, lower=edges[:, 0], upper=edges[:, 1], along=())
-        fine, q = replace(fine, rows=slice(0, len(at))), self.poses(at)
-        if isinstance(fine, StaticLimit):
-            curve = fine.way.at(q, self.y)
-            if fine.way.target.limit == "at_least":  # of the stiffness, not of its inverse
-                return np.asarray(fine.upper / np.maximum(curve, RIGID) - 1.0)
-        else:
-            hz, nothing = self.model.frequencies(q, self.y, fine.top), np.zeros((len(at), 0))
-            curve = fine.curve(Solved(hz, nothing, nothing.astype(np.intp)))
-        beyond = [rows.scale * (curve - rows.edge) for rows in fine.edge_rows()]
-        return np.asarray(-np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0))
-
-
-def least_room(
-    model: Model, band: ForbiddenBand, row: ClearanceRow, path: Trajectories, y: Floats
-) -> float:
-    """The room of a band that was found to be clear, within `WITHIN` of itself."""
-    if not row.clear:
-        return row.room
-    q, poses = path.at(y)[0][band.rows], path.between(band.rows, y)
-    motion = BandMotion(model, band, row.below, q, y, row.raised, None, poses)
-    return least_along(motion.room, q, WITHIN).room
 
 
 def finer_path(
@@ -350,7 +332,7 @@ def finer_path(
         room = low.room
         if one.is_aim:  # what it has at samples is what counts
             here = np.arange(len(one.lower), dtype=np.float64)
-            own = _Room(model, one, path.between(one.rows, y), y)(here)
+            own = _room(model, path, [one], y)(here)
             room = low.room / float(own.min()) - 1.0
         if room < -LIMIT:
             k = int(low.at)
@@ -360,31 +342,6 @@ def finer_path(
                 time_s
             )
     return path.with_instants(times)
-
-
-def followed_between(scene: Scene, asked: Requirement, y: Floats) -> float:
-    """The largest error of a target on followed modes between samples that are far apart, else 0.
-
-    Raises LostModeError where a shape is lost between samples.
-    """
-    q, worst = scene.path.at(y)[0], 0.0
-    for name, rows in asked.along if asked.terms and asked.followed else ():
-        part = asked.part(name, rows)
-        at = places(q[part.rows])
-        if len(at) == len(part.hz):
-            continue
-        path, k = _refined(scene.path, part.rows, at)
-        needed = np.isin(np.arange(len(path.q)), k)
-        shapes = [
-            replace(one, path=path, needed=needed & one.needed.any())
-            for one in followers(scene, [asked])
-        ]
-        found = follow_all(scene.model, path, shapes, y, part.mode).solved
-        edges = _between(at, np.column_stack([part.lower, part.upper]))
-        fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=(), rows=slice(0, len(at)))
-        errors = fine.errors(Solved(found.hz[k], found.followed[k], found.numbers[k]))
-        worst = max(worst, float(np.abs(errors).max()))
-    return worst
 
 
 def wanting(found: Sequence[ClearanceRow]) -> float:

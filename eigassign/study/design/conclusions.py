@@ -35,7 +35,7 @@ from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.errors import EigassignError
 from eigassign.study.checks.accuracy import raised_by
-from eigassign.study.design.clearance import WITHIN, least_room, lowest_room
+from eigassign.study.design.clearance import WITHIN, check_band, lowest_room
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, can_be_met
 from eigassign.study.design.search.response import Outlook
@@ -215,7 +215,8 @@ def _rooms(found: Found, wanted: Sequence[Requirement], y: Floats) -> Iterator[f
         return
     for one in found.task.designs(y):
         for band, row in zip(found.task.bands, found.clearances, strict=True):
-            yield least_room(model, band, row, path, one)
+            judged = band, row.below, one, found.task.followers, row.raised, WITHIN
+            yield check_band(model, path, *judged).room if row.clear else row.room
 
 
 MOST_CHOICES = 60  # searches to say whether some limits can be met together

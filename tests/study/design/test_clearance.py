@@ -10,13 +10,19 @@ from scenes import SHIPPED, changed, scene_of
 
 import eigassign
 from eigassign.assignment import ForbiddenBand
+from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 from eigassign.pipeline import solve_case
-from eigassign.study import BandMotion, Scene, load_case
+from eigassign.study import Scene, check_band, load_case
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
+
+
+def still(q: np.ndarray) -> Trajectories:
+    """The poses q (n, n_q), a second apart."""
+    return Trajectories((NamedTrajectory("1", Trajectory(np.arange(float(len(q))), q)),))
 
 
 def band(scene: Scene, low: float, high: float) -> ForbiddenBand:
@@ -26,7 +32,7 @@ def band(scene: Scene, low: float, high: float) -> ForbiddenBand:
 
 def test_room_is_the_least_distance_to_an_edge(arm: Scene) -> None:
     hz = arm.model.frequencies(arm.path.q, arm.initial, 2)
-    found = BandMotion(arm.model, band(arm, 230.0, 300.0), 1, arm.path.q, arm.initial).judged()
+    found = check_band(arm.model, arm.path, band(arm, 230.0, 300.0), 1, arm.initial)
     assert found.clear
     assert found.counted
     exact = min(1.0 - hz[:, 0].max() / 230.0, hz[:, 1].min() / 300.0 - 1.0)
@@ -43,20 +49,20 @@ def test_a_mode_that_passes_a_band_between_two_samples_is_seen(
     way = np.linspace(q[0], q[1], 2_001)
     hz = arm.model.frequencies(way, arm.initial, 1)[:, 0]
     two = arm.model.frequencies(q, arm.initial, 1)[:, 0]
-    width = 0.02 * np.ptp(hz)
+    width, path = 0.02 * np.ptp(hz), still(q)
     for low in np.linspace(hz.min(), hz.max() - width, 9):
         if two.max() < low or two.min() > low + width:
             below = int(two.max() < low)
             there = ForbiddenBand("", "", (), slice(0, 2), np.full(2, low), np.full(2, low + width))
-            assert not BandMotion(arm.model, there, below, q, arm.initial).judged().clear
+            assert not check_band(arm.model, path, there, below, arm.initial).clear
     above = ForbiddenBand("", "", (), slice(0, 2), *np.full((2, 2), 1.02 * hz.max()))
-    assert BandMotion(arm.model, above, 1, q, arm.initial).judged().clear
+    assert check_band(arm.model, path, above, 1, arm.initial).clear
 
 
 def test_a_forged_answer_is_rejected(arm: Scene) -> None:
     for low, high, below in ((150.0, 300.0, 1), (230.0, 300.0, 2), (230.0, 300.0, 0)):
-        forged = band(arm, low, high), below, arm.path.q
-        assert not BandMotion(arm.model, *forged, arm.initial).judged().clear
+        forged = band(arm, low, high), below, arm.initial
+        assert not check_band(arm.model, arm.path, *forged).clear
 
 
 @pytest.mark.parametrize("low", [196.0, pytest.param(203.0, marks=pytest.mark.slow)])
@@ -100,12 +106,12 @@ def test_a_mode_that_mesh_or_reduced_links_raise_beyond_a_band_is_not_clear_of_i
     assert scene.model.frequencies(pose, scene.initial, 3)[0, below] > high
     assert true.model.frequencies(pose, scene.initial, 3)[0, below] < low
     there = ForbiddenBand("band", "", (), slice(0, 1), np.array([low]), np.array([high]))
-    found = BandMotion(scene.model, there, below, pose, scene.initial).judged()
+    found = check_band(scene.model, still(pose), there, below, scene.initial)
     assert found.counted
     assert not found.clear
     assert found.raised is not None
     assert found.raised > high / low - 1.0
-    assert BandMotion(true.model, there, below + 1, pose, scene.initial).judged().clear
+    assert check_band(true.model, still(pose), there, below + 1, scene.initial).clear
 
 
 def test_links_left_to_auto_are_modelled_up_to_the_bands(tmp_path: Path) -> None:
@@ -229,5 +235,5 @@ def test_a_coordinate_that_only_trembles_asks_for_no_more_points(arm: Scene) -> 
 
     q = np.column_stack([np.linspace(1.7, 1.9, 21), 5.3 + 1e-12 * (-1.0) ** np.arange(21)])
     there = ForbiddenBand("", "", (), slice(0, 21), np.full(21, 230.0), np.full(21, 300.0))
-    BandMotion(Counting(), there, 1, q, arm.initial).judged()  # type: ignore[arg-type]
+    check_band(Counting(), still(q), there, 1, arm.initial)  # type: ignore[arg-type]
     assert max(solved) <= 21

@@ -554,7 +554,10 @@ def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...
     """The bands that are not left out, checked at a design, in the scenario of least room."""
     return tuple(
         min(
-            (check_band(task.scene, task.followers, band, k, one) for one in task.designs(y)),
+            (
+                check_band(task.scene.model, task.scene.path, band, k, one, task.followers)
+                for one in task.designs(y)
+            ),
             key=lambda row: (row.clear, row.room),
         )
         for band, k in zip(task.bands, below, strict=True)
