@@ -19,7 +19,7 @@ from pathlib import Path
 import chart_cases
 
 from eigassign import load_case
-from eigassign.chart import QUICK, Effort, Request
+from eigassign.chart import QUICK, Effort
 from eigassign.output import Table, chart_tables, write_chart
 from eigassign.pipeline import Options, chart_case
 
@@ -37,7 +37,7 @@ def main(names: list[str]) -> None:
             path = Path(folder) / f"{name}.yaml"
             path.write_text(CASES[name](), encoding="utf-8")
             options = Options(use_cache=False, progress=lambda line: print(line, file=sys.stderr))
-            chart = chart_case(load_case(path), options, effort, Request())
+            chart = chart_case(load_case(path), options, effort)
         machine = common.machine()  # before the results of an earlier run are changed
         target = common.RESULTS / f"chart_{name}"
         shutil.rmtree(target, ignore_errors=True)

@@ -6,9 +6,7 @@ Evaluations are timed in large batches, as a search over designs asks for them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +26,11 @@ from eigassign.chart.question import (
 from eigassign.chart.results import (
     Advice,
     Asked,
-    AutoTakes,
     Chart,
     ChartPoint,
     Errors,
     Front,
     MeshRow,
-    Request,
     Timing,
     machine,
 )
@@ -48,28 +44,25 @@ Floats = NDArray[np.float64]
 
 
 def compare_methods(
-    scene: Scene, effort: Effort, request: Request, progress: Callable[[str], None]
+    scene: Scene, effort: Effort, accuracies: Sequence[float], progress: Callable[[str], None]
 ) -> Chart:
-    """Time against error of every method; no meshes and designs yet.
+    """Time against error of every method; no meshes yet.
 
     Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
     """
     bench = build_bench(scene, effort)
     progress("solving the points of the question exactly")
     question = build_question(bench)
-    charted, skipped = chart_methods(bench, question, request.accuracies, progress)
-    one, n = float(question.asked.trajectory_samples), request.evaluations
-    counts = {"one trajectory": one, "1000 trajectories": 1000.0 * one}
-    named = counts | ({f"{n:g} evaluations": n} if n else {}) | {"online alone": None}
-    asked, notes = replace(question.asked, evaluations=n or one), list(skipped_notes(skipped))
-    file = scene.file
+    charted, skipped = chart_methods(bench, question, progress)
+    one, asked, file = float(question.asked.trajectory_samples), question.asked, scene.file
+    named = {"one trajectory": one, "1000 trajectories": 1000.0 * one, "online alone": None}
     return Chart(
         title=file.title, case_name=file.path.stem, case_sha256=file.sha256,
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
         asked=asked, points=tuple(charted), skipped=tuple(skipped.items()),
         fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named.items()),
-        advice=tuple(advise(charted, asked, request, skipped)),
-        notes=tuple(notes), warnings=scene.warnings,
+        advice=tuple(advise(charted, asked, accuracies)),
+        notes=tuple(skipped_notes(skipped)), warnings=scene.warnings,
     )  # fmt: skip
 
 
@@ -84,14 +77,14 @@ def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
 
 
 def chart_methods(
-    bench: Bench, question: Question, accuracies: Sequence[float], progress: Callable[[str], None]
+    bench: Bench, question: Question, progress: Callable[[str], None]
 ) -> tuple[list[ChartPoint], dict[str, str]]:
     """A point for every method, exact solvers first; of those that cannot answer, why.
 
     After a set-up that takes over ``effort.most_s`` no other of its family is made.
     """
     charted, skipped, ended = list[ChartPoint](), dict[str, str](), dict[str, str]()
-    for method in list_methods(bench, accuracies):
+    for method in list_methods(bench):
         if method.family not in ended:
             progress(f"charting {method.family}")
         exact = (p.online.median_s for p in charted if p.family.startswith("exact"))
@@ -188,11 +181,6 @@ def chart_meshes(
 # --- Which methods no other beats, and what to choose
 
 
-def _rivals(points: Sequence[ChartPoint]) -> list[ChartPoint]:
-    """The points without those that ``order: auto`` takes, whose time lacks that of choosing."""
-    return [p for p in points if not p.method.startswith("auto ")]
-
-
 def front(
     points: Sequence[ChartPoint], name: str, evaluations: float | None, floor_hz: float
 ) -> Front:
@@ -200,10 +188,7 @@ def front(
 
     A point that equals another in one of the two and is no better in the other is beaten.
     """
-    able = [
-        (p.cost_s(evaluations), max(p.everywhere.worst_hz, floor_hz), p.method)
-        for p in _rivals(points)
-    ]
+    able = [(p.cost_s(evaluations), max(p.everywhere.worst_hz, floor_hz), p.method) for p in points]
     kept, best = list[str](), np.inf
     for _, error, method in sorted(able, key=lambda each: each[:2]):
         if error < best:
@@ -212,74 +197,32 @@ def front(
 
 
 def advise(
-    points: Sequence[ChartPoint], asked: Asked, request: Request, skipped: Mapping[str, str]
+    points: Sequence[ChartPoint], asked: Asked, accuracies: Sequence[float]
 ) -> Iterator[Advice]:
-    """What to choose for each number of evaluations, in words and as data.
+    """What to write in the case for each accuracy: the lowest order that has it, in words too.
 
-    For an accuracy the quickest method that is accurate enough. Nothing is advised below round-off:
-    no method can be seen to be that accurate. For a time, which counts the set-up, the most
-    accurate method, the quicker of equals. The words are of the first of them that a case can ask
-    for.
+    Nothing is advised below round-off: no method can be seen to be that accurate.
     """
-    floor, rivals = asked.floor_hz / asked.typical_hz, _rivals(points)
-    whole = (float(asked.trajectory_samples), 1000.0 * asked.trajectory_samples)
-    counts = (request.evaluations,) if request.evaluations else whole
-    wanted = [("accuracy", a, None) for a in request.accuracies]
-    for n, each in product(counts, [*wanted, ("budget", None, request.budget_s)]):
-        advice = Advice(*each, n)
-        if advice.accuracy is not None and advice.accuracy < floor:
-            words = f"nothing is within {_share(advice.accuracy)} of exact: round-off moves even "
-            words += f"exact solves by {floor:.1e}"
-            yield replace(advice, words=words, is_below_round_off=True)
-        elif advice.accuracy is not None or advice.budget_s is not None:
-            yield _chosen(advice, rivals, points, skipped)
-
-
-def _chosen(
-    advice: Advice,
-    rivals: Sequence[ChartPoint],
-    points: Sequence[ChartPoint],
-    skipped: Mapping[str, str],
-) -> Advice:
-    """The advice with the best method, the best that a case can ask for, and what `auto` takes."""
-    n, budget, accuracy = advice.evaluations, advice.budget_s, advice.accuracy or 0.0
-    mine = f"auto {accuracy:.0e}"
-    own = [p for p in points if p.method.startswith(mine)]
-    for why in [why for method, why in skipped.items() if method.startswith(mine)]:
-        advice = replace(advice, auto=AutoTakes(refused=why))
-    for p in own:
-        took, worst = p.parameters["choosing_s"], p.everywhere.worst_relative
-        advice = replace(advice, auto=AutoTakes(p.method, worst, p.cost_s(n), took))
-    if budget is None:
-        able = [p for p in rivals if p.everywhere.worst_relative <= accuracy]
-        keyed = [p for p in able if p.key]  # the lowest order, whatever the clock says
-        keyed += [p for p in own if p.everywhere.worst_relative <= accuracy]
-        able.sort(key=lambda p: p.cost_s(n))
-    else:
-        able = [p for p in rivals if p.cost_s(n) <= budget]
-        able.sort(key=lambda p: (p.everywhere.worst_hz, p.cost_s(n)))
-        keyed = [p for p in able if p.key]
-    for p in able[:1]:
-        advice = replace(advice, method=p.method, parameters=p.parameters, total_s=p.cost_s(n))
-        advice = replace(advice, worst_relative=p.everywhere.worst_relative)
-    for p in keyed[:1]:
-        advice = replace(advice, key=p.key, key_method=p.method, key_sample_s=p.online.median_s)
-        advice = replace(advice, key_relative=p.everywhere.worst_relative)
-    return replace(advice, words=_words(advice, rivals))
-
-
-def _words(advice: Advice, rivals: Sequence[ChartPoint]) -> str:
-    """What to write in the case, and what that gives."""
-    if advice.key is not None:
-        worst, each = _share(advice.key_relative or 0.0), time_in_words(advice.key_sample_s or 0.0)
-        words = f"write `{advice.key}` under `expansion`: {worst} off at worst, {each} a sample"
-        exact = [time_in_words(p.online.median_s) for p in rivals if p.family == "exact"][:1]
-        return words + "".join(f" (an exact solve takes {time})" for time in exact)
-    within = f"within {_share(advice.accuracy)} of exact" if advice.accuracy else "in time"
-    nearest = min((p.everywhere.worst_relative for p in rivals if p.key), default=None)
-    off = "" if nearest is None else f", the nearest is {_share(nearest)} off at worst"
-    which = "write `method: sequential` under `assignment`, which needs no expansion"
-    return f"{which}: no order that was charted is {within}{off}"
+    floor = asked.floor_hz / asked.typical_hz
+    keyed = [p for p in points if p.key]
+    exact = [time_in_words(p.online.median_s) for p in points if p.family == "exact"][:1]
+    for accuracy in accuracies:
+        able = [p for p in keyed if p.everywhere.worst_relative <= accuracy][:1]
+        if accuracy < floor:
+            words = f"nothing is within {_share(accuracy)} of exact: round-off moves even exact "
+            yield Advice(accuracy, f"{words}solves by {floor:.1e}", is_below_round_off=True)
+        elif not able:
+            nearest = min((p.everywhere.worst_relative for p in keyed), default=None)
+            off = "" if nearest is None else f", the nearest is {_share(nearest)} off at worst"
+            which = "write `method: sequential` under `assignment`, which needs no expansion"
+            words = f"{which}: no order that was charted is within {_share(accuracy)} of exact{off}"
+            yield Advice(accuracy, words)
+        for p in able:
+            worst, each = p.everywhere.worst_relative, p.online.median_s
+            words = f"write `{p.key}` under `expansion`: {_share(worst)} off at worst, "
+            words += f"{time_in_words(each)} a sample"
+            words += "".join(f" (an exact solve takes {time})" for time in exact)
+            yield Advice(accuracy, words, p.key, p.method, worst, each)
 
 
 def _share(relative: float) -> str:

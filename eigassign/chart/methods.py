@@ -6,7 +6,7 @@ SciPy's eigensolver is what people use without eigassign.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from math import comb
@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from eigassign.chart.question import Bench, Points, timed
-from eigassign.errors import AccuracyError
+from eigassign.chart.question import Bench, Points
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.study.pictures.drawing import spread_samples
-from eigassign.study.planning import choose_order
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +51,7 @@ class Method:
         return bool(self.use or self.key) or self.family == "exact"
 
 
-def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
+def list_methods(bench: Bench) -> Iterator[Method]:
     """The list of all methods."""
     model = bench.scene.model
     kind, solver = "dense" if model.pencil.is_dense else "sparse", Built(bench.exact)
@@ -64,7 +62,6 @@ def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
         peer = Built(partial(by_scipy, model, bench.scene.expansions.modes))
         yield Method("exact dense, SciPy one by one", "exact by others", told, lambda: peer)
     yield from _series(bench)
-    yield from _auto(bench, accuracies)
     yield from _reduced_models(bench)
 
 
@@ -127,36 +124,8 @@ def _series(bench: Bench) -> Iterator[Method]:
         yield Method(f"Taylor {order} at {where}", "Taylor, several points", told, build, use)
 
 
-def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
-    """What ``expansion.order: auto`` takes, by the very function that a run asks.
-
-    The loosest accuracy first; after a choice that takes too long no other is made.
-    """
-    scene, full, spent = bench.scene, bench.scene.expansions.full, 0.0
-    told: dict[str, Any]
-    for accuracy in sorted(accuracies, reverse=True):
-        expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
-        case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
-        name = f"auto {accuracy:.0e}"
-        try:
-            if spent > bench.effort.most_s:
-                raise AccuracyError(f"choosing took {spent:.1f} s before")
-            choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
-        except AccuracyError as error:
-            told = {"refused": str(error)}
-        else:
-            q = np.vstack([choice.q0, *choice.more_q])
-            told = {"order": choice.order, "accuracy": accuracy}
-            told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
-            name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        build, key = partial(_expanded, bench, told, False), f"order: auto, accuracy: {accuracy:g}"
-        yield Method(name, "Taylor, auto", told, build, key=key)
-
-
 def _expanded(bench: Bench, told: Mapping[str, Any], inverse: bool) -> Built:
     """λ about one or several points, of which the nearest answers, or 1/λ about one."""
-    if why := told.get("refused"):
-        raise AccuracyError(why)
     pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
     how = {key: told[key] for key in ("order", "linear_in_y") if key in told}
     points = zip(np.atleast_2d(told["q0"]), np.atleast_2d(told["y0"]), strict=True)

@@ -39,21 +39,20 @@ class Effort:
     quick: bool = False
     random_points: int = 600  # at which methods are compared, beside
     samples_per_design: int = 152  # along the trajectory at several designs
-    most_s: float = 60.0  # for the exact answers, one method's set-up, one search for a design
+    most_s: float = 60.0  # for the exact answers, one method's set-up
     orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
     coefficients: int = 5000  # largest set that is expanded
     half_orders: tuple[int, ...] = (0, 1, 2, 3)
     expansion_points: tuple[int, ...] = (1, 3, 5)
     factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
     most_dof: int = 40_000  # of a refined mesh
-    objectives: int = 600  # exact evaluations of the objective in a search
     repeats: int = 15  # of a job, at most, and none is begun after
     repeat_s: float = 1.0  # its first run included
 
 
 QUICK = Effort(
     quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
-    expansion_points=(1, 3), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500, objectives=60,
+    expansion_points=(1, 3), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
     repeat_s=0.1,
 )  # fmt: skip
 
@@ -180,7 +179,7 @@ def build_question(bench: Bench) -> Question:
     asked = Asked(
         modes=modes, n_dof=scene.model.n_dof, random_points=n_random, designs=len(runs),
         samples_per_design=n, trajectory_samples=samples,
-        evaluations=float(samples), seed=SEED, typical_hz=float(np.median(exact_hz)),
+        seed=SEED, typical_hz=float(np.median(exact_hz)),
         floor_hz=floor * float(exact_hz.max()),
     )  # fmt: skip
     return Question(points, exact_hz, runs, asked)

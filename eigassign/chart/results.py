@@ -20,9 +20,9 @@ from eigassign._version import __version__
 from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
 from eigassign.study.results import CaseRow
 
-SCHEMA = 6  # of chart.json
+SCHEMA = 7  # of chart.json
 _BREAK_EVEN = "evaluations from which it beats exact solves"
-_AUTO, _TIME = "order: auto takes", lambda s: time_in_words(s) if s else ""  # none is not told
+ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)  # worst relative errors in Hz that are advised for
 ErrorHz = Annotated[Hertz, Fact(digits=".2e")]
 RelativeError = Annotated[Share, Fact("of the frequency", "relative", digits=".1e")]
 _KINDS = {  # of methods whose family begins so: the first that fits
@@ -37,11 +37,6 @@ _KINDS = {  # of methods whose family begins so: the first that fits
 def kind_of(family: str) -> str:
     """The kind of a family's methods in words."""
     return next(kind for beginning, kind in _KINDS.items() if family.startswith(beginning))
-
-
-def excess_over(best: float, objective: float) -> float:
-    """(F − F_best) / F_best; an F_best below 1e-12, a rms error of 1e-6, is no yardstick."""
-    return (objective - best) / max(best, 1e-12)
 
 
 def machine() -> dict[str, Any]:
@@ -60,15 +55,6 @@ def machine() -> dict[str, Any]:
         "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
         "threads": "1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
     }
-
-
-@dataclass(frozen=True)
-class Request:
-    """The advice that is asked for."""
-
-    accuracies: tuple[float, ...] = (1e-2, 1e-4, 1e-6, 1e-8)  # worst relative errors in Hz
-    budget_s: float | None = None  # advice for this time, too
-    evaluations: float | None = None  # one trajectory, and a thousand of them, if None
 
 
 @dataclass(frozen=True)
@@ -147,48 +133,19 @@ class Front:
 
 
 @dataclass(frozen=True)
-class AutoTakes:
-    """What ``expansion.order: auto`` takes for an accuracy, as charted, or why it refuses.
-
-    ``choosing_s`` went before and is no part of ``total_s``.
-    """
-
-    method: Annotated[str | None, Fact("", _AUTO, digits=lambda m: m.partition(": ")[2])] = None
-    worst_relative: Annotated[Share | None, Fact(heading="its worst error")] = None
-    total_s: Seconds | None = None
-    choosing_s: Annotated[Seconds, Fact("", "choosing took", digits=_TIME)] = 0.0
-    refused: Annotated[str, Fact("why it refuses")] = ""
-
-
-@dataclass(frozen=True)
 class Advice:
-    """The cheapest method for an accuracy, or the most accurate for a budget.
+    """What to write in a case for an accuracy: the lowest order that was measured to have it."""
 
-    ``key`` is the same of what a case can ask for, ``words`` tell it in a sentence.
-    """
-
-    asked: Annotated[str, Fact("accuracy or budget")]
-    accuracy: Annotated[Share | None, Fact("the worst relative error in Hz")]
-    budget_s: Seconds | None
-    evaluations: Annotated[float, Fact(digits=",.0f")]
-    method: Annotated[str | None, Fact("null: no charted method does it", absent="none")] = None
-    parameters: Mapping[str, Any] | None = None
-    worst_relative: Annotated[Share | None, Fact(heading="worst error")] = None
-    total_s: Annotated[Seconds | None, Fact("set-up and all evaluations", "time in all")] = None
-    words: Annotated[str, Fact("what to write in the case, in a sentence")] = ""
+    accuracy: Annotated[
+        Share,
+        Fact("the worst relative error in Hz", "asked for", digits=lambda a: f"{100.0 * a:.2g} %"),
+    ]
+    words: Annotated[str, Fact("what to write in the case, in a sentence")]
     key: Annotated[str | None, Fact("null: none does it", "under expansion", absent="none")] = None
-    key_method: Annotated[str | None, Fact("the charted method that the key asks for")] = None
-    key_relative: Annotated[Share | None, Fact("its worst error", "worst error")] = None
-    key_sample_s: Annotated[Seconds | None, Fact("its time", "a sample", "", time_in_words)] = None
+    method: Annotated[str | None, Fact("the charted method that the key asks for")] = None
+    worst_relative: Annotated[Share | None, Fact("its worst error", "worst error")] = None
+    sample_s: Annotated[Seconds | None, Fact("its time", "a sample", "", time_in_words)] = None
     is_below_round_off: bool = False
-    auto: Annotated[AutoTakes | None, Fact("null: not looked at")] = None
-
-    @property
-    def asked_for(self) -> Annotated[str, Fact(heading="asked for")]:
-        """The accuracy, or the time, in words."""
-        if self.accuracy is None:
-            return f"in {time_in_words(self.budget_s or 0.0)}"
-        return f"{100.0 * self.accuracy:.2g} %"
 
 
 @dataclass(frozen=True)
@@ -205,24 +162,6 @@ class MeshRow:
 
 
 @dataclass(frozen=True)
-class DesignRun:
-    """One way to a design: time against F, the mean square of f/f_d − 1 by exact solves."""
-
-    method: str
-    ours: bool
-    parameters: Mapping[str, Any]
-    seconds: Annotated[Timing, Fact(heading="time")]
-    solves: Annotated[int, Fact(heading="exact solves")]
-    design: tuple[float, ...]
-    objective: Annotated[float, Fact(digits=".6e")]
-    max_relative: Annotated[Share, Fact("distance to the target in Hz, exact", "worst")]
-    rms_relative: Annotated[Share, Fact(heading="rms")]
-    excess: Annotated[float, Fact("over the best, relative", "above best", digits=".1e")]
-    trace: Annotated[tuple[tuple[float, float], ...], Fact("seconds, the best F so far")] = ()
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Asked:
     """The question that every method is put."""
 
@@ -232,7 +171,6 @@ class Asked:
     designs: int
     samples_per_design: int
     trajectory_samples: int
-    evaluations: Annotated[float, Fact("of one trajectory if nothing else is asked for")]
     seed: int
     typical_hz: Hertz
     floor_hz: Annotated[Hertz, Fact("round-off of exact answers: no error below it counts")]
@@ -256,7 +194,6 @@ class Chart:
     fronts: tuple[Front, ...]
     advice: tuple[Advice, ...]
     mesh: tuple[MeshRow, ...] = ()
-    designs: tuple[DesignRun, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     seconds: Annotated[Seconds, Fact("that the chart took")] = 0.0

@@ -263,17 +263,6 @@ def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
     type=arguments.ACCURACY,
     help="Advise for this largest relative error (default: for several).",
 )
-@click.option(
-    "--budget",
-    "budget_s",
-    type=arguments.POSITIVE,
-    help="Advise for this many seconds in all (default: no limit).",
-)
-@click.option(
-    "--evaluations",
-    type=arguments.COUNT,
-    help="Advise for this many evaluations (default: for one trajectory, and for many).",
-)
 @arguments.writing("results/<case>_chart")
 @arguments.json
 @arguments.common
@@ -281,18 +270,17 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     """Compare time and accuracy of all methods on one case.
 
     Times exact solves, expansions and reduced models on this machine, and compares them with the
-    same exact frequencies. Compares meshes, and methods that search for a design. Writes figures,
+    same exact frequencies; compares meshes. Writes figures,
     chart.json and report.html, and says what to write in the case.
     """
     from eigassign.chart.question import QUICK, Effort
-    from eigassign.chart.results import Request
+    from eigassign.chart.results import ACCURACIES
     from eigassign.pipeline import studies as charting
 
-    accuracies = Request.accuracies if how["accuracy"] is None else (how["accuracy"],)
-    request = Request(accuracies, how["budget_s"], how["evaluations"])
+    accuracies = ACCURACIES if how["accuracy"] is None else (how["accuracy"],)
     effort = QUICK if quick else Effort()
     with reporting(how) as reporter:
-        folder, made = charting.chart(case, _options(how, reporter), effort, request)
+        folder, made = charting.chart(case, _options(how, reporter), effort, accuracies)
         reporter.warn(made.warnings)
     if as_json:
         print_json({"run_folder": str(folder), **vars(made)})

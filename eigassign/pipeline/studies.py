@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eigassign.brief import cut
 from eigassign.chart.comparison import chart_meshes, compare_methods
-from eigassign.chart.designs import chart_designs
 from eigassign.chart.question import Effort
-from eigassign.chart.results import Chart, Request
+from eigassign.chart.results import ACCURACIES, Chart
 from eigassign.errors import AccuracyError
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.update import update_figures
@@ -86,18 +86,20 @@ def update_case(case: BuiltCase, options: Options = DEFAULT) -> Updated:
 
 
 def chart(
-    path: str | Path, options: Options, effort: Effort, request: Request
+    path: str | Path, options: Options, effort: Effort, accuracies: Sequence[float]
 ) -> tuple[Path, Chart]:
     """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
     case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force, "_chart") as folder:
-        made = chart_case(case, options, effort, request)
+        made = chart_case(case, options, effort, accuracies)
         options.progress("writing the chart")
         write_chart(made, folder.hidden, options.figures, options.report)
     return folder.path, made
 
 
-def chart_case(case: BuiltCase, options: Options, effort: Effort, request: Request) -> Chart:
+def chart_case(
+    case: BuiltCase, options: Options, effort: Effort, accuracies: Sequence[float] = ACCURACIES
+) -> Chart:
     """Time against accuracy of every method on this case; nothing written.
 
     Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
@@ -112,13 +114,10 @@ def chart_case(case: BuiltCase, options: Options, effort: Effort, request: Reque
             usual = type(case.file.expansion)().order
             scene = prepare(case, stages, None, order=int(usual))
         with stages("methods", "charting methods"):
-            made = compare_methods(scene, effort, request, progress)
+            made = compare_methods(scene, effort, accuracies, progress)
         with stages("mesh", "charting meshes"):
             poses = scene.path.q[scene.path.spread(5)]
             x = scene.model.x(poses, scene.initial)
             mesh = chart_meshes(case.settled, x, scene.expansions.modes, effort)
-        with stages("designs", "charting ways to a design"):
-            solve_s = min(p.online.median_s for p in made.points if p.family == "exact")
-            designs, notes = chart_designs(scene, effort, solve_s, progress)
-    notes = (*made.notes, *truncation_notes(scene), *notes)
-    return replace(made, mesh=mesh, designs=designs, notes=notes, seconds=stages.total_s)
+    notes = (*made.notes, *truncation_notes(scene))
+    return replace(made, mesh=mesh, notes=notes, seconds=stages.total_s)

@@ -9,6 +9,5 @@ TINY = Effort(
     half_orders=(1, 2),
     expansion_points=(1, 3),
     factors=(0.5, 1.0, 2.0),
-    objectives=40,
     repeats=1,
 )

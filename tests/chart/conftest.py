@@ -4,7 +4,7 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
-from eigassign.chart import Chart, Request, compare_methods
+from eigassign.chart import ACCURACIES, Chart, compare_methods
 from eigassign.study import Scene
 
 
@@ -15,4 +15,4 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="session")
 def compared(arm: Scene) -> Chart:
-    return compare_methods(arm, TINY, Request(budget_s=10.0, evaluations=1e4), lambda line: None)
+    return compare_methods(arm, TINY, ACCURACIES, lambda line: None)

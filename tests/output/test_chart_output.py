@@ -1,7 +1,6 @@
 """What a chart leaves: figures, tables, a page and JSON, all from the same numbers."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,8 @@ import pytest
 from eigassign.chart import (
     Advice,
     Asked,
-    AutoTakes,
     Chart,
     ChartPoint,
-    DesignRun,
     Errors,
     Front,
     MeshRow,
@@ -38,16 +35,8 @@ def point(name: str, family: str, ours: bool, online: float, worst: float) -> Ch
     )  # fmt: skip
 
 
-def design(name: str, excess: float, trace: tuple[tuple[float, float], ...] = ()) -> DesignRun:
-    return DesignRun(
-        name, not trace, {}, timing(0.1), 3, (0.1, 0.2), 1e-4 * (1 + excess), 0.02, 0.01, excess,
-        trace,
-    )  # fmt: skip
-
-
 BEST = Advice(
-    "accuracy", 1e-2, None, 152.0, "exact dense", {}, 0.0, 0.0152,
-    "write `order: 4` under `expansion`: 0.05 % off", "order: 4", "Taylor 4 full", 5e-4, 1e-7,
+    1e-2, "write `order: 4` under `expansion`: 0.05 % off", "order: 4", "Taylor 4 full", 5e-4, 1e-7,
 )  # fmt: skip
 CHART = Chart(
     title="An <arm> & more",
@@ -57,11 +46,10 @@ CHART = Chart(
     version="1.0",
     quick=True,
     machine={"versions": {"Python": "3.12", "NumPy": "2"}, "blas": "blas 1", "threads": "1"},
-    asked=Asked((1,), 23, 30, 2, 9, 152, 152.0, 7, 200.0, 1e-10),
+    asked=Asked((1,), 23, 30, 2, 9, 152, 7, 200.0, 1e-10),
     points=(
         point("exact dense", "exact", True, 1e-4, 0.0),
         point("Taylor 4 full", "Taylor, full", True, 1e-7, 1e-1),
-        point("auto 1e-02: Taylor 4", "Taylor, auto", True, 1e-7, 1e-1),
         point("SciPy one by one", "exact by others", False, 2e-7, 1e-2),
         point("hopeless", "1/λ, full", True, 2e-7, np.inf),
     ),
@@ -71,24 +59,13 @@ CHART = Chart(
         Front("online alone", None, ("exact dense", "SciPy one by one", "Taylor 4 full")),
     ),
     advice=(
-        replace(BEST, auto=AutoTakes("auto 1e-02: Taylor 4", 5e-5, 0.00304, 0.4, "")),
-        replace(
-            BEST,
-            accuracy=1e-8,
-            key=None,
-            key_method=None,
-            key_relative=None,
-            key_sample_s=None,
-            auto=AutoTakes(None, None, None, 0.0, "it is too large"),
-        ),
-        replace(BEST, evaluations=152000.0),
-        Advice("budget", None, 1e-9, 152.0, words="nothing"),
+        BEST,
+        Advice(1e-8, "nothing"),
     ),
     mesh=(
         MeshRow(1.0, 7, 23, 0.06, 3e-4, 4.0, timing(1e-4)),
         MeshRow(2.0, 14, 44, 0.004, 2e-5, None, timing(2e-4, 0)),
     ),
-    designs=(design("program", 0.02), design("search", 0.0, ((0.1, 1e-3), (0.4, 1e-4)))),
     notes=("a note",),
     warnings=(),
     seconds=3.0,
@@ -99,22 +76,21 @@ def test_a_folder_holds_every_point_the_tables_and_the_figures(tmp_path: Path) -
     write_chart(CHART, tmp_path, kind="light")
     data = json.loads((tmp_path / "chart.json").read_text(), parse_constant=pytest.fail)
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
-    assert data["points"][4]["everywhere"]["worst_hz"] is None
+    assert data["points"][3]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
-    assert data["schema"] == 6
+    assert data["schema"] == 7
     page = (tmp_path / "report.html").read_text()
     assert "An &lt;arm&gt; &amp; more" in page
-    assert page.count("data:image/png;base64") == 4
+    assert page.count("data:image/png;base64") == 3
     for word in (
         "What to write in the case",
-        "The quickest of all methods",
         "All methods",
         "Mesh",
         "Machine",
     ):
         assert word in page
     figures = {path.name: path.read_bytes() for path in (tmp_path / "figures").iterdir()}
-    names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
+    names = ("cost_one_trajectory", "online_alone", "mesh")
     assert set(figures) == {f"{name}.png" for name in names}
     assert all(data.startswith(b"\x89PNG") for data in figures.values())
 
@@ -124,23 +100,13 @@ def table(title: str, chart: Chart = CHART) -> Table:
     return found
 
 
-def test_what_auto_takes_stands_beside_the_choice() -> None:
+def test_what_to_write_stands_with_its_error_and_its_time() -> None:
     shown = table("What to write in the case")
-    assert shown.columns[1:6] == (
-        *("under expansion", "worst error", "a sample", "order: auto takes", "its worst error"),
-    )
+    assert shown.columns == ("asked for", "under expansion", "worst error", "a sample")
     assert shown.rows == (
-        ("1 %", "order: 4", "0.0500 %", "100 ns", "Taylor 4", "0.00500 %", "400 ms", ""),
-        ("1e-06 %", "none", "", "", "", "", "", "it is too large"),
-        ("in 1 ns", "none", "", "", "", "", "", ""),
+        ("1 %", "order: 4", "0.0500 %", "100 ns"),
+        ("1e-06 %", "none", "", ""),
     )
-
-
-def test_the_quickest_of_all_methods_is_told_for_each_number_of_evaluations() -> None:
-    rows = [row[:5] for row in table("The quickest of all methods").rows]
-    assert rows[0] == ("1 %", "152", "exact dense", "0 %", "15.2 ms")
-    assert rows[2][:3] == ("1 %", "152,000", "exact dense")
-    assert rows[3] == ("in 1 ns", "152", "none", "", "")
 
 
 def test_the_page_is_a_sentence_that_names_a_key_one_plot_and_the_rest_is_folded(

@@ -1,4 +1,4 @@
-"""The figures of a chart: time against error on each front, elements, and ways to a design.
+"""The figures of a chart: time against error on each front, and elements.
 
 Every figure is a scatter over two logarithmic axes. Methods that differ by a setting are joined by
 a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
@@ -13,12 +13,11 @@ from itertools import cycle
 
 import numpy as np
 
-from eigassign.chart.results import Chart, ChartPoint, Front, excess_over, kind_of
+from eigassign.chart.results import Chart, ChartPoint, Front, kind_of
 from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 
-LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
 BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
 RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 
@@ -27,12 +26,11 @@ def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
     """The figures that this chart has something to show for; the time of a sample first."""
     plans = [_front(chart, f) for f in sorted(chart.fronts, key=lambda f: bool(f.evaluations))]
     plans += [_mesh(chart)] if chart.mesh else []
-    plans += [_designs(chart)] if chart.designs else []
     return tuple(plans)
 
 
 def _front(chart: Chart, front: Front) -> FigurePlan:
-    """The methods by family, over the band through the best; what auto takes is ringed."""
+    """The methods by family, over the band through the best; what to write is ringed."""
     asked, n = chart.asked, front.evaluations
     what = "time of a sample" if n is None else f"set-up and {n:,.0f} evaluations"
     name = "".join(c if c.isalnum() else "_" for c in front.name)
@@ -44,8 +42,7 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         f"Worst |f / f exact − 1| over {asked.random_points} random samples of trajectory × design "
         f"box and {asked.designs} × {asked.samples_per_design} samples along the trajectory at "
         "several designs. Filled: eigassign's; hollow: what people do without it; the band: no "
-        "charted method is both quicker and more accurate; ringed: taken by "
-        f"`expansion.order: auto`.{beyond}"
+        f"charted method is both quicker and more accurate.{beyond}"
     )
     floor = asked.floor_hz / asked.typical_hz
 
@@ -54,9 +51,8 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         y = np.array([100.0 * max(p.everywhere.worst_relative, floor) for p in points])
         return Curve(y, look, label, x, names=tuple(p.method for p in points))
 
-    taken = {a.auto.method for a in chart.advice if a.auto is not None}
     best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
-    ringed = [p for p in shown if p.method in taken]
+    ringed = [p for p in shown if p.method in {a.method for a in chart.advice[:1]}]
     curves = [
         (ours, curve([p for p in shown if p.family == family], PLAIN, kind_of(family)))
         for family, ours in dict.fromkeys((p.family, p.ours) for p in shown)
@@ -64,7 +60,7 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
     marks: list[Mark] = [
         Rule(100.0 * floor, PLAIN, note="round-off of exact solves"),
         curve(best, BAND),
-        *([curve(ringed, RING, "taken by order: auto")] if ringed else ()),
+        *([curve(ringed, RING, "to write in the case")] if ringed else ()),
         *_coloured(curves),
     ]
     room = (np.array([50.0 * floor]),)  # for the name of the level
@@ -95,25 +91,6 @@ def _mesh(chart: Chart) -> FigurePlan:
     )
     alt = "Discretisation error in Hz over the number of elements."
     return FigurePlan("mesh", heading, caption, alt, _scatter(heading, "elements", *panels))
-
-
-def _designs(chart: Chart) -> FigurePlan:
-    """Single answers as points, searches as lines of their improvements."""
-    best = min(chart.designs, key=lambda run: run.objective)
-    caption = (
-        "Exact objective (mean square of f/f_d − 1) above the best one that any method "
-        f"found ({best.objective:.6g}, by {best.method}), relative to it; searches with all their "
-        f"steps. What is nearer than {LEAST_EXCESS:.0e} is drawn there."
-    )
-    curves = []
-    for run in chart.designs:
-        seconds, found = np.array(run.trace or ((run.seconds.median_s, run.objective),)).T
-        excess = [max(excess_over(best.objective, value), LEAST_EXCESS) for value in found]
-        curves.append((run.ours, Curve(np.array(excess), PLAIN, run.method, seconds)))
-    heading = "Time to a design against the objective it reaches"
-    panel = Panel("objective above the best [relative]", (*_coloured(curves),), 3.8, True, None)
-    alt = "Scatter of excess objective over seconds for every way to a design."
-    return FigurePlan("designs", heading, caption, alt, _scatter(heading, "time [s]", panel))
 
 
 def _scatter(title: str, x: str, *panels: Panel) -> Graph:

@@ -24,15 +24,9 @@ def chart_tables(chart: Chart) -> tuple[Table, ...]:
 
 
 def _tables(chart: Chart) -> Iterator[Table]:
-    """What to write beside what auto takes, the quickest and all methods, mesh, designs."""
-    names = "asked_for key key_relative key_sample_s auto.method auto.worst_relative"
-    rows = [a for a in chart.advice if a.evaluations == chart.advice[0].evaluations]
-    names += " auto.choosing_s auto.refused"
-    refused = {"auto.refused": "refused"}
-    yield facts_table("What to write in the case", rows, names, "", **refused)
-    names = "asked_for evaluations method worst_relative total_s"
-    caption = "Set-up and all evaluations. Not all of these can be asked for in a case file."
-    yield facts_table("The quickest of all methods", chart.advice, names, caption)
+    """What to write, all methods, and mesh."""
+    names = "accuracy key worst_relative sample_s"
+    yield facts_table("What to write in the case", chart.advice, names)
     names = (
         "method offline online exact_solves everywhere.worst_hz everywhere.rms_hz "
         "trajectory.worst_hz everywhere.failed break_even use"
@@ -46,10 +40,6 @@ def _tables(chart: Chart) -> Iterator[Table]:
     names = "elements factor n_dof worst_hz worst_relative order solve"
     caption = "Against the limit extrapolated from the two finest; factor 1 is the case's own mesh."
     yield facts_table("Mesh", chart.mesh, names, caption)
-    names = "method seconds solves objective excess max_relative rms_relative note"
-    designs = sorted(chart.designs, key=lambda r: r.excess)
-    caption = "Objective and distances to the target by exact solves along the trajectory."
-    yield facts_table("Designs", designs, names, caption)
     m = dict(chart.machine)
     m["linear algebra"] = f"{m.pop('blas')}, threads: {m.pop('threads')}"
     m["versions"] = ", ".join(f"{name} {version}" for name, version in m["versions"].items())
