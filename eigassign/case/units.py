@@ -1,21 +1,20 @@
 """Quantities as people write them (`30 mm`, `69 GPa`, `104.1 deg`) → SI numbers, dimension-checked.
 
 A bare number is SI already. Angles and cycles are dimensions of their own, so that nothing converts
-between rad/s, 1/s and Hz silently. 5 rpm is 1/12 Hz where a speed of rotation is meant, as by an
-edge of a band; elsewhere it is neither that nor 0.52 rad/s, it is an error.
+between rad/s, 1/s and Hz silently. 5 rpm is a frequency of 1/12 Hz, and no angular rate.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
 from eigassign.case.reader import shown, suggestion
 
-Exponents = tuple[int, int, int, int, int]  # of kg, m, s, rad, cycle
+Exponents = tuple[int, ...]  # of kg, m, s, rad, cycle
 
 
 class QuantityError(ValueError):
@@ -51,16 +50,11 @@ class Unit:
     exponents: Exponents
     pi: int = 0
 
-    def power(self, n: int) -> Unit:
-        """Unit to the integer power ``n``."""
-        kg, m, s, rad, cycle = (n * e for e in self.exponents)
-        return Unit(self.factor**n, (kg, m, s, rad, cycle), n * self.pi)
-
-    def times(self, other: Unit) -> Unit:
-        """Product of two units."""
+    def times(self, other: Unit, n: int) -> Unit:
+        """Its product with the ``n``-th power of another."""
         pairs = zip(self.exponents, other.exponents, strict=True)
-        kg, m, s, rad, cycle = (a + b for a, b in pairs)
-        return Unit(self.factor * other.factor, (kg, m, s, rad, cycle), self.pi + other.pi)
+        exponents = tuple(a + n * b for a, b in pairs)
+        return Unit(self.factor * other.factor**n, exponents, self.pi + n * other.pi)
 
     def to_si(self, value: float) -> float:
         """``value`` in SI."""
@@ -93,18 +87,14 @@ _DIMENSIONS = (
     Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2", 1e-6, 1e24),
     Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad", 1e-12, 1e6),
     Dimension(
-        "rotational stiffness",
-        (1, 2, -2, -1, 0),
-        "N m/rad",
-        "kN m/rad, N m/arcmin, kgf m/arcmin",
-        1e-24,
-        1e24,
+        *("rotational stiffness", (1, 2, -2, -1, 0), "N m/rad"),
+        *("kN m/rad, N m/arcmin, kgf m/arcmin", 1e-24, 1e24),
     ),
     Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm, N/um", 1e-24, 1e24),
     Dimension("compliance", (-1, 0, 2, 0, 0), "m/N", "mm/N, um/N", 1e-24, 1e24),
     Dimension("transmission", (0, -1, 0, 1, 0), "rad/m", "rad/mm, deg/mm", 1e-12, 1e12),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
-    Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz", 1e-12, 1e15),
+    Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz, rpm", 1e-12, 1e15),
     Dimension("acceleration", (0, 1, -2, 0, 0), "m/s2", "mm/s2", 1e-12, 1e9),
     Dimension("fraction", (0, 0, 0, 0, 0), "", "%"),
     Dimension("force", (1, 1, -2, 0, 0), "N", "kN", 1e-24, 1e24),
@@ -116,7 +106,6 @@ _DIMENSIONS = (
     Dimension("mass per length", (1, -1, 0, 0, 0), "kg/m", "g/mm"),
 )
 DIMENSIONS = {d.name: d for d in _DIMENSIONS}
-SPEED = replace(DIMENSIONS["frequency"], name="frequency or speed of rotation", examples="kHz, rpm")
 PLAIN = DIMENSIONS["fraction"]
 _BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
 
@@ -185,22 +174,19 @@ UNITS: dict[str, Unit] = {
     "arcmin": Unit(Fraction(1, 10_800), (0, 0, 0, 1, 0), pi=1),
     "in": Unit(Fraction(254, 10**4), (0, 1, 0, 0, 0)),
     "kgf": Unit(Fraction(980_665, 10**5), (1, 1, -2, 0, 0)),
+    "rpm": Unit(Fraction(1, 60), (0, 0, -1, 0, 1)),
     "%": Unit(Fraction(1, 100), _PLAIN),
 }
-_RPM = Unit(Fraction(1, 60), SPEED.exponents)
 for _unit, _prefixes, _exponents in _PREFIXED:
     UNITS[_unit] = Unit(Fraction(1), _exponents)
     for _p in _prefixes.split():
         UNITS[_p + _unit] = Unit(Fraction(10) ** _PREFIXES[_p], _exponents)
-_TURNS = (
-    "rpm and turns are not converted: write a frequency in Hz (one cycle per turn is rpm / 60), "
-    "an angle in deg or rad"
-)
 
 TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degrees
 
 NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
+_BETWEEN = re.compile(r"(?<!\*)\*(?!\*)|[\s·⋅]+")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
 
 
@@ -217,7 +203,7 @@ def read_quantity(value: object, dimension: Dimension | None) -> float:
     elif isinstance(value, bool) or not isinstance(value, (int, float)):
         raise QuantityError(f"{_expected(dimension)}, got {shown(value)}")
     else:
-        si = _to_float(value)
+        si = float(value) if abs(value) < 1.7e308 else math.inf
     require_size(si, dimension, shown(value))
     return si
 
@@ -272,13 +258,6 @@ def _expected(dimension: Dimension | None) -> str:
     return f"expected {article} {dimension}"
 
 
-def _to_float(value: int | float) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
 def _split(text: str, dimension: Dimension | None) -> tuple[str, str]:
     """``"30 mm"`` → ``("30", "mm")``."""
     stripped = text.strip()
@@ -300,7 +279,7 @@ def _checked(text: str, unit_text: str, dimension: Dimension | None) -> Unit:
     spelt = " ".join(f"{n}^{e}" for n, e in names if e) or "1"
     name = found.name if found else f"of dimension {spelt}"
     hint = ""
-    if dimension.exponents == SPEED.exponents and name == "angular rate":
+    if dimension.name == "frequency" and name == "angular rate":
         hint = "; an angular rate is never converted silently: divide by 2π and write Hz"
     raise QuantityError(f"{_expected(dimension)}, got {shown(text)}, which is {name}{hint}")
 
@@ -313,30 +292,17 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
     people read `kg/m s` in two ways. Raises QuantityError.
     """
     over, *under = (part.strip() for part in text.translate(_SUPERSCRIPTS).split("/"))
-    factors = [(f, 1) for f in re.split(r"(?<!\*)\*(?!\*)|[\s·⋅]+", over)] + [
-        (f, -1) for f in under
-    ]
     product = Unit(Fraction(1), _PLAIN)
-    for factor, sign in factors:
-        product = product.times(_factor(factor, text, dimension).power(sign))
+    for factor, sign in [*((f, 1) for f in _BETWEEN.split(over)), *((f, -1) for f in under)]:
+        match = _FACTOR.fullmatch(factor)
+        symbol = match.group(1) if match else factor
+        if match is None or symbol not in UNITS:
+            raise QuantityError(_unknown(symbol, text, dimension))
+        product = product.times(UNITS[symbol], sign * int(match.group(2) or 1))
     return product
 
 
-def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
-    match = _FACTOR.fullmatch(factor)
-    symbol = match.group(1) if match else factor
-    if symbol == "rpm" and dimension in (SPEED, PLAIN, None):
-        return _RPM
-    if match is None or symbol not in UNITS:
-        raise QuantityError(_unknown(symbol, text, dimension))
-    return UNITS[symbol].power(int(match.group(2) or 1))
-
-
 def _unknown(symbol: str, text: str, dimension: Dimension | None) -> str:
-    if symbol.lower() == "rpm" and dimension == SPEED:
-        return f"unknown unit {shown(symbol)}; did you mean 'rpm'?"
-    if symbol.lower() in {"rpm", "rev", "turn", "turns"}:
-        return _TURNS
     splits = ((symbol[:i], symbol[i:]) for i in range(1, len(symbol)))
     pairs = (f"{a} {b}" for a, b in splits if a in UNITS and b in UNITS)
     folded = next(pairs, None) or {u.lower(): u for u in UNITS}.get(symbol.lower())

@@ -51,6 +51,7 @@ from eigassign.case import DIMENSIONS, QuantityError, read_quantity
         ("1.5 h", "time", 5400.0),
         ("190 Hz", "frequency", 190.0),
         ("0.19 kHz", "frequency", 190.0),
+        ("190 rpm", "frequency", 190 / 60),
         ("2 %", "fraction", 0.02),
         ("2%", "fraction", 0.02),
         ("." + "0" * 30 + "5e31 m", "length", 5.0),
@@ -81,8 +82,8 @@ def test_a_bare_number_is_si_already(value: float) -> None:
     [
         ("190 rad/s", "frequency", "divide by 2π and write Hz"),
         ("190 1/s", "frequency", "unknown unit"),
-        ("190 rpm", "frequency", "rpm and turns are not converted"),
-        ("30 rev", "angle", "rpm and turns are not converted"),
+        ("190 rpm", "angular rate", "which is frequency"),
+        ("30 rev", "angle", "unknown unit 'rev'"),
         ("1 N m", "rotational stiffness", "got '1 N m', which is torque or energy"),
         ("1 Hz", "angle", "expected an angle (in rad when bare; or deg, mrad), got '1 Hz'"),
         ("1 kg m s", "mass", "which is of dimension kg^1 m^1 s^1"),

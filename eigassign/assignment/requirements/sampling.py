@@ -297,8 +297,7 @@ def _knots(file: CaseFile, curve: _Curve, key: str) -> _Knots:
     if isinstance(curve, FrequencyProfile):
         return curve.frequency, curve.time
     if isinstance(curve, FrequencyFile):
-        of_columns = {"time": DIMENSIONS["time"], "frequency": curve.dimension}
-        columns = [CsvColumn(name, (own,)) for name, own in of_columns.items()]
+        columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
         try:
             numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
         except MechanismError as error:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from eigassign.case.reader import KeyPath, listed, suggestion
+from eigassign.case.reader import KeyPath, at, listed, suggestion
 from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
     ByReference,
@@ -32,11 +32,10 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.trajectory import TIME, Coordinates, Times
-from eigassign.case.units import DIMENSIONS, SPEED, Dimension
+from eigassign.case.units import DIMENSIONS
 
 FREQUENCY = quantity("frequency", above=0)
 Frequency: TypeAlias = Annotated[float, FREQUENCY]
-Speed: TypeAlias = Annotated[float, Quantity(SPEED, above=0)]
 Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
 
 
@@ -77,27 +76,13 @@ class FrequencyFile(Part):
         file: relative to the case file; columns `time` and `frequency`
     """
 
-    dimension: ClassVar[Dimension] = DIMENSIONS["frequency"]  # of the column `frequency`
     file: File
 
 
-class SpeedProfile(FrequencyProfile):
-    """A speed of rotation that changes in time, linear between the points given."""
-
-    frequency: Annotated[tuple[Speed, ...], Field(min_length=2)]
-
-
-class SpeedFile(FrequencyFile):
-    """The same in a CSV file."""
-
-    dimension = SPEED
-
-
-_WHICH_CURVE = Told(
-    lambda value: isinstance(value, Mapping) + (isinstance(value, Mapping) and "file" in value)
-)
-Curve: TypeAlias = Annotated[Frequency | FrequencyProfile | FrequencyFile, _WHICH_CURVE]
-SpeedCurve: TypeAlias = Annotated[Speed | SpeedProfile | SpeedFile, _WHICH_CURVE]
+Curve: TypeAlias = Annotated[
+    Frequency | FrequencyProfile | FrequencyFile,
+    Told(lambda value: 2 if at(value, "file") is not None else isinstance(value, Mapping)),
+]
 
 
 class Harmonic(Part):
@@ -105,12 +90,12 @@ class Harmonic(Part):
 
     Keys:
         harmonic: the multiple
-        of: the frequency, or speed of rotation in rpm
+        of: the frequency
         margin: to either side
     """
 
     harmonic: Annotated[float, Quantity(above=0)]
-    of: SpeedCurve
+    of: Curve
     margin: Annotated[float, Quantity(DIMENSIONS["fraction"], above=0, below=1)]
 
 
@@ -309,7 +294,7 @@ class KeepOutTarget(AnyTarget):
     """
 
     kind = "keep_out"
-    keep_out: OneOrList[Harmonic, tuple[Speed, Speed]]
+    keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
 

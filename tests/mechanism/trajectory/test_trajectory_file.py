@@ -78,7 +78,7 @@ GOOD = "time,q1,q2\n0,1,2\n"
         ("time,q1 [degrees],q2\n0,1,2\n", "arm.csv:1: column q1: unknown unit 'degrees'"),
         ("time,q1 [mm],q2\n0,1,2\n", r"arm.csv:1: column q1: \[mm\] is no unit of angle"),
         ("time [rad],q1,q2\n0,1,2\n", r"arm.csv:1: column time: \[rad\] is no unit of time"),
-        ("time,q1 [rpm],q2\n0,1,2\n", "arm.csv:1: column q1: rpm "),
+        ("time,q1 [rpm],q2\n0,1,2\n", "arm.csv:1: column q1: .rpm. is no unit of "),
         ("time,q1 [deg,q2\n0,1,2\n", r"arm.csv:1: column 'q1 \[deg' must read"),
     ],
 )

@@ -277,7 +277,6 @@ HEADER = "time,mode,frequency,deviation"
         ("mode,frequency,deviation\n1,1,1\n", "either the column time, or one for each coordinate"),
         ("q1,mode,frequency,deviation\n1,1,1,1\n", "either the column time, or one for each"),
         ("time,q1,q2,mode,frequency,deviation\n0,1,2,1,1,1\n", "either the column time, or one"),
-        ("time,mode,frequency [rpm],deviation\n0,1,1,1\n", "m.csv:1: column frequency: rpm"),
         ("time,mode,frequency [rad/s],deviation\n0,1,1,1\n", "is no unit of frequency"),
         ("time,mode,frequency [herz],deviation\n0,1,1,1\n", "unknown unit 'herz'"),
         ("time,mode [Hz],frequency,deviation\n0,1,1,1\n", "column mode: .* is no unit"),
