@@ -81,7 +81,6 @@ from eigassign.case.schema.targets import AnyTarget, TargetForm
 from eigassign.case.schema.trajectory import (
     Added,
     AnyTrajectory,
-    Timed,
     TrajectoryForm,
     named_trajectories,
 )
@@ -142,8 +141,8 @@ def plain(value: object) -> object:
 
 
 def _superfluous(value: Part) -> set[str]:
-    """Keys that say nothing: zero offsets from a link's node, the other space's turn, a share of
-    time for a timing law that has none, a trajectory that sets nothing."""
+    """Keys that say nothing: zero offsets from a link's node, the other space's turn, a
+    trajectory that sets nothing."""
     keys = set()
     if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
         keys.add("angle")
@@ -151,8 +150,6 @@ def _superfluous(value: Part) -> set[str]:
         keys.add("position")
     if isinstance(value, Body) and not any(value.offset or ()):
         keys.add("offset")
-    if isinstance(value, Timed) and value.timing != "trapezoidal":
-        keys.add("acceleration_share")
     if isinstance(value, AnyTrajectory) and not value.set:
         keys.add("set")
     return keys

@@ -27,6 +27,7 @@ from eigassign.case.schema.parts import (
     Part,
     Quantity,
     Told,
+    distinct,
     must,
     needs_one_of,
     quantity,
@@ -85,13 +86,6 @@ class Tolerance:
         )
 
 
-def _differ(values: tuple[float, ...]) -> tuple[float, ...]:
-    for k, value in enumerate(values):
-        if value in values[:k]:
-            raise wrong(f"{value:g} (SI units) is listed twice", k)
-    return values
-
-
 def _several(given: tuple[str | Mapping[str, float], ...]) -> tuple[str | Mapping[str, float], ...]:
     if not isinstance(given[0], str):
         raise wrong("the first is a path alone: its value is that of the parameter", 0)
@@ -142,7 +136,7 @@ class Parameter(Part):
         Annotated[
             tuple[YValue, ...],
             Field(min_length=1, max_length=MOST_CHOICES),
-            AfterValidator(_differ),
+            distinct("{:g} (SI units) is listed twice"),
         ]
         | None
     ) = None

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -33,6 +33,7 @@ from eigassign.case.schema.parts import (
     Vector,
     kinds,
     needs_one_of,
+    one_of,
     only_in,
     quantity,
     wrong,
@@ -40,6 +41,7 @@ from eigassign.case.schema.parts import (
 
 MODULUS = quantity("pressure or modulus", above=0)
 SECOND_MOMENT = quantity("second moment of area", above=0)
+_THICK = "is no box whose torsion and shear are known well"
 
 
 class Material(Part):
@@ -56,12 +58,7 @@ class Material(Part):
     density: Annotated[float, quantity("density", at_least=0)]
     poissons_ratio: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
     shear_modulus: Annotated[float, MODULUS] | None = None
-
-    @model_validator(mode="after")
-    def _has_one_shear_modulus(self) -> Self:
-        if self.poissons_ratio is not None and self.shear_modulus is not None:
-            raise wrong("give poissons_ratio or shear_modulus, not both", "shear_modulus")
-        return self
+    _is_one_constant = one_of("poissons_ratio", "shear_modulus", needed=False)
 
 
 @dataclass(frozen=True)
@@ -88,13 +85,17 @@ class DimensionLimit:
 class SectionBase(Part):
     """Depth and limits, which all sections have."""
 
+    depths: ClassVar[tuple[str, ...]] = ()  # its dimension in the plane of bending, then the other
+    bounds: ClassVar[tuple[DimensionLimit, ...]] = ()
+
     def depth(self, spatial: bool) -> float:
         """Depth in the plane of bending, m; in space the larger of the two."""
-        raise NotImplementedError
+        both: list[float] = [getattr(self, key) for key in self.depths]
+        return max(both) if spatial else both[0]
 
     def limits(self) -> tuple[DimensionLimit, ...]:
         """Inequalities between its dimensions without which the section cannot exist."""
-        return ()
+        return tuple(each for each in self.bounds if getattr(self, each.small) is not None)
 
     @model_validator(mode="after")
     def _exists(self) -> Self:
@@ -127,11 +128,7 @@ class BareSection(SectionBase):
     polar_inertia: Annotated[float, SECOND_MOMENT] | None = None
     shear_coefficient: Annotated[float, Quantity(above=0)] | None = None
 
-    @model_validator(mode="after")
-    def _bends_one_way(self) -> Self:
-        if self.bending_inertia is not None and self.inertia_z is not None:
-            raise wrong("is the same as bending_inertia: give one of them", "inertia_z")
-        return self
+    _bends_one_way = one_of("bending_inertia", "inertia_z", needed=False)
 
     @property
     def in_plane(self) -> float:
@@ -157,10 +154,7 @@ class CircleSection(SectionBase):
 
     shape: Literal["circle"]
     diameter: Annotated[float, LENGTH]
-
-    def depth(self, spatial: bool) -> float:
-        """The diameter."""
-        return self.diameter
+    depths = ("diameter",)
 
 
 class TubeSection(SectionBase):
@@ -177,23 +171,13 @@ class TubeSection(SectionBase):
     inner_diameter: Annotated[float, LENGTH] | None = None
     thickness: Annotated[float, LENGTH] | None = None
 
-    @model_validator(mode="after")
-    def _has_one_wall(self) -> Self:
-        if (self.inner_diameter is None) == (self.thickness is None):
-            raise wrong("a tube needs either inner_diameter or thickness, and not both")
-        return self
+    _has_one_wall = one_of("inner_diameter", "thickness")
 
-    def depth(self, spatial: bool) -> float:
-        """The outer diameter."""
-        return self.outer_diameter
-
-    def limits(self) -> tuple[DimensionLimit, ...]:
-        """The wall ends at the middle, where a tube is solid; a bore needs a wall around it."""
-        if self.inner_diameter is not None:
-            return (DimensionLimit("inner_diameter", "outer_diameter"),)
-        if self.thickness is not None:
-            return (DimensionLimit("thickness", "outer_diameter", factor=2, may_meet=True),)
-        return ()
+    depths = ("outer_diameter",)
+    bounds = (  # a bore needs a wall around it, which ends at the middle, where a tube is solid
+        DimensionLimit("inner_diameter", "outer_diameter"),
+        DimensionLimit("thickness", "outer_diameter", factor=2, may_meet=True),
+    )
 
 
 class RectangleSection(SectionBase):
@@ -207,10 +191,7 @@ class RectangleSection(SectionBase):
     shape: Literal["rectangle"]
     width: Annotated[float, LENGTH]
     height: Annotated[float, LENGTH]
-
-    def depth(self, spatial: bool) -> float:
-        """The height, or the larger side."""
-        return max(self.height, self.width) if spatial else self.height
+    depths = ("height", "width")
 
 
 class BoxSection(RectangleSection):
@@ -224,14 +205,10 @@ class BoxSection(RectangleSection):
 
     shape: Literal["box"]  # type: ignore[assignment]
     thickness: Annotated[float, LENGTH]
-
-    def limits(self) -> tuple[DimensionLimit, ...]:
-        """Up to which torsion and shear are known well, see `mechanism.elements.sections`."""
-        beyond = "is no box whose torsion and shear are known well"
-        return tuple(
-            DimensionLimit("thickness", side, factor=2.5, may_meet=True, beyond=beyond)
-            for side in ("width", "height")
-        )
+    bounds = (  # up to which torsion and shear are known well, see `mechanism.elements.sections`
+        DimensionLimit("thickness", "width", 2.5, True, _THICK),
+        DimensionLimit("thickness", "height", 2.5, True, _THICK),
+    )
 
 
 class IProfileSection(SectionBase):
@@ -249,17 +226,11 @@ class IProfileSection(SectionBase):
     width: Annotated[float, LENGTH]
     flange_thickness: Annotated[float, LENGTH]
     web_thickness: Annotated[float, LENGTH]
-
-    def depth(self, spatial: bool) -> float:
-        """The height, or the larger side."""
-        return max(self.height, self.width) if spatial else self.height
-
-    def limits(self) -> tuple[DimensionLimit, ...]:
-        """The web stands between the flanges and is no wider than they are."""
-        return (
-            DimensionLimit("flange_thickness", "height", factor=2),
-            DimensionLimit("web_thickness", "width", may_meet=True),
-        )
+    depths = ("height", "width")
+    bounds = (  # the web stands between the flanges and is no wider than they are
+        DimensionLimit("flange_thickness", "height", factor=2),
+        DimensionLimit("web_thickness", "width", may_meet=True),
+    )
 
 
 Section: TypeAlias = Annotated[

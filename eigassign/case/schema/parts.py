@@ -138,6 +138,33 @@ def must(hold: Callable[[Any], object], message: str) -> AfterValidator:
     return AfterValidator(checked)
 
 
+def one_of(*keys: str, needed: bool = True) -> Any:
+    """Validator of a part that has one of two ``keys``, and not both; where not ``needed`` none."""
+    either = " or ".join(keys)
+
+    def has_one(part: P) -> P:
+        given = [key for key in keys if getattr(part, key) is not None]
+        if needed and len(given) != 1:
+            raise wrong(f"give either {either}, and not both")
+        if len(given) > 1:
+            raise wrong(f"give {either}, not both", given[-1])
+        return part
+
+    return model_validator(mode="after")(has_one)
+
+
+def distinct(text: str) -> AfterValidator:
+    """Validator of a list without repeats, the ``text`` of which is formatted with the entry."""
+
+    def checked(values: tuple[T, ...]) -> tuple[T, ...]:
+        for k, value in enumerate(values):
+            if value in values[:k]:
+                raise wrong(text.format(value), k)
+        return values
+
+    return AfterValidator(checked)
+
+
 # --- Quantities
 
 

@@ -22,6 +22,7 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     ValueOr,
+    one_of,
     quantity,
     wrong,
 )
@@ -155,12 +156,7 @@ class Measurement(Part):
     mode: Mode
     frequency: Frequency
     deviation: Tolerance
-
-    @model_validator(mode="after")
-    def _has_one_pose(self) -> Self:
-        if (self.time is None) == (self.q is None):
-            raise wrong("give either time or q, and not both")
-        return self
+    _has_one_pose = one_of("time", "q")
 
 
 class MeasurementFile(Part):
@@ -261,10 +257,10 @@ class Sweep(Part):
     parameters: Annotated[ByReference[Body], Field(min_length=1)] | None = None
     file: File | None = None
 
+    _is_one_kind = one_of("parameters", "file")
+
     @model_validator(mode="after")
-    def _is_one_kind(self) -> Self:
-        if (self.parameters is None) == (self.file is None):
-            raise wrong("give either parameters or file")
+    def _lists_each_once(self) -> Self:
         for key, body in (self.parameters or {}).items():
             seen: set[str] = set()
             for k, value in enumerate(body if isinstance(body, tuple) else ()):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from eigassign.case.reader import KeyPath, at, listed, suggestion
 from eigassign.case.schema.design import YValue
@@ -26,8 +26,10 @@ from eigassign.case.schema.parts import (
     Quantity,
     Told,
     ValueOr,
+    distinct,
     mapping,
     needs_one_of,
+    one_of,
     quantity,
     wrong,
 )
@@ -39,14 +41,9 @@ Frequency: TypeAlias = Annotated[float, FREQUENCY]
 Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
 
 
-def _differ(modes: tuple[int, ...]) -> tuple[int, ...]:
-    for k, mode in enumerate(modes):
-        if mode in modes[:k]:
-            raise wrong(f"mode {mode} is listed twice", k)
-    return modes
-
-
-Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1), AfterValidator(_differ)]
+Modes: TypeAlias = Annotated[
+    tuple[Mode, ...], Field(min_length=1), distinct("mode {} is listed twice")
+]
 
 # --- Frequencies that may change in time
 
@@ -114,11 +111,10 @@ class Pose(Part):
     time: Annotated[float, TIME] | None = None
     trajectory: str | None = None
     q: Coordinates | None = None
+    _is_one = one_of("time", "q")
 
     @model_validator(mode="after")
-    def _is_one(self) -> Self:
-        if (self.time is None) == (self.q is None):
-            raise wrong("give either time or q, and not both")
+    def _is_where_time_runs(self) -> Self:
         if self.q is not None and self.trajectory is not None:
             raise wrong("belongs to time; q stands for itself", "trajectory")
         return self
@@ -172,12 +168,12 @@ class AnyTarget(Part):
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
         """Frequencies that the file gives, each with its keys below the target."""
-        raise NotImplementedError
+        return ()
 
     @property
     def named(self) -> tuple[tuple[AnyMode, ...], ...]:
-        """The modes of each of its requirements; none where every mode is meant."""
-        raise NotImplementedError
+        """The modes of each of its requirements; none where every mode is meant, or statics."""
+        return ()
 
     @property
     def followed(self) -> tuple[FollowedMode, ...]:
@@ -205,7 +201,20 @@ class AnyTarget(Part):
         return self
 
 
-class ModeTarget(AnyTarget):
+class SomeModes(AnyTarget):
+    """A target on one mode, or on several."""
+
+    mode: ValueOr[Mode, FollowedMode] | None = None
+    modes: OneOrList[Literal["all"], Modes] | None = None
+
+    @model_validator(mode="after")
+    def _names_them_once(self) -> Self:
+        if self.mode is not None and self.modes is not None:
+            raise wrong("mode is given already: one of them is enough", "modes")
+        return self
+
+
+class ModeTarget(SomeModes):
     """A target on a mode, or on each of several.
 
     Keys:
@@ -216,8 +225,6 @@ class ModeTarget(AnyTarget):
     model_config = needs_one_of(("mode",), ("modes",))
 
     never_all: ClassVar[str] = ""  # why `modes: all` cannot be meant
-    mode: ValueOr[Mode, FollowedMode] | None = None
-    modes: OneOrList[Literal["all"], Modes] | None = None
 
     @property
     def curve(self) -> Curve:
@@ -241,8 +248,6 @@ class ModeTarget(AnyTarget):
     def _names_modes(self) -> Self:
         if self.mode is None and self.modes is None:
             raise wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
-        if self.mode is not None and self.modes is not None:
-            raise wrong("mode is given already: one of them is enough", "modes")
         if self.modes == "all" and self.never_all:
             raise wrong(self.never_all, "modes")
         return self
@@ -284,7 +289,7 @@ class AtMostTarget(ModeTarget):
     at_most: Curve
 
 
-class KeepOutTarget(AnyTarget):
+class KeepOutTarget(SomeModes):
     """No mode is in this band, or none of those named.
 
     Keys:
@@ -295,8 +300,6 @@ class KeepOutTarget(AnyTarget):
 
     kind = "keep_out"
     keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
-    mode: ValueOr[Mode, FollowedMode] | None = None
-    modes: OneOrList[Literal["all"], Modes] | None = None
 
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
@@ -320,8 +323,6 @@ class KeepOutTarget(AnyTarget):
 
     @model_validator(mode="after")
     def _is_a_band(self) -> Self:
-        if self.mode is not None and self.modes is not None:
-            raise wrong("mode is given already: one of them is enough", "modes")
         if isinstance(self.keep_out, tuple) and self.keep_out[0] >= self.keep_out[1]:
             low, high = self.keep_out
             raise wrong(f"the band must go upwards, got [{low:g}, {high:g}] Hz", "keep_out")
@@ -382,11 +383,6 @@ class HighestTarget(AnyTarget):
     mode: Mode
 
     @property
-    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """None."""
-        return ()
-
-    @property
     def named(self) -> tuple[tuple[int, ...], ...]:
         """The mode."""
         return ((self.mode,),)
@@ -419,16 +415,6 @@ class StaticTarget(AnyTarget):
     """A limit of what statics gives at every pose: it is on no mode."""
 
     limit: ClassVar[str]  # the key that it has with kinds of other targets
-
-    @property
-    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """None."""
-        return ()
-
-    @property
-    def named(self) -> tuple[tuple[int, ...], ...]:
-        """No mode."""
-        return ()
 
     @property
     def place(self) -> Node:

@@ -29,6 +29,7 @@ from eigassign.case.schema.parts import (
     ValueOr,
     Vector,
     mapping,
+    one_of,
     quantity,
     wrong,
 )
@@ -110,7 +111,7 @@ class SampledTrajectory(AnyTrajectory):
                 raise wrong("one sample is a pose at rest: leave the time out", key)
             return self
         if (self.time is None) == (self.duration is None):
-            raise wrong("give either time (one per sample) or duration, and not both")
+            raise wrong("give either time or duration, and not both")
         if self.time is not None and len(self.time) != len(self.q):
             raise wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
         return self
@@ -131,22 +132,13 @@ class Timed(AnyTrajectory):
 
     Keys:
         timing: `quintic`: no velocity and no acceleration at both ends; `cubic`: no velocity;
-            `trapezoidal`: constant acceleration, then constant velocity, then braking for as long;
+            `trapezoidal`: constant acceleration, constant velocity, braking, a third each;
             `linear`: constant velocity
-        acceleration_share: of the time, with `timing: trapezoidal`
         samples: their number
     """
 
     timing: Literal["quintic", "cubic", "trapezoidal", "linear"] = "quintic"
-    acceleration_share: Annotated[float, Quantity(above=0, at_most=0.5)] = 1 / 3
     samples: Samples = 101
-
-    @model_validator(mode="after")
-    def _accelerates(self) -> Self:
-        if "acceleration_share" in self.model_fields_set and self.timing != "trapezoidal":
-            message = f"is for timing: trapezoidal; {self.timing} has no such share"
-            raise wrong(message, "acceleration_share")
-        return self
 
 
 class PointTrajectory(Timed):
@@ -162,11 +154,10 @@ class PointTrajectory(Timed):
     points: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
     times: Times | None = None
     duration: Annotated[float, DURATION] | None = None
+    _has_one_clock = one_of("times", "duration")
 
     @model_validator(mode="after")
-    def _has_one_clock(self) -> Self:
-        if (self.times is None) == (self.duration is None):
-            raise wrong("give either times (one per point) or duration, and not both")
+    def _waits_for_a_time(self) -> Self:
         if self.times is not None and len(self.times) != len(self.points):
             raise wrong(f"{len(self.times)} times for {len(self.points)} points", "times")
         for k, (a, b) in enumerate(pairwise(self.points), 1):

@@ -94,27 +94,20 @@ _POLYNOMIALS = {
 }
 
 
-def timing_law(name: str, acceleration_share: float = 1.0 / 3.0) -> Curve:
+def timing_law(name: str) -> Curve:
     """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
-    trapezoidal, which accelerates for the share a of its time, and brakes for a:
-
-        s = v τ²/(2a), then v (τ − a/2), then 1 − v (1 − τ)²/(2a), at the peak v = 1/(1 − a).
+    trapezoidal: 9τ²/4 for a third of the time, then 1/4 + 3(τ − 1/3)/2, then braking alike.
 
     All but linear start and stop at rest, quintic also without acceleration. UsageError for other
-    names, and unless 0 < a ≤ 1/2.
+    names.
     """
     if name in _POLYNOMIALS:
         return Curve(np.array([0.0, 1.0]), np.array(_POLYNOMIALS[name])[:, None, None])
     if name != "trapezoidal":
         known = ", ".join((*_POLYNOMIALS, "trapezoidal"))
         raise UsageError(f"unknown timing law {name!r}; there are {known}")
-    a = acceleration_share
-    if not 0.0 < a <= 0.5:
-        raise UsageError(f"the share of time spent accelerating must be in (0, 0.5], got {a:g}")
-    v = 1.0 / (1.0 - a)
-    ramp = 0.5 * v * a  # covered while accelerating, and while braking
-    pieces = np.array([[0.0, ramp, 1.0 - ramp], [0.0, v, v], [0.5 * v / a, 0.0, -0.5 * v / a]])
-    return Curve(np.array([0.0, a, 1.0 - a, 1.0]), pieces[..., None])
+    pieces = np.array([[0.0, 0.25, 0.75], [0.0, 1.5, 1.5], [2.25, 0.0, -2.25]])
+    return Curve(np.array([0.0, 1 / 3, 2 / 3, 1.0]), pieces[..., None])
 
 
 # --- point to point

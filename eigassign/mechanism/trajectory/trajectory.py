@@ -163,7 +163,7 @@ def _from_tip_path(
         attitude = spatial_attitude(path, spec.orientation, spec.path)
     chain = tip_chain(spec.tip, attitude is not None)
     tau = np.linspace(0.0, 1.0, spec.samples)
-    law = timing_law(spec.timing, spec.acceleration_share)
+    law = timing_law(spec.timing)
     s = law.value(tau)[:, 0]
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
     course = Course(path, s, spec.duration * tau, attitude)
@@ -204,7 +204,7 @@ def _from_points(spec: PointTrajectory) -> Trajectory:
         )
     else:
         reached, said = np.array(spec.times, dtype=np.float64), ()
-    motion = point_motion(points, reached, timing_law(spec.timing, spec.acceleration_share))
+    motion = point_motion(points, reached, timing_law(spec.timing))
     time_s = np.linspace(reached[0], reached[-1], spec.samples)
     return Trajectory(time_s, motion.poses(time_s), said if len(points) > 2 else (), motion)
 
