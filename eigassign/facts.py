@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 # --- What is declared
 
+Getter = TypeVar("Getter", bound=Callable[..., Any])
+
 OF_ROW = "that of the row"  # the unit of numbers whose row has a field for it
 
 
@@ -62,12 +64,27 @@ class Fact:
         return f"{value + 0.0:{self.digits}}" if self.digits else str(value)
 
 
+def told(name: str = "", optional: bool = False) -> Callable[[Getter], Getter]:
+    """Files have this property, by its name or another; its docstring says what it is."""
+
+    def marked(getter: Getter) -> Getter:
+        words = str(getter.__doc__).partition(".")[0]
+        words = words[:1].lower() + words[1:]
+        getter.fact = Fact(words, name=name or getter.__name__, optional=optional)  # type: ignore[attr-defined]
+        return getter
+
+    return marked
+
+
 @cache
 def hints(row: Any) -> dict[str, Any]:
     """The types of all fields and properties, with what they are annotated with."""
     found = get_type_hints(row, include_extras=True)
-    own = {k: v.fget for k, v in vars(row).items() if isinstance(v, property)}
-    return found | {k: get_type_hints(v, include_extras=True)["return"] for k, v in own.items()}
+    for name, own in vars(row).items():
+        if isinstance(own, property):
+            kind = get_type_hints(own.fget, include_extras=True)["return"]
+            found[name] = Annotated[kind, getattr(own.fget, "fact", Fact())]
+    return found
 
 
 @cache

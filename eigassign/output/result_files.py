@@ -119,27 +119,21 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
         name: [getattr(one.frequencies, f"{name.replace(' ', '_')}_hz") for one in targets]
         for name in targets[0].asked.columns
     }
-    for mode in sorted({mode for t in targets if t.near for mode in t.near.modes}):
-        for when in ("initial", "optimal"):
-            found[f"mode {mode} {'exact' if when == 'optimal' else when}"] = [
-                getattr(t.near, f"{when}_hz")[:, t.near.modes.index(mode)]
-                if t.near and mode in t.near.modes
-                else None
-                for t in targets
-            ]
+    near = [{row.mode: row for row in one.near or ()} for one in targets]
+    for mode in sorted(set().union(*near)):
+        rows = [own.get(mode) for own in near]
+        found[f"mode {mode} initial"] = [None if row is None else row.initial_hz for row in rows]
+        found[f"mode {mode} exact"] = [None if row is None else row.optimal_hz for row in rows]
     return found
 
 
 def _others(results: RunResults) -> Iterator[Column]:
     """Expanded modes that no target names, before and after (the paper's Figure 5)."""
-    others = results.others
-    if others is None:
-        return
     expanded = {study.mode for study in results.studies}
-    for k, mode in enumerate(others.modes):
-        if mode in expanded:
-            yield f"mode {mode} initial [Hz]", others.initial_hz[:, k].tolist()
-            yield f"mode {mode} exact [Hz]", others.optimal_hz[:, k].tolist()
+    for row in results.other_modes:
+        if row.mode in expanded:
+            yield f"mode {row.mode} initial [Hz]", row.initial_hz.tolist()
+            yield f"mode {row.mode} exact [Hz]", row.optimal_hz.tolist()
 
 
 def _expanded(results: RunResults) -> Iterator[Column]:

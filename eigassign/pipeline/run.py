@@ -272,10 +272,8 @@ def _first_curve(results: RunResults) -> tuple[Floats, Floats, Floats, Floats | 
     if results.targets:
         first = results.targets[0]
         times = results.time_s[first.asked.rows]
-        return times, first.target_hz, first.initial_hz, first.predicted_hz, first.exact_hz
-    shown = results.spectrum
-    assert shown is not None
-    before, after = shown.initial_hz[:, 0], shown.optimal_hz[:, 0]
+        return times, first.asked.hz, first.initial_hz, first.predicted_hz, first.exact_hz
+    before, after = results.spectrum[0].initial_hz, results.spectrum[0].optimal_hz
     return results.time_s, np.full_like(before, np.nan), before, None, after
 
 

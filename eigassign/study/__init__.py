@@ -50,7 +50,7 @@ __all__, __getattr__, __dir__ = face(
             "AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
             "Comparison DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
-            "OtherModes RangeRow RunResults SensitivityRow SolverRow TargetAlong "
+            "ModeRow RangeRow RunResults SensitivityRow SolverRow TargetAlong "
             "TargetStudy TrajectoryRow ValidationRow"
         ),
         "scene": "Scene",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from decimal import ROUND_DOWN, Context
 from functools import partial
 from operator import itemgetter
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from eigassign.facts import (
     number,
     percent,
     positive_percent,
+    told,
 )
 from eigassign.modal.adaptive_order import MARGIN
 
@@ -75,11 +76,6 @@ def _metres(along: Floats) -> str:
     small = 1e-6 * float(np.abs(along).max())
     shown = (value / size if abs(value) > small else 0.0 for value in along.tolist())
     return f"{', '.join(f'{value:.3g}' for value in shown)} {unit}"
-
-
-def _said(name: str, words: str = "", optional: bool = False) -> Fact:
-    """What is said of a property that files have by this name."""
-    return Fact(words, name=name, optional=optional)
 
 
 # --- How good an expansion is
@@ -231,15 +227,11 @@ class DesignRow:
         return "" if self.choice is None or is_bare(self.choice) else self.choice
 
     @property
-    def cost(self) -> Annotated[float, Fact(digits=number)]:
-        """Price of the change, or of the choice; 0 without a price."""
-        change = (self.price or 0.0) * (self.optimal - self.initial)
-        return change + (self.choice_price or 0.0)
-
-    @property
-    def is_priced(self) -> bool:
-        """True where it has a price, or what was chosen has one."""
-        return self.price is not None or self.choice_price is not None
+    def cost(self) -> Annotated[float | None, Fact(digits=number)]:
+        """Price of the change, or of the choice; None without a price."""
+        if self.price is None:
+            return self.choice_price
+        return self.price * (self.optimal - self.initial) + (self.choice_price or 0.0)
 
 
 @dataclass(frozen=True)
@@ -352,23 +344,8 @@ class FollowedRow(Brief):
 
 
 @dataclass(frozen=True, repr=False)
-class OtherModes(Brief):
-    """Exact frequencies (n_t, n_modes) of some modes before and after (Figure 5)."""
-
-    modes: tuple[int, ...]
-    initial_hz: Floats
-    optimal_hz: Floats
-
-    @property
-    def rows(self) -> list[ModeRow]:
-        """Mode by mode."""
-        columns = zip(self.modes, self.initial_hz.T, self.optimal_hz.T, strict=True)
-        return [ModeRow(*column) for column in columns]
-
-
-@dataclass(frozen=True, repr=False)
 class ModeRow(Brief):
-    """Exact frequencies of a mode before and after."""
+    """Exact frequencies (n_t,) of a mode before and after (Figure 5)."""
 
     mode: int
     initial_hz: Curve
@@ -389,14 +366,8 @@ class Curves(Brief):
     one_shot_hz: Annotated[Curve | None, Fact("exact, at the paper's design")]
     predicted_hz: Annotated[Curve | None, Fact("by the last program", may_lack=True)]
     exact_hz: Annotated[Curve, Fact("exact, at the answer")]
-
-
-@dataclass(frozen=True, repr=False)
-class LimitCurves(Curves):
-    """A limit or band over its samples."""
-
-    lower_hz: Annotated[Curve | None, Fact("lower edge")]
-    upper_hz: Annotated[Curve | None, Fact("upper edge")]
+    lower_hz: Annotated[Curve | None, Fact("lower edge of a limit", optional=True)] = None
+    upper_hz: Annotated[Curve | None, Fact("upper edge of a limit", optional=True)] = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -420,67 +391,61 @@ class TargetStudy(Brief):
     weight_s: Unwritten[float]
     along: Unwritten[tuple[TargetAlong, ...]]
     followed: Unwritten[tuple[FollowedRow, ...]] = ()
-    near: Unwritten[OtherModes | None] = None
+    near: Annotated[tuple[ModeRow, ...] | None, Fact("modes about a band", optional=True)] = None
 
     @property
-    def kind(self) -> Annotated[str, _said("kind", "the key of the case file: frequency, …")]:
-        """Its key in the case file."""
+    @told()
+    def kind(self) -> str:
+        """The key of the case file: frequency, …"""
         return self.asked.kind
 
     @property
-    def label(self) -> Annotated[str, _said("label", "what is asked, in words")]:
-        """The words for what is asked: "mode 2 at least 320 Hz"."""
+    @told()
+    def label(self) -> str:
+        """What is asked, in words: "mode 2 at least 320 Hz"."""
         return self.asked.label
 
     @property
-    def mode(self) -> Annotated[int | None, _said("mode", "the lowest; null of a followed one")]:
-        """The lowest of its modes; None of one that is followed by its shape."""
+    @told()
+    def mode(self) -> int | None:
+        """The lowest of its modes; null of one that is followed by its shape."""
         return None if self.followed else self.asked.mode
 
     @property
-    def modes(self) -> Annotated[tuple[int, ...], _said("modes")]:
+    @told()
+    def modes(self) -> tuple[int, ...]:
         """All that it names."""
         return self.asked.modes
 
     @property
-    def by_shape(self) -> Annotated[FollowedRow | None, _said("followed", "by its shape", True)]:
+    @told("followed", optional=True)
+    def by_shape(self) -> FollowedRow | None:
         """The first that is followed by its shape."""
         return next(iter(self.followed), None)
 
     @property
-    def worst(self) -> Annotated[Share, _said("worst", "error or violation of the answer")]:
+    @told()
+    def worst(self) -> Share:
         """The largest error or violation of the answer."""
         return self.error.exact.max_relative
 
     @property
-    def trajectory(self) -> Annotated[str | None, _said("trajectory", "the only one", True)]:
+    @told(optional=True)
+    def trajectory(self) -> str | None:
         """The only one on which it holds, where there are others."""
         return self.asked.trajectory
 
     @property
-    def frequencies(self) -> Annotated[Curves | LimitCurves, _said("frequencies")]:
+    @told()
+    def frequencies(self) -> Curves:
         """Its curves with what is asked."""
         asked, names = self.asked, None
         if asked.trajectory is not None or len(self.along) > 1:
             names = [one.name for one in self.along for _ in self.time_s[one.rows]]
         own = self.initial_hz, self.one_shot_hz, self.predicted_hz, self.exact_hz
-        curves = self.time_s, names, asked.hz, *own
-        if asked.is_goal:
-            return Curves(*curves)
-        edges = (hz if np.isfinite(hz).all() else None for hz in (asked.lower, asked.upper))
-        return LimitCurves(*curves, *edges)
-
-    @property
-    def about(
-        self,
-    ) -> Annotated[Sequence[ModeRow] | None, _said("near", "modes about a band", True)]:
-        """The modes about a band, row by row."""
-        return None if self.near is None else self.near.rows
-
-    @property
-    def target_hz(self) -> Floats:
-        """The wanted frequency, or the limit (n,); the lower edge of a band."""
-        return self.asked.hz
+        edges = (asked.lower, asked.upper) if not asked.is_goal else ()
+        limits = (hz if np.isfinite(hz).all() else None for hz in edges)
+        return Curves(self.time_s, names, asked.hz, *own, *limits)
 
     @property
     def numbers(self) -> set[int]:
@@ -491,7 +456,7 @@ class TargetStudy(Brief):
     @property
     def judged(self) -> set[int]:
         """``numbers``, and of a band those about it."""
-        return self.numbers.union(() if self.near is None else self.near.modes)
+        return self.numbers.union(row.mode for row in self.near or ())
 
     @property
     def approximation_error(self) -> float:
@@ -770,21 +735,13 @@ class SensitivityRow:
     and with ``_largest`` the one of largest magnitude.
     """
 
-    parameter: Key
-    unit: Key
+    parameter: str
+    unit: Annotated[str, Fact("of the parameter")]
     label: Annotated[str, Fact("the target in words", "target")]
     hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit")]
     hz_per_unit_largest: Annotated[float, Fact(unit="Hz per SI unit")]
     percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
     percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]
-
-
-@dataclass(frozen=True)
-class SensitivityRows:
-    """Changes of the targets with one parameter."""
-
-    unit: str
-    targets: Sequence[SensitivityRow]
 
 
 @dataclass(frozen=True)
@@ -822,22 +779,11 @@ class RangeRow:
 class Meaning(Brief):
     """The meaning of the answer: what it hangs on, what holds it back, how sure it is."""
 
-    sensitivity: Unwritten[tuple[SensitivityRow, ...]] = ()
+    sensitivity: Annotated[tuple[SensitivityRow, ...], Fact("to each parameter")] = ()
     relaxed: Annotated[tuple[RelaxedRow, ...], Fact("what more room at limits gains")] = ()
     reach: Annotated[tuple[RangeRow, ...], Fact("over all designs within the bounds")] = ()
     unreachable: Annotated[tuple[str, ...], Fact("what is out of reach, in words")] = ()
     notes: Unwritten[tuple[str, ...]] = ()
-
-    @property
-    def by_parameter(
-        self,
-    ) -> Annotated[Mapping[str, SensitivityRows], _said("sensitivity", "by parameter")]:
-        """The changes of all targets with each parameter."""
-        named = dict.fromkeys((row.parameter, row.unit) for row in self.sensitivity)
-        return {
-            name: SensitivityRows(unit, [r for r in self.sensitivity if r.parameter == name])
-            for name, unit in named
-        }
 
 
 # --- What there is to draw of a mechanism
@@ -950,7 +896,8 @@ class TrajectoryRow(Brief):
     error: ErrorSummary | None = None
 
     @property
-    def samples(self) -> Annotated[int, _said("samples")]:
+    @told()
+    def samples(self) -> int:
         """How many it has."""
         return int(self.rows.stop - self.rows.start)
 
@@ -1074,6 +1021,8 @@ class RunResults(Origin):
     warnings: tuple[str, ...]
     notes: Annotated[tuple[str, ...], Fact("what was chosen and why")]
     timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
+    other_modes: Annotated[tuple[ModeRow, ...], Fact("some modes without a target")] = ()
+    price: Annotated[float | None, Fact("of the choices and of the change of the design")] = None
     # for figures, tables and CSV files
     q_names: Unwritten[tuple[str, ...]]
     q_units: Unwritten[tuple[str, ...]]
@@ -1083,25 +1032,15 @@ class RunResults(Origin):
     reduced: Unwritten[bool] = False  # links are
     in_degrees: Unwritten[bool] = False  # people read angles so
     given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
-    others: Unwritten[OtherModes | None] = None
-    spectrum: Unwritten[OtherModes | None] = None  # up to the mode above the highest asked for
-    tolerance: Unwritten[float] = 0.02  # the largest error of the expansion that is accepted
+    spectrum: Unwritten[tuple[ModeRow, ...]] = ()  # up to the mode above the highest asked for
     only: Unwritten[str | None] = None  # of several trajectories the one that these are of
     moving: Unwritten[tuple[Motion, ...]] = ()  # of every trajectory, where a report shows it
 
     @property
-    def frequencies(
-        self,
-    ) -> Annotated[Curves | LimitCurves | None, _said("frequencies", "of the first target")]:
-        """The curves of the first target."""
+    @told()
+    def frequencies(self) -> Curves | None:
+        """Those of the first target."""
         return self.targets[0].frequencies if self.targets else None
-
-    @property
-    def other_modes(
-        self,
-    ) -> Annotated[Sequence[ModeRow], _said("other_modes", "some modes without a target")]:
-        """The modes that are shown beside those of targets."""
-        return () if self.others is None else self.others.rows
 
     @property
     def trajectory_names(self) -> list[str]:
@@ -1109,7 +1048,8 @@ class RunResults(Origin):
         return [row.name for row in self.trajectories for _ in range(row.samples)]
 
     @property
-    def motion(self) -> Annotated[MotionRow, _said("trajectory", "all samples")]:
+    @told("trajectory")
+    def motion(self) -> MotionRow:
         """All samples."""
         names = self.trajectory_names if len(self.trajectories) > 1 else None
         each = zip(self.q_names, self.q_units, self.q.T, strict=True)
@@ -1125,19 +1065,6 @@ class RunResults(Origin):
         return f"{len(self.trajectories)} trajectories" if several else "the trajectory"
 
     @property
-    def approximation_error(self) -> float | None:
-        """The largest distance of the predicted frequencies from the exact ones; None without."""
-        if not self.targets:
-            return None
-        return max(target.approximation_error for target in self.targets)
-
-    @property
-    def within_tolerance(self) -> bool:
-        """True if the prediction that the optimum rests on is as exact as the case asks for."""
-        error = self.approximation_error
-        return error is None or error <= self.tolerance
-
-    @property
     def interrupted(self) -> bool:
         """True where Ctrl-C ended the search: what was found until then is the answer."""
         return self.assignment is not None and self.assignment.ended == "interrupted"
@@ -1148,34 +1075,17 @@ class RunResults(Origin):
         return None if self.assignment is None else self.assignment.shortcoming
 
     @property
-    def error(
-        self,
-    ) -> Annotated[
-        ErrorSummary | None, _said("error", "of all wanted frequencies, else of all limits")
-    ]:
-        """Over all wanted frequencies: the largest maximum and the root of the mean square.
-
-        Where none is wanted, over the violations of all limits; None without either.
-        """
+    @told()
+    def error(self) -> ErrorSummary | None:
+        """Over all wanted frequencies, else the violations of all limits; None without either."""
         found = [(target.error, target.weight_s) for target in counted_of(self.targets)]
         return over_all(found) if found else None
 
     @property
-    def violation(
-        self,
-    ) -> Annotated[
-        ViolationRow | None, _said("violation", "the largest of any limit, and which has it")
-    ]:
-        """The largest violation of any limit; None where nothing is limited."""
+    @told()
+    def violation(self) -> ViolationRow | None:
+        """The largest of any limit, and which has it; None where nothing is limited."""
         return worst_violation(self.targets, self.assignment.limits if self.assignment else ())
-
-    @property
-    def price(self) -> Annotated[float | None, _said("price", "of the change of the design")]:
-        """The cost of the choices and of the change; None where nothing has a price."""
-        priced = [row.cost for row in self.design if row.is_priced]
-        if self.mass is not None and self.mass.price is not None:
-            priced.append(self.mass.cost)
-        return sum(priced) if priced else None
 
 
 def counted_of(targets: tuple[TargetStudy, ...]) -> tuple[TargetStudy, ...]:
@@ -1205,23 +1115,14 @@ def worst_violation(
 def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
     """The largest of the maxima, and of the mean squares their mean by the time they stand for."""
     weights = np.array([weight for _, weight in errors])
-
-    def combined(kind: str) -> ErrorRow | None:
+    found: dict[str, Any] = {}
+    for kind in ("initial", "exact", "predicted", "one_shot"):
         rows = [getattr(error, kind) for error, _ in errors]
-        return None if None in rows else _combined(rows, weights)
-
-    return ErrorSummary(
-        initial=_combined([error.initial for error, _ in errors], weights),
-        exact=_combined([error.exact for error, _ in errors], weights),
-        predicted=combined("predicted"),
-        one_shot=combined("one_shot"),
-    )
-
-
-def _combined(rows: list[ErrorRow], weights: Floats) -> ErrorRow:
-    square = np.array([row.rms_relative**2 for row in rows])
-    mean_square = float(square @ weights / weights.sum())
-    return ErrorRow(max(row.max_relative for row in rows), float(np.sqrt(mean_square)))
+        if None not in rows:
+            mean_square = weights @ [row.rms_relative**2 for row in rows] / weights.sum()
+            worst = max(row.max_relative for row in rows)
+            found[kind] = ErrorRow(worst, float(np.sqrt(mean_square)))
+    return ErrorSummary(**found)
 
 
 # --- The results along one of several trajectories
@@ -1250,14 +1151,13 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
             replace(study, over_time=_part(study.over_time, rows)) for study in results.studies
         ),
         targets=tuple(target for target in targets if target is not None),
-        others=_part(results.others, rows),
         spectrum=_part(results.spectrum, rows),
         drives=_part(results.drives, rows),
         statics=_part(results.statics, rows),
     )
 
 
-_OF_SAMPLES = (Comparison, OtherModes, FollowedRow, DriveRow, StaticRow, TargetStudy)
+_OF_SAMPLES = (Comparison, ModeRow, FollowedRow, DriveRow, StaticRow, TargetStudy)
 
 
 def _part(row: Row, rows: slice) -> Row:

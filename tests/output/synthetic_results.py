@@ -21,9 +21,9 @@ from eigassign.study import (
     ErrorSummary,
     LocalOptimum,
     Meaning,
+    ModeRow,
     ModeStudy,
     OptimalityRow,
-    OtherModes,
     RangeRow,
     RunResults,
     SensitivityRow,
@@ -76,8 +76,8 @@ def make_results(
         studies=studies,
         design=tuple(_design_row(i, prefix) for i in range(n_y)),
         targets=targets,
-        others=_others(time, n_targets, scale_hz) if n_t else None,
-        spectrum=_spectrum(targets, _others(time, n_targets, scale_hz)) if targets else None,
+        other_modes=_others(time, n_targets, scale_hz) if n_t else (),
+        spectrum=_spectrum(targets, _others(time, n_targets, scale_hz)) if targets else (),
         solver=SolverRow("solved", 25, 3.1e-17, 2.2e-14, 1.5e-16) if n_y else None,
         assignment=_assignment(n_y, prefix) if targets else None,
         warnings=("section 'rod': <area> & inertia look odd",),
@@ -312,18 +312,19 @@ def _error(relative: Floats) -> ErrorRow:
     return ErrorRow(float(np.abs(relative).max()), float(np.sqrt(np.mean(relative**2))))
 
 
-def _others(time: Floats, n_targets: int, scale: float) -> OtherModes:
-    modes = tuple(range(n_targets + 1, n_targets + 4))
-    levels = scale * np.array([490.0, 720.0, 1100.0])
-    initial = levels * (1.0 + 0.05 * np.outer(np.sin(4 * time), [1.0, -0.4, 0.3]))
-    return OtherModes(modes, initial, initial * np.array([0.93, 0.97, 0.99]))
+def _others(time: Floats, n_targets: int, scale: float) -> tuple[ModeRow, ...]:
+    rows = []
+    for k, (level, wave, share) in enumerate(
+        zip((490.0, 720.0, 1100.0), (1.0, -0.4, 0.3), (0.93, 0.97, 0.99), strict=True)
+    ):
+        initial = scale * level * (1.0 + 0.05 * wave * np.sin(4 * time))
+        rows.append(ModeRow(n_targets + 1 + k, initial, initial * share))
+    return tuple(rows)
 
 
-def _spectrum(targets: tuple[TargetStudy, ...], others: OtherModes) -> OtherModes:
-    initial = [*(target.initial_hz for target in targets), others.initial_hz[:, 0]]
-    optimal = [*(target.exact_hz for target in targets), others.optimal_hz[:, 0]]
-    modes = tuple(range(1, len(initial) + 1))
-    return OtherModes(modes, np.stack(initial, axis=1), np.stack(optimal, axis=1))
+def _spectrum(targets: tuple[TargetStudy, ...], others: tuple[ModeRow, ...]) -> tuple[ModeRow, ...]:
+    own = (ModeRow(k, t.initial_hz, t.exact_hz) for k, t in enumerate(targets, 1))
+    return (*own, others[0])
 
 
 def _design_row(index: int, prefix: str) -> DesignRow:

@@ -111,7 +111,7 @@ def test_a_full_report_plots_every_description_and_saves_its_numbers():
     assert [a["data-csv"] for tag, a in parsed.tags if a.get("data-csv")] == plots
     curves = {c["name"]: c["y"] for c in island(html, "figures")["frequencies"]["data"]}
     target = results.targets[0]
-    assert curves["mode 1 at 190 Hz"][0] == target.target_hz[0]
+    assert curves["mode 1 at 190 Hz"][0] == target.asked.hz[0]
     initial = island(html, "figures")["frequencies"]["data"]
     before = next(c for c in initial if c["name"] == "mode 1, initial design")
     assert before["y"][0] == pytest.approx(target.initial_hz[0], rel=1e-6)

@@ -11,7 +11,7 @@ from synthetic_results import as_limit, make_results
 
 from eigassign.mechanism import read_samples
 from eigassign.output import sample_files
-from eigassign.study import Comparison, OtherModes, RunResults
+from eigassign.study import Comparison, ModeRow, RunResults
 
 
 def rows_of(data: bytes) -> list[dict[str, str]]:
@@ -61,7 +61,7 @@ def test_frequencies_stand_beside_time_and_pose() -> None:
     for target in results.targets:
         for kind in ("target", "initial", "predicted", "exact"):
             column = [float(row[f"mode {target.asked.mode} {kind} [Hz]"]) for row in rows]
-            np.testing.assert_array_equal(column, getattr(target, f"{kind}_hz"))
+            np.testing.assert_array_equal(column, getattr(target.frequencies, f"{kind}_hz"))
     np.testing.assert_array_equal([float(row["q2 [rad]"]) for row in rows], results.q[:, 1])
     assert "trajectory" not in rows_of(sample_files(make_results())["frequencies.csv"])[0]
 
@@ -88,7 +88,7 @@ def test_a_limit_beside_a_target_of_the_same_mode_overwrites_nothing() -> None:
     other = np.full(152, 180.0)
     twice = replace(target, asked=replace(target.asked, lower=other, upper=other))
     band = as_limit(target, "keep_out", np.full(152, 150.0), np.full(152, 160.0))
-    near = OtherModes((1, 2), np.full((152, 2), 140.0), np.full((152, 2), 170.0))
+    near = tuple(ModeRow(k, np.full(152, 140.0), np.full(152, 170.0)) for k in (1, 2))
     band = replace(band, near=near)
     rows = rows_of(
         sample_files(replace(results, targets=(target, limit, twice, band)))["frequencies.csv"]
@@ -97,7 +97,7 @@ def test_a_limit_beside_a_target_of_the_same_mode_overwrites_nothing() -> None:
     def column(heading: str) -> list[float]:
         return [float(row[f"{heading} [Hz]"]) for row in rows]
 
-    np.testing.assert_array_equal(column("mode 1 target"), target.target_hz)
+    np.testing.assert_array_equal(column("mode 1 target"), target.asked.hz)
     np.testing.assert_array_equal(column("mode 1 (2) target"), np.full(152, 180.0))
     np.testing.assert_array_equal(column("mode 1 at_most target"), np.full(152, 205.0))
     np.testing.assert_array_equal(column("mode 1 at_most exact"), limit.exact_hz)

@@ -35,7 +35,7 @@ def searched() -> RunResults:
     assert results.assignment is not None
     row = replace(results.assignment, catalogue=CatalogueRow(7, 0.0, best))
     design = (replace(results.design[0], price=10.0), results.design[1])
-    return replace(results, assignment=row, targets=(limit,), design=design)
+    return replace(results, assignment=row, targets=(limit,), design=design, price=4.0)
 
 
 def test_bands_say_how_many_modes_are_below_and_whether_that_is_checked() -> None:

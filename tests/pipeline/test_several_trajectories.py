@@ -139,7 +139,7 @@ def test_a_trajectory_cut_in_two_is_still_the_same_problem(
 
 def test_the_errors_of_each_trajectory_are_those_of_its_own_samples(pair: Result) -> None:
     (target,) = pair.results.targets
-    off = target.exact_hz / target.target_hz - 1.0
+    off = target.exact_hz / target.asked.hz - 1.0
     for along, rows in zip(target.along, (slice(0, 21), slice(21, 42)), strict=True):
         assert along.rows == rows
         assert along.error.exact.max_relative == pytest.approx(np.abs(off[rows]).max(), rel=1e-12)

@@ -29,7 +29,7 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.study.results import OtherModes, RunResults, TargetStudy
+from eigassign.study.results import ModeRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
 
@@ -135,7 +135,7 @@ MOST_PANELS = 3  # at most
 FAR = 0.5  # of a limit that is kept: as far from it nothing is seen in one panel with it
 
 
-def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
+def overview(results: RunResults, spectrum: Sequence[ModeRow]) -> FigurePlan:
     """Targets, limits and bands with the modes around them; what lies far apart in own panels."""
     groups, time_s = _groups(results, spectrum), results.time_s
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
@@ -166,13 +166,13 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
 
 
 def _groups(
-    results: RunResults, spectrum: OtherModes
+    results: RunResults, spectrum: Sequence[ModeRow]
 ) -> list[tuple[list[TargetStudy], tuple[float, float]]]:
     """What is asked of frequencies, in groups of like ones, and the ends of each group's panel."""
     asked = [target for target in results.targets if len(target.asked.terms) < 2]
     held = sorted(((_range(t, spectrum), [t]) for t in asked), key=lambda each: each[0])
     if not held:
-        held = [(graph.bounds([spectrum.initial_hz[:, :1], spectrum.optimal_hz[:, :1]]), [])]
+        held = [(graph.bounds([spectrum[0].initial_hz, spectrum[0].optimal_hz]), [])]
     while len(held) > 1:
         gaps = [b[0][0] - a[0][1] for a, b in pairwise(held)]
         k = int(np.argmin(gaps))
@@ -188,7 +188,7 @@ def _groups(
     ]
 
 
-def _range(target: TargetStudy, spectrum: OtherModes) -> tuple[float, float]:
+def _range(target: TargetStudy, spectrum: Sequence[ModeRow]) -> tuple[float, float]:
     """The frequencies that a panel has to hold of a target: its edges, and modes beside them."""
     asked = target.asked
     low, high = asked.forbidden_hz
@@ -196,11 +196,12 @@ def _range(target: TargetStudy, spectrum: OtherModes) -> tuple[float, float]:
         edges = [edge for edge in (low, high) if edge is not None]
         bottom, top = graph.bounds(edges)
         room = ROOM * top
-        near = np.concatenate([spectrum.initial_hz[asked.rows], spectrum.optimal_hz[asked.rows]])
+        every = [hz for row in spectrum for hz in (row.initial_hz, row.optimal_hz)]
+        near = np.array(every)[:, asked.rows]
         return graph.bounds([*edges, near[(near > bottom - room) & (near < top + room)]])
     own = [target.initial_hz, target.exact_hz]
     if not _is_far(target):
-        own += [target.target_hz] if asked.is_goal else [e for e in (low, high) if e is not None]
+        own += [target.asked.hz] if asked.is_goal else [e for e in (low, high) if e is not None]
     bottom, top = graph.bounds(own)
     room = ROOM * (top - bottom)
     return max(bottom - room, 0.0), top + room
@@ -224,7 +225,7 @@ def _asked(target: TargetStudy, time_s: Floats, width: float) -> Iterator[Mark]:
     low, high = asked.forbidden_hz
     colour = mode_colour(asked.mode)
     if asked.is_goal:
-        yield Curve(target.target_hz, TARGET, target.label, x)
+        yield Curve(target.asked.hz, TARGET, target.label, x)
     elif low is not None and high is not None:
         yield Shade(low, high, graph.VERMILLION, asked.label, x=x)
     elif not asked.is_aim:
@@ -256,7 +257,7 @@ def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
     name = asked.curve_name
     stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, name))
     for hz, look, end in stages:
-        off = 100.0 * (hz / target.target_hz - 1.0)
+        off = 100.0 * (hz / target.asked.hz - 1.0)
         x = results.time_s[asked.rows]
         hover = f"{name}, initial design" * (not end)
         yield Curve(off, replace(look, colour=colour), x=x, end=end, hover=hover)
@@ -267,12 +268,12 @@ def mode_colour(mode: int) -> str:
     return _MODES[(mode - 1) % len(_MODES)]
 
 
-def before_and_after(shown: OtherModes) -> tuple[Curve, ...]:
+def before_and_after(shown: Sequence[ModeRow]) -> tuple[Curve, ...]:
     """One colour a mode: dashed before, solid after, its number at the end of its curve."""
     found = []
-    for k, mode in enumerate(shown.modes):
-        before, after = (replace(look, colour=mode_colour(mode)) for look in (_BEFORE, _AFTER))
-        name = f"mode {mode}"
-        found.append(Curve(shown.initial_hz[:, k], before, hover=f"{name}, initial design"))
-        found.append(Curve(shown.optimal_hz[:, k], after, end=name))
+    for row in shown:
+        before, after = (replace(look, colour=mode_colour(row.mode)) for look in (_BEFORE, _AFTER))
+        name = f"mode {row.mode}"
+        found.append(Curve(row.initial_hz, before, hover=f"{name}, initial design"))
+        found.append(Curve(row.optimal_hz, after, end=name))
     return tuple(found)

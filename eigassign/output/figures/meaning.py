@@ -109,7 +109,7 @@ def ranges(
     low, high = row.lowest_hz[along.rows], row.highest_hz[along.rows]
     curves = (
         Curve(target.exact_hz[along.rows], OPTIMAL, "answer"),
-        Curve(target.target_hz[along.rows], TARGET, "wanted"),
+        Curve(target.asked.hz[along.rows], TARGET, "wanted"),
     )
     shade = Shade(low, high, graph.GREY, "within the bounds", 0.35)
     panel = Panel(f"{target.asked.axis} [Hz]", (shade, *curves), 2.4, holds=(low, high))

@@ -18,7 +18,7 @@ def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
 def _figures(results: RunResults) -> Iterator[FigurePlan]:
     each = along_each(results)
     for one in each:
-        if one.spectrum is not None and one.spectrum.initial_hz.size:
+        if one.spectrum and one.time_s.size:
             yield curves.overview(one, one.spectrum)
     if any(results.poses.lines):
         yield mechanism.poses(results.case.title, results.poses)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
     FollowedRow,
-    OtherModes,
+    ModeRow,
     TargetAlong,
     TargetStudy,
 )
@@ -79,7 +79,7 @@ def _studied(
         "predicted": None if predicted is None else predicted / asked.hz - 1.0,
         "one_shot": None if one_shot is None else asked.errors(one_shot),
     }
-    summary = _summary(errors, weights)
+    summary, near = _summary(errors, weights), asked.near(before, after)
     return TargetStudy(
         asked=asked,
         time_s=time_s,
@@ -94,7 +94,7 @@ def _studied(
             TargetAlong(name, own, _summary(errors, weights, own)) for name, own in asked.along
         ),
         followed=tuple(_followed(asked, before, after)),
-        near=_near(asked, before, after),
+        near=None if near is None else mode_rows(near, before, after, asked.rows),
     )
 
 
@@ -104,12 +104,11 @@ def _followed(asked: Requirement, before: Solved, after: Solved) -> Iterator[Fol
         yield FollowedRow(mode.name, mode.like, *numbers)
 
 
-def _near(asked: Requirement, before: Solved, after: Solved) -> OtherModes | None:
-    modes = asked.near(before, after)
-    if modes is None:
-        return None
-    columns = [mode - 1 for mode in modes]
-    return OtherModes(modes, *(solved.hz[asked.rows][:, columns] for solved in (before, after)))
+def mode_rows(
+    modes: Iterable[int], before: Solved, after: Solved, rows: slice = slice(None)
+) -> tuple[ModeRow, ...]:
+    """Some of the modes that were solved, before and after."""
+    return tuple(ModeRow(k, before.hz[rows, k - 1], after.hz[rows, k - 1]) for k in modes)
 
 
 def _summary(

@@ -133,7 +133,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
 
 def cost(scene: Scene, y: Floats) -> float | None:
     """The price of a design (n_y,), of choices and of its change; None where nothing has one."""
-    costs = [row.cost for row in design_rows(scene, y) if row.is_priced]
+    costs = [row.cost for row in design_rows(scene, y) if row.cost is not None]
     if (limits := scene.file.design.mass) is not None and limits.price is not None:
         costs.append(limits.price * (scene.model.mass(y) - scene.model.mass(scene.initial)))
     return sum(costs) if costs else None

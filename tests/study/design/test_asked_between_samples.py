@@ -100,7 +100,7 @@ def test_limits_and_wanted_frequencies_count_between_samples_too() -> None:
     assert modes_inside(case, result, 0.5, 0.0, 190.0 * (1.0 + 1e-6)) == 1
     _, result, row = shipped(f"{{mode: 1, frequency: {PEAK.replace('100', '195')}}}")
     (target,) = result.results.targets
-    assert target.target_hz.min() == 190.0
+    assert target.asked.hz.min() == 190.0
     assert any("3 instants between samples" in note for note in result.results.notes)
     assert row.max_error == 0.02
 
