@@ -50,15 +50,14 @@ from eigassign.case.rules.files import (
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
     below,
+    bounds_hold_nothing_impossible,
+    followed_designs,
     known_property,
-    least_and_largest,
     property_at,
     quantities,
-    starts_outside,
     value_at,
     with_value,
 )
-from eigassign.case.rules.values import followed_designs
 from eigassign.case.schema.design import RESERVED, Design, Tolerance
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.mechanism import (
@@ -339,7 +338,11 @@ class CaseFile:
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Least and largest value of each property that varies, by path."""
-        return {path: least_and_largest(terms, self.box) for path, terms in self.varied.items()}
+        found = {}
+        for path, terms in self.varied.items():
+            ends = [sorted(factor * end for end in self.box[k]) for k, factor in terms]
+            found[path] = (sum(low for low, _ in ends), sum(high for _, high in ends))
+        return found
 
     def value_at(self, path: str) -> float:
         """The number that the file gives to the property at ``path``, in SI."""
@@ -490,7 +493,10 @@ def checked(
         raise CaseError(_first(list(dict.fromkeys(problems))))
     for place, value in [*followed_designs(document)]:
         document = with_value(document, place, value)
-    return _case_file(document, source, written, values, named)
+    case = _case_file(document, source, written, values, named)
+    if impossible := [source.problem(*each) for each in bounds_hold_nothing_impossible(case)]:
+        raise CaseError(_first(impossible))
+    return case
 
 
 def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
@@ -512,7 +518,7 @@ def _case_file(
 ) -> CaseFile:
     path = written.path
     content = {name: getattr(document, name) for name in Document.model_fields}
-    doubts = [*implausible(document), *starts_outside(document)]
+    doubts = [*implausible(document)]
     doubts += unreadable([each for each in named if each.spare])
     warnings = [source.problem(*finding) for finding in doubts]
     return CaseFile(

@@ -4,12 +4,9 @@ The schema sees one part at a time; the rules see the whole, once the form of ea
 
 In reading order, each importing only from those above it:
 
-    lookups       what the names in a case stand for: nodes, joints, parameters
-    properties    design parameters: the number that a path names, and its bounds
-    files         files that the case names: whether they can be read; choices listed in one
-    values        rule: values whose unit another key decides
+    properties    the number that a path names, what it may be, and values whose unit it decides
     mechanism     rules: links and what stands on their nodes; joints, coordinates, loops
-    study         rules: trajectory, design, expansion; targets, and the method that takes them
-    consistency   the table of all rules
+    files         files that the case names: whether they can be read; choices listed in one
+    consistency   rules of the whole case: trajectory, design, targets, method; the table of all
     plausibility  warnings: what is allowed but looks like a slip
 """

@@ -1,24 +1,45 @@
-"""The table of rules: what several keys must have in common, once the form of each is right.
+"""Rules of the whole case: how it moves, what may change and is asked, and the table of all rules.
 
 A rule keeps silent about what it cannot judge since a name in it stands for nothing: that is told
 already. Its name and docstring say what must hold; it yields where it does not, and why. To add
-one: write it, and name it here.
+one: write it, and name it in the table at the end.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, items
-from eigassign.case.rules import mechanism, properties, study, values
+from eigassign.case.reader import Finding, KeyPath, Tree, items, listed, unknown
+from eigassign.case.rules import mechanism, properties
+from eigassign.case.rules.mechanism import node_problem
+from eigassign.case.rules.properties import coordinate_lists, followed_modes, freedoms
+from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.mechanism import Mechanism
+from eigassign.case.schema.mechanism import Mechanism, RevoluteJoint
+from eigassign.case.schema.study import Highest, HighestMode
+from eigassign.case.schema.targets import (
+    FrequencyTarget,
+    GapTarget,
+    KeepOutTarget,
+    SagTarget,
+    StaticTarget,
+)
+from eigassign.case.schema.trajectory import (
+    FileTrajectory,
+    TipTrajectory,
+    TrajectoryForm,
+    named_trajectories,
+)
 
-Rule = Callable[[Document], Iterator[Finding]]
+Span = tuple[float, float]  # first and last time, s
 
 
-def reserved_names_are_not_used(document: Document) -> Iterator[Finding]:
-    """`ground` is no link, `time` heads every table over time, `torque` limits drives."""
+def names_mean_something(document: Document) -> Iterator[Finding]:
+    """`ground` is no link, `time` heads every table over time, `torque` limits drives.
+
+    Those drives are named by their coordinates.
+    """
     if "time" in document.coordinates:
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in document.mechanism.links:
@@ -27,53 +48,261 @@ def reserved_names_are_not_used(document: Document) -> Iterator[Finding]:
     if "torque" in document.design.entries:
         message = "'torque' limits what drives exert, by coordinate: name the parameter otherwise"
         yield ("design", "torque"), message
+    for name in document.design.torque:
+        if name not in document.coordinates:
+            yield ("design", "torque", name), unknown("coordinate", name, document.coordinates)
 
 
+def lists_are_as_long_as_what_they_list(document: Document) -> Iterator[Finding]:
+    """Points of trajectories and other poses are as long as q, `expansion.y` as the design."""
+    coordinates, parameters = [*document.coordinates], [*document.design.parameters]
+    rows = [(path, row, "coordinate", coordinates) for path, row in coordinate_lists(document)]
+    if isinstance(document.expansion.y, tuple):
+        rows.append((("expansion", "y"), document.expansion.y, "design parameter", parameters))
+    for path, row, kind, known in rows:
+        if len(row) != len(known):
+            message = f"needs {len(known)} entries, one for each {kind} ({listed(known)}); got "
+            yield path, f"{message}{len(row)}"
+
+
+def trajectories_have_names_of_their_own(document: Document) -> Iterator[Finding]:
+    """No two names agree but for case: they name files, and some file systems ignore it."""
+    seen: dict[str, str] = {}
+    for path, _, motion in named_trajectories(document.trajectory):
+        if motion.name is None:
+            continue
+        if same := seen.get(motion.name.casefold()):
+            ignored = f": {same!r} (some file systems ignore upper case)"
+            hint = "" if same == motion.name else ignored
+            yield (*path, "name"), f"a trajectory has this name already{hint}"
+        seen.setdefault(motion.name.casefold(), motion.name)
+
+
+def branches_are_ranges_of_driven_joints(document: Document) -> Iterator[Finding]:
+    """A range that keeps a tip path in its branch is that of a joint which a coordinate moves."""
+    mechanism = document.mechanism
+    ranged = [name for name in mechanism.joints if len(freedoms(mechanism, name)) == 1]
+    moved = {body.joint for body in document.coordinates.values()}
+    for place, _, motion in named_trajectories(document.trajectory):
+        for joint, (low, high) in (
+            motion.branch.items() if isinstance(motion, TipTrajectory) else ()
+        ):
+            path: KeyPath = (*place, "branch", joint)
+            if joint not in ranged:
+                yield path, unknown("joint with one freedom", joint, ranged)
+            elif joint not in moved:
+                known = listed([name for name in ranged if name in moved])
+                yield path, f"no coordinate moves this joint, but the loop does; use {known}"
+            elif isinstance(mechanism.joints[joint], RevoluteJoint) and high - low > 2 * math.pi:
+                yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
+
+
+def bounds_go_upwards(document: Document) -> Iterator[Finding]:
+    """No minimum is above its maximum."""
+    design = document.design
+    limited: dict[KeyPath, object] = {("design", name): e for name, e in design.entries.items()}
+    limited |= {("design", "constraints", name): c for name, c in design.constraints.items()}
+    limited |= {("design", "mass"): design.mass}
+    for path, part in limited.items():
+        low, high = getattr(part, "min", None), getattr(part, "max", None)
+        if low is not None and high is not None and low > high:
+            yield (*path, "min"), f"min {low:g} is above max {high:g} (SI units)"
+
+
+def constraints_are_between_design_parameters(document: Document) -> Iterator[Finding]:
+    """The terms of a constraint name design parameters."""
+    entries = document.design.entries
+    known = [name for name, entry in entries.items() if not isinstance(entry, Choices)]
+    for name, constraint in document.design.constraints.items():
+        for term in constraint.terms:
+            if term in known:
+                continue
+            message = unknown("design parameter", term, known)
+            if term in entries:
+                message = f"{term!r} is a list of choices; a constraint is between parameters"
+            yield ("design", "constraints", name, "terms", term), message
+
+
+def times_are_of_trajectories(document: Document) -> Iterator[Finding]:
+    """What names a trajectory, or a time of one, means one that exists, and a time that it has."""
+    motions = {name: _span(form) for _, name, form in named_trajectories(document.trajectory)}
+    asked: list[tuple[KeyPath, str | None, str, float | Span | None]] = []
+    for k, target in enumerate(document.targets):
+        asked.append((("targets", k), target.trajectory, "during", target.during))
+    for path, mode in followed_modes(document):
+        asked.append(((*path, "at"), mode.at.trajectory, "time", mode.at.time))
+    for k, each in enumerate(m if isinstance(m := document.measurements, tuple) else ()):
+        asked.append((("measurements", k), each.trajectory, "time", each.time))
+    objective = document.assignment.objective
+    if isinstance(objective, Highest) and isinstance(objective.highest, HighestMode):
+        aim = ("assignment", "objective", "highest")
+        asked.append((aim, objective.highest.trajectory, "", None))
+    for path, name, key, time in asked:
+        if name is not None and name not in motions:
+            yield (*path, "trajectory"), unknown("trajectory", name, motions)
+        elif time is None:
+            continue
+        elif not motions:
+            yield (*path, key), "there is no trajectory: give q"
+        elif name is None and len(motions) > 1:
+            message = f"needs the trajectory that is meant, as trajectory ({listed(motions)})"
+            yield (*path, key), message
+        elif (motion := motions[name or next(iter(motions))]) is not None:
+            first, last = time if isinstance(time, tuple) else (time, time)
+            if not (motion[0] <= last and first <= motion[1]):
+                lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
+                what = "lies" if isinstance(time, tuple) else f"{time:g} s is"
+                yield (*path, key), f"{what} outside: {lasts}"
+
+
+def _span(motion: TrajectoryForm) -> Span | None:
+    """First and last time; None where the file does not say (a CSV does)."""
+    if isinstance(motion, FileTrajectory):
+        return None
+    times = getattr(motion, "times", None) or getattr(motion, "time", None)
+    if times is not None:
+        return times[0], times[-1]
+    return None if motion.duration is None else (0.0, motion.duration)
+
+
+def statics_are_of_nodes(document: Document) -> Iterator[Finding]:
+    """The node of a static target exists, and what sags has a weight."""
+    mechanism = document.mechanism
+    for k, target in enumerate(document.targets):
+        if not isinstance(target, StaticTarget):
+            continue
+        if problem := node_problem(mechanism, target.place.at):
+            yield ("targets", k, target.kind, "at"), problem
+        if isinstance(target, SagTarget) and not isinstance(mechanism.gravity, tuple):
+            down = "[0, -9.81]" if mechanism.space == "planar" else "[0, 0, -9.81]"
+            yield ("targets", k, "sag"), f"nothing sags without mechanism.gravity: {down}, say"
+
+
+def a_mode_has_one_frequency_at_a_time(document: Document) -> Iterator[Finding]:
+    """No two targets want frequencies of the same mode on the same part of a trajectory."""
+    known = [name for _, name, _ in named_trajectories(document.trajectory)] or [""]
+    seen = dict[tuple[int, str], list[Span]]()
+    for k, target in enumerate(document.targets):
+        if not isinstance(target, FrequencyTarget) or target.followed:
+            continue
+        first, last = target.during or (-math.inf, math.inf)
+        for i, mode in enumerate(target.numbers):
+            ones = [(mode, name) for name in ([target.trajectory] if target.trajectory else known)]
+            both = [one for one in ones for a, b in seen.get(one, ()) if first < b and a < last]
+            if both:
+                which = f" along trajectory {both[0][1]!r}" if len(known) > 1 else ""
+                place: KeyPath = ("mode",) if target.modes is None else ("modes", i)
+                yield ("targets", k, *place), f"mode {mode} has a target already{which}"
+            for each in ones:
+                seen.setdefault(each, []).append((first, last))
+
+
+def followed_modes_are_of_possible_designs(document: Document) -> Iterator[Finding]:
+    """Where a mode is named by its shape, the design has parameters, and choices that they have."""
+    entries = document.design.entries
+    for path, mode in followed_modes(document):
+        for name, value in mode.design.items():
+            place, entry = (*path, "design", name), entries.get(name)
+            if entry is None:
+                yield place, unknown("design parameter", name, entries)
+            elif isinstance(entry, Choices) and value not in entry.choices:
+                yield place, unknown("choice", str(value), entry.choices)
+
+
+def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
+    """The paper's program has wanted frequencies, bounds, linear constraints, no more."""
+    assignment, design = document.assignment, document.design
+    if assignment.method != "one_shot":
+        return
+    instead = "method: one_shot takes only frequency targets of numbered modes, bounds and "
+    instead += "linear constraints: write method: sequential"
+    if assignment.objective != "least_squares":
+        yield ("assignment", "objective"), f"is not least_squares: {instead}"
+    if assignment.robust:
+        yield ("assignment", "robust"), f"is not linear in the design: {instead}"
+    for k, target in enumerate(document.targets):
+        if not target.is_goal:
+            yield ("targets", k, target.kind), f"is not a wanted frequency: {instead}"
+    for path, _ in followed_modes(document):
+        yield path, f"is followed by its shape: {instead}"
+    if design.mass is not None:
+        limited = design.mass.min is not None or design.mass.max is not None
+        yield ("design", "mass"), f"{'limits' if limited else 'prices'} the mass: {instead}"
+    if "torque" in design.model_fields_set:
+        yield ("design", "torque"), f"limits torques of drives: {instead}"
+    for name, entry in design.entries.items():
+        key = "choices" if isinstance(entry, Choices) else "values"
+        if getattr(entry, key) is not None:
+            yield ("design", name, key), f"is a list: {instead}"
+
+
+def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
+    """What is to be light, high or wide has limits beside it, no wanted frequencies.
+
+    Bands or gaps can be wide where there are some.
+    """
+    name = document.assignment.named_objective
+    one_shot = document.assignment.method == "one_shot"  # which takes none of them
+    if name not in ("lightest", "highest", "widest") or one_shot:
+        return
+    for k, target in enumerate(document.targets):
+        if isinstance(target, FrequencyTarget):
+            message = f"objective {name} takes no wanted frequency: write at_least, at_most or both"
+            yield ("targets", k, "frequency"), message
+    wide = [isinstance(target, (KeepOutTarget, GapTarget)) for target in document.targets]
+    if name == "widest" and not any(wide):
+        yield ("assignment", "objective"), "widest needs a target with keep_out or gap"
+    for place, _ in followed_modes(document) if name == "widest" else ():
+        if wide[int(place[1])]:
+            yield place, "is followed by its shape: widest takes numbered modes only"
+
+
+def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
+    """Something deviates where deviations count."""
+    deviates = any(entry.tolerance for entry in document.design.entries.values())
+    if document.assignment.robust and not deviates:
+        message = "no parameter has a tolerance: give at least one, such as tolerance: 2 %"
+        yield ("assignment", "robust"), message
+
+
+# --- All rules
+
+Rule = Callable[[Document], Iterator[Finding]]
 RULES: tuple[Rule, ...] = (
-    reserved_names_are_not_used,
+    names_mean_something,
     mechanism.links_have_known_materials,
     mechanism.beams_have_known_sections,
     mechanism.bare_sections_have_the_moments_of_their_space,
     mechanism.rigid_links_have_one_end,
     mechanism.frames_hang_together,
     mechanism.beams_have_no_more_elements_than_can_be_meant,
-    mechanism.superelements_have_rows_of_their_own_for_each_node,
-    mechanism.links_that_a_joint_travels_along_are_not_reduced,
+    mechanism.superelements_have_a_row_for_each_freedom,
     mechanism.bodies_and_tips_are_on_nodes,
     mechanism.springs_join_two_nodes,
     mechanism.joints_connect_two_links,
-    mechanism.beams_carry_one_rider,
-    mechanism.nuts_are_on_their_shaft,
+    mechanism.riders_have_a_beam_of_their_own,
     mechanism.links_are_connected_to_the_ground,
     mechanism.coordinates_move_one_freedom_each,
-    mechanism.assembly_names_coordinates_and_joints,
-    mechanism.assembly_is_for_loops,
+    mechanism.assembly_closes_loops,
     properties.parameters_name_properties,
     properties.properties_of_one_parameter_are_alike,
-    properties.load_cases_set_properties,
-    values.values_are_what_they_are_of,
-    study.lists_have_an_entry_for_each_coordinate,
-    study.expansion_point_has_an_entry_for_each_parameter,
-    study.trajectories_have_names_of_their_own,
-    study.branches_are_ranges_of_driven_joints,
-    study.parameters_vary_different_properties,
-    study.limited_drives_are_of_coordinates,
-    study.constraints_are_between_design_parameters,
-    study.targets_are_on_trajectories,
-    study.statics_are_of_nodes,
-    study.a_mode_has_one_frequency_at_a_time,
-    study.followed_modes_are_at_a_pose,
-    study.measurements_are_at_poses,
-    study.one_shot_has_a_quadratic_program,
-    study.objectives_have_what_they_take,
-    study.robust_designs_have_tolerances,
-    study.profiles_cover_their_trajectories,
+    properties.each_property_has_one_owner,
+    properties.values_are_what_they_are_of,
+    lists_are_as_long_as_what_they_list,
+    trajectories_have_names_of_their_own,
+    branches_are_ranges_of_driven_joints,
+    constraints_are_between_design_parameters,
+    times_are_of_trajectories,
+    statics_are_of_nodes,
+    a_mode_has_one_frequency_at_a_time,
+    followed_modes_are_of_possible_designs,
+    one_shot_has_a_quadratic_program,
+    objectives_have_what_they_take,
+    robust_designs_have_tolerances,
 )
 LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right
-    study.bounds_go_upwards,
+    bounds_go_upwards,
     properties.parameters_agree_with_the_file,
-    properties.bounds_hold_nothing_impossible,
-    properties.load_cases_set_nothing_impossible,
 )
 
 

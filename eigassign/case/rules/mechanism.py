@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Collection, Iterator
 
 from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
-from eigassign.case.rules.lookups import beams, freedoms, guessed, moving, node_problem
+from eigassign.case.rules.properties import freedoms, guessed
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import (
     BareSection,
     BeamLink,
+    FrameBeam,
     FrameLink,
+    Link,
     RigidLink,
     SectionBase,
     SolidLink,
@@ -28,6 +29,67 @@ from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
 from eigassign.files import how_to_raise, raised
 
 MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
+
+# --- What names stand for
+
+
+def beams(mechanism: Mechanism) -> Iterator[tuple[KeyPath, BeamLink | FrameBeam]]:
+    """Key path and content of every beam: links that are one, and those of frames."""
+    for name, link in mechanism.links.items():
+        path: KeyPath = ("mechanism", "links", name)
+        if isinstance(link, BeamLink):
+            yield path, link
+        if isinstance(link, FrameLink):
+            yield from (((*path, "beams", beam), own) for beam, own in link.beams.items())
+
+
+def node_names(link: Link) -> list[str]:
+    """Nodes of one link."""
+    if isinstance(link, BeamLink):
+        return ["start", "end"]
+    if not isinstance(link, RigidLink):
+        return list(link.nodes)
+    implied = ["start"] if link.length is None else ["start", "end"]
+    return list(dict.fromkeys([*implied, *link.nodes]))
+
+
+def moving(mechanism: Mechanism) -> list[str]:
+    """Names of the joints that are not fixed."""
+    return [name for name in mechanism.joints if freedoms(mechanism, name)]
+
+
+def reached(first: str, pairs: Collection[tuple[str, str]]) -> set[str]:
+    """What pairs of names lead to from the ``first``."""
+    beside: dict[str, set[str]] = {}
+    for a, b in pairs:
+        beside.setdefault(a, set()).add(b)
+        beside.setdefault(b, set()).add(a)
+    found, waiting = {first}, [first]
+    while waiting:
+        new = beside.get(waiting.pop(), set()) - found
+        found |= new
+        waiting += new
+    return found
+
+
+def node_problem(mechanism: Mechanism, value: str, also: str = "") -> str | None:
+    """The mistake in ``value`` as `<link>.<node>`; ``also`` may stand there too."""
+    link, _, node = value.partition(".")
+    or_else = [also] if also else []
+    if link not in mechanism.links:
+        expected = f"{also}, " if also else ""
+        return (
+            f"{unknown('link', link, [*or_else, *mechanism.links])}; expected {expected}"
+            "'<link>.start', '<link>.end' or another node"
+        )
+    nodes = node_names(mechanism.links[link])
+    if node in nodes:
+        return None
+    few = [repr(f"{link}.{name}") for name in nodes]
+    spelt = few if len(nodes) <= 6 else [f"'{link}.<node>' ({listed(nodes)})"]
+    expected = " or ".join([*or_else, *spelt])
+    return f"expected {expected}, got {shown(value)}{suggestion(node, nodes)}"
+
 
 # --- Materials and sections
 
@@ -118,37 +180,20 @@ def frames_hang_together(document: Document) -> Iterator[Finding]:
         if not isinstance(link, FrameLink):
             continue
         path: KeyPath = ("mechanism", "links", name)
-        nodes = link.nodes
+        nodes, pairs = link.nodes, [(b.from_node, b.to_node) for b in link.beams.values()]
         if "start" not in nodes:
             yield (*path, "nodes"), "a frame needs a node 'start'"
-        joined: dict[str, list[str]] = {node: [] for node in nodes}
-        ends_exist = True
-        for key, beam in link.beams.items():
-            inner, (a, b) = (*path, "beams", key), (beam.from_node, beam.to_node)
+        for key, (a, b) in zip(link.beams, pairs, strict=True):
             for end, node in (("from", a), ("to", b)):
                 if node not in nodes:
-                    yield (*inner, end), unknown("node", node, nodes)
-                    ends_exist = False
-            if a not in nodes or b not in nodes:
-                continue
-            if nodes[a] == nodes[b]:
-                yield inner, f"has no length: {a!r} and {b!r} are the same place"
-            joined[a].append(b)
-            joined[b].append(a)
-        if ends_exist and nodes:
-            yield from _loose_nodes(path, joined)
-
-
-def _loose_nodes(path: KeyPath, joined: Mapping[str, list[str]]) -> Iterator[Finding]:
-    first = "start" if "start" in joined else next(iter(joined))
-    reached, waiting = {first}, [first]
-    while waiting:
-        new = [node for node in joined[waiting.pop()] if node not in reached]
-        reached.update(new)
-        waiting += new
-    if loose := [node for node in joined if node not in reached]:
-        message = f"no beams connect {listed(loose)} with {first!r}"
-        yield (*path, "nodes", loose[0]), message
+                    yield (*path, "beams", key, end), unknown("node", node, nodes)
+            if a in nodes and nodes[a] == nodes.get(b):
+                yield (*path, "beams", key), f"has no length: {a!r} and {b!r} are the same place"
+        together = reached("start", pairs)
+        loose = [node for node in nodes if node not in together]
+        if "start" in nodes and loose and {end for pair in pairs for end in pair} <= {*nodes}:
+            message = f"no beams connect {listed(loose)} with 'start'"
+            yield (*path, "nodes", loose[0]), message
 
 
 def beams_have_no_more_elements_than_can_be_meant(document: Document) -> Iterator[Finding]:
@@ -168,37 +213,16 @@ def beams_have_no_more_elements_than_can_be_meant(document: Document) -> Iterato
         )
 
 
-def superelements_have_rows_of_their_own_for_each_node(document: Document) -> Iterator[Finding]:
-    """A node of a superelement has as many rows as degrees of freedom, shared with no other."""
+def superelements_have_a_row_for_each_freedom(document: Document) -> Iterator[Finding]:
+    """A node of a superelement has as many rows as degrees of freedom."""
     planar = document.mechanism.space == "planar"
     wanted = "u_x, u_y, θ_z" if planar else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
     n = len(wanted.split())
     for name, link in document.mechanism.links.items():
-        owner: dict[int, str] = {}
-        numbered: dict[int, str] = {}
         for node, body in link.nodes.items() if isinstance(link, SuperelementLink) else ():
-            path: KeyPath = ("mechanism", "links", name, "nodes", node)
-            number = body.id[0] if isinstance(body.id, tuple) else body.id
-            first = node if number is None else numbered.setdefault(number, node)
-            if first != node and body.dofs is None:
-                yield (*path, "id"), f"node {number} is {first!r} already"
             if body.dofs is not None and len(body.dofs) != n:
-                message = f"needs {n} entries, the rows of {wanted}; got {len(body.dofs)}"
-                yield (*path, "dofs"), message
-            for k, dof in enumerate(body.dofs or ()):
-                if dof in owner:
-                    yield (*path, "dofs", k), f"row {dof} belongs to node {owner[dof]!r} already"
-                owner.setdefault(dof, node)
-
-
-def links_that_a_joint_travels_along_are_not_reduced(document: Document) -> Iterator[Finding]:
-    """A link on which a carriage or nut travels bends differently at every place of it."""
-    for name, joint in document.mechanism.joints.items():
-        base = document.mechanism.links.get(joint.base)
-        if joint.travels and isinstance(base, BeamLink) and base.reduce_to is not None:
-            message = f"{name!r} travels along this link, so that it cannot be reduced: "
-            path = ("mechanism", "links", joint.base, "reduce_to")
-            yield path, message + "leave reduce_to out"
+                path: KeyPath = ("mechanism", "links", name, "nodes", node, "dofs")
+                yield path, f"needs {n} entries, the rows of {wanted}; got {len(body.dofs)}"
 
 
 # --- Bodies, springs and the tip stand on nodes
@@ -236,48 +260,17 @@ _JOINTS = ("mechanism", "joints")
 # --- Joints connect links to the ground
 
 
-class Edge(NamedTuple):
-    """A joint between two links, or the ground and a link."""
-
-    joint: str
-    base: str
-    follower: str
-
-
-class Walk(NamedTuple):
-    """Links that joints connect to the ground, and the joints that placed none of them."""
-
-    placed: frozenset[str]
-    loops: tuple[Edge, ...]  # both their links are placed by others
-    apart: tuple[Edge, ...]  # neither of their links is placed
-
-
-def walk_from_the_ground(mechanism: Mechanism) -> Walk | None:
-    """Place link after link, joints in the order of the file.
-
-    None if a joint does not join two links that exist.
-    """
-    known = set(mechanism.links)
-    waiting = []
-    for joint, body in mechanism.joints.items():
-        base, follower = (node.partition(".")[0] for node in (body.base, body.follower))
-        if base not in {*known, "ground"} or follower not in known or base == follower:
-            return None
-        waiting.append(Edge(joint, base, follower))
-    placed = {"ground"}
-    while step := next((e for e in waiting if (e.base in placed) != (e.follower in placed)), None):
-        placed |= {step.base, step.follower}
-        waiting.remove(step)
-    loops = tuple(e for e in waiting if e.base in placed)
-    return Walk(frozenset(placed), loops, tuple(e for e in waiting if e.base not in placed))
-
-
-def beams_carry_one_rider(document: Document) -> Iterator[Finding]:
-    """One carriage or nut travels along a beam: its mesh is divided where that stands."""
+def riders_have_a_beam_of_their_own(document: Document) -> Iterator[Finding]:
+    """One carriage or nut travels along a beam, a nut on its axis, and the beam is not reduced."""
     riders: dict[str, str] = {}
     for name, joint in document.mechanism.joints.items():
-        if not joint.travels:
+        base = document.mechanism.links.get(joint.base)
+        if not joint.travels or not isinstance(base, BeamLink):
             continue
+        if base.reduce_to is not None:
+            message = f"{name!r} travels along this link, so that it cannot be reduced: "
+            path = ("mechanism", "links", joint.base, "reduce_to")
+            yield path, message + "leave reduce_to out"
         if joint.base in riders:
             message = (
                 f"{riders[joint.base]!r} travels along {joint.base!r} already, and a beam carries "
@@ -285,11 +278,6 @@ def beams_carry_one_rider(document: Document) -> Iterator[Finding]:
             )
             yield (*_JOINTS, name, "base"), message
         riders.setdefault(joint.base, name)
-
-
-def nuts_are_on_their_shaft(document: Document) -> Iterator[Finding]:
-    """A nut turns about its shaft: beside it there is none to turn about."""
-    for name, joint in document.mechanism.joints.items():
         if isinstance(joint, NutJoint) and any((joint.position or ())[1:]):
             message = (
                 "a nut stands on the axis of its shaft, so that only the first component of its "
@@ -326,22 +314,40 @@ def _base_problem(mechanism: Mechanism, joint: JointBase) -> str | None:
     return f"rides along a beam: expected one of {listed(beams)}, got {shown(base)}{hint}"
 
 
+def _pairs(mechanism: Mechanism) -> list[tuple[str, str]]:
+    """The links, or ground and link, that each joint joins; none if some join no two that exist."""
+    known = {*mechanism.links}
+    pairs = [
+        (joint.base.partition(".")[0], joint.follower.partition(".")[0])
+        for joint in mechanism.joints.values()
+    ]
+    good = all(a in {*known, "ground"} and b in known and a != b for a, b in pairs)
+    return pairs if good else []
+
+
+def _is_open(mechanism: Mechanism) -> bool:
+    """True where every joint hangs another link on the ground: no loop is closed."""
+    pairs = _pairs(mechanism)
+    return len(pairs) == len(mechanism.links) < len(reached("ground", pairs))
+
+
 def links_are_connected_to_the_ground(document: Document) -> Iterator[Finding]:
     """Joints lead from the ground to every link; what hangs together apart is reported once."""
-    walk = walk_from_the_ground(document.mechanism)
-    left = [link for link in document.mechanism.links if walk and link not in walk.placed]
-    while walk and left:
-        group = {left[0]}
-        while more := [e for e in walk.apart if (e.base in group) != (e.follower in group)]:
-            group |= {end for edge in more for end in (edge.base, edge.follower)}
-        joints = [e.joint for e in walk.apart if e.base in group]
+    mechanism = document.mechanism
+    pairs = _pairs(mechanism)
+    placed = reached("ground", pairs)
+    for link in mechanism.links if pairs or not mechanism.joints else ():
+        if link in placed:
+            continue
+        group = reached(link, pairs)
+        placed |= group
+        joints = [j for j, pair in zip(mechanism.joints, pairs, strict=True) if group & {*pair}]
         if joints:
-            message = f"{listed(joints)} join {listed([n for n in left if n in group])}"
+            message = f"{listed(joints)} join {listed([n for n in mechanism.links if n in group])}"
             yield (*_JOINTS, joints[0]), f"{message}, but no joint connects these to the ground"
         else:
-            message = f"no joint holds this link: add one with follower: {left[0]}.<node>"
-            yield ("mechanism", "links", left[0]), message
-        left = [link for link in left if link not in group]
+            message = f"no joint holds this link: add one with follower: {link}.<node>"
+            yield ("mechanism", "links", link), message
 
 
 # --- Coordinates move joints
@@ -352,35 +358,39 @@ def coordinates_move_one_freedom_each(document: Document) -> Iterator[Finding]:
     every freedom has one, since nothing else determines it."""
     mechanism = document.mechanism
     owner: dict[tuple[str, str], str] = {}  # coordinate by joint and freedom
-    complete = True
+    complete = _is_open(mechanism)
     for name, body in document.coordinates.items():
         path: KeyPath = ("coordinates", name)
         known = freedoms(mechanism, body.joint)
         if problem := _problem(mechanism, known, body, path):
             yield problem
-            complete = complete and known == ()
+            complete = complete and body.joint in mechanism.joints and not known
             continue
-        freedom = str(body.component or (known or ("",))[0])
+        freedom = str(body.component or known[0])
         if (body.joint, freedom) in owner:
-            of = f"{freedom} of " if known and len(known) > 1 else ""
+            of = f"{freedom} of " if len(known) > 1 else ""
             message = f"{of}joint {body.joint!r} has a coordinate already: "
             yield (*path, "joint"), f"{message}{owner[body.joint, freedom]!r}"
         owner.setdefault((body.joint, freedom), name)
         if body.angle == "absolute" and not isinstance(mechanism.joints[body.joint], RevoluteJoint):
             yield (*path, "angle"), "only the angle of a revolute joint can be absolute"
-    walk = walk_from_the_ground(mechanism)
-    if complete and walk is not None and not walk.loops:
-        yield from _undriven(document, owner)
+    for joint in moving(mechanism) if complete else ():
+        known = freedoms(mechanism, joint)
+        if missing := [freedom for freedom in known if (joint, freedom) not in owner]:
+            which = f", component: {missing[0]}" if len(known) > 1 else ""
+            first = f"q{len(document.coordinates) + 1}"
+            message = f"no coordinate: add one under coordinates, e.g. {first}: "
+            yield (*_JOINTS, joint), message + f"{{joint: {joint}{which}}}"
 
 
 def _problem(
-    mechanism: Mechanism, known: tuple[str, ...] | None, body: Coordinate, path: KeyPath
+    mechanism: Mechanism, known: tuple[str, ...], body: Coordinate, path: KeyPath
 ) -> Finding | None:
     """The mistake in the joint, or in the component of it, if there is one."""
     joint, component = body.joint, body.component
-    if known is None:
+    if joint not in mechanism.joints:
         return (*path, "joint"), unknown("joint", joint, mechanism.joints)
-    if known == ():
+    if not known:
         message = f"joint {joint!r} is fixed and has no coordinate; joints that move: "
         return (*path, "joint"), message + listed(moving(mechanism))
     message = f"joint {joint!r} is {mechanism.joints[joint].type}: "
@@ -393,47 +403,31 @@ def _problem(
     return None
 
 
-def _undriven(document: Document, owner: dict[tuple[str, str], str]) -> Iterator[Finding]:
-    for joint in moving(document.mechanism):
-        known = freedoms(document.mechanism, joint) or ()
-        missing = [freedom for freedom in known if (joint, freedom) not in owner]
-        if missing:
-            which = f", component: {missing[0]}" if len(known) > 1 else ""
-            first = f"q{len(document.coordinates) + 1}"
-            message = f"no coordinate: add one under coordinates, e.g. {first}: "
-            yield (*_JOINTS, joint), message + f"{{joint: {joint}{which}}}"
+def assembly_closes_loops(document: Document) -> Iterator[Finding]:
+    """`at` names coordinates, `guess` joints that move, with a number for each freedom.
 
-
-# --- Loops are put together
-
-
-def assembly_names_coordinates_and_joints(document: Document) -> Iterator[Finding]:
-    """`at` names coordinates, `guess` joints that move, with a number for each freedom."""
-    assembly, path = document.mechanism.assembly, ("mechanism", "assembly")
-    for name in assembly.at if assembly else ():
+    An open mechanism can be put together in one way only.
+    """
+    mechanism, path = document.mechanism, ("mechanism", "assembly")
+    assembly = mechanism.assembly
+    if assembly is None:
+        return
+    if _is_open(mechanism):
+        yield path, "no joint closes a loop: there is nothing to choose"
+    for name in assembly.at:
         if name not in document.coordinates:
             yield (*path, "at", name), unknown("coordinate", name, document.coordinates)
-    for joint, value in assembly.guess.items() if assembly else ():
-        if problem := _guess_problem(document, joint, value):
-            yield (*path, "guess", joint), problem
-
-
-def _guess_problem(document: Document, joint: str, value: object) -> str | None:
-    known = freedoms(document.mechanism, joint)
-    if known is None:
-        return unknown("joint", joint, document.mechanism.joints)
-    if known == ():
-        return f"joint {joint!r} is fixed: there is nothing to guess"
-    count = len(value) if isinstance(value, tuple) else 1
-    if len(known) > 1 and guessed(document, joint, count) is None:
-        return f"needs a list of {len(known)}: {listed(known)}; or of those without a coordinate"
-    if len(known) == 1 and isinstance(value, tuple):
-        return f"joint {joint!r} has one freedom: expected a number, got a list"
-    return None
-
-
-def assembly_is_for_loops(document: Document) -> Iterator[Finding]:
-    """An open mechanism can be put together in one way only."""
-    walk = walk_from_the_ground(document.mechanism)
-    if document.mechanism.assembly is not None and walk is not None and not walk.loops:
-        yield ("mechanism", "assembly"), "no joint closes a loop: there is nothing to choose"
+    for joint, value in assembly.guess.items():
+        known, count = freedoms(mechanism, joint), len(value) if isinstance(value, tuple) else 1
+        message = ""
+        if joint not in mechanism.joints:
+            message = unknown("joint", joint, mechanism.joints)
+        elif not known:
+            message = f"joint {joint!r} is fixed: there is nothing to guess"
+        elif len(known) > 1 and not guessed(document, joint, count):
+            message = f"needs a list of {len(known)}: {listed(known)}; or of those without a "
+            message += "coordinate"
+        elif len(known) == 1 and isinstance(value, tuple):
+            message = f"joint {joint!r} has one freedom: expected a number, got a list"
+        if message:
+            yield (*path, "guess", joint), message

@@ -1,4 +1,4 @@
-"""Design parameters: which number of the mechanism a path names, and whether its bounds make sense.
+"""Which number of the mechanism a path names, what it may be, and values whose unit it decides.
 
 A path is `materials.<name>.<property>` and the like below `mechanism`, or
 `coordinates.<name>.drive.stiffness` (or another key of `DRIVEN`). What can vary follows from the
@@ -9,18 +9,21 @@ angles, such as `joints.<name>.position.0`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
-from eigassign.case.reader import Finding, KeyPath, listed, suggestion, unknown
-from eigassign.case.rules.lookups import ANY, driven, places
-from eigassign.case.schema.design import Choices, Design
+from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
+from eigassign.case.schema.design import Choices, Design, Tolerance, column_names
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.links import RigidLink, Section, SolidLink
-from eigassign.case.schema.mechanism import Coordinate, Mechanism, NutJoint
-from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, quantity
+from eigassign.case.schema.links import RigidLink, SolidLink
+from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism, NutJoint
+from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, Written, quantity
+from eigassign.case.schema.targets import FREQUENCY, FollowedMode
 from eigassign.case.schema.trajectory import Added, named_trajectories
-from eigassign.case.units import QuantityError
+from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_rate
+
+ANY = Quantity()  # dimension unknown because of an error elsewhere
 
 _GROUPS = {
     "materials": "material",
@@ -29,6 +32,7 @@ _GROUPS = {
     "joints": "joint",
     "bodies": "body",
     "springs": "spring",
+    "coordinates": "coordinate",
 }
 _FORMS = (
     "expected materials.<name>.<property>, or the same of sections, links, bodies and springs, "
@@ -48,16 +52,6 @@ DRIVEN = {  # of a drive: what it is where the joint turns, and where it slides
     "motor_inertia": (quantity("rotary inertia", at_least=0),) * 2,
     "ratio": (Quantity(above=0), quantity("transmission", above=0)),
 }
-# By what a bare number is in: the unit that is easily left out, and its size.
-_MEANT = {
-    "m": ("mm", 1e-3),
-    "kg": ("g", 1e-3),
-    "Pa": ("GPa", 1e9),
-    "N/m": ("kN/m", 1e3),
-    "N m/rad": ("kN m/rad", 1e3),
-}
-# real numbers that the mechanism is built with
-_FIXED = {("links", "roll"), ("links", "reduce_to"), ("springs", "angle"), ("joints", "lead")}
 
 
 class NoPropertyError(ValueError):
@@ -70,17 +64,29 @@ def property_at(case: Any, path: str) -> Quantity:
     ``case`` has a `mechanism` and `coordinates`. Raises NoPropertyError where the path names
     nothing, or something that is not a real number.
     """
-    mechanism: Mechanism = case.mechanism
-    group, *rest = path.split(".")
-    if group == "mechanism" and rest and rest[0] in _GROUPS:
-        raise NoPropertyError(f"paths start below mechanism: write {'.'.join(rest)!r}")
-    if group == "coordinates" and len(rest) == 3 and rest[1] == "drive":
-        return _of_drive(mechanism, case.coordinates, rest[0], rest[2])
-    if group in _VECTORS and len(rest) > 1 and rest[1] in _VECTORS[group]:
-        return _of_component(mechanism, group, rest[0], rest[1], rest[2:])
-    if group not in _GROUPS or len(rest) != 2:
-        raise NoPropertyError(f"{_FORMS}; got {path!r}{_meant(mechanism, group, path)}")
-    return _of_part(mechanism, group, *rest)
+    group, name, *keys = (*path.split("."), "", "")
+    if group == "mechanism" and name in _GROUPS:
+        raise NoPropertyError(f"paths start below mechanism: write {path.partition('.')[2]!r}")
+    if group not in _GROUPS or not keys[0]:
+        meant = suggestion(group, _GROUPS) if group not in _GROUPS else ""
+        for known in _GROUPS:
+            if group in _parts(case, known):
+                meant = f"; did you mean '{known}.{path}'?"
+        raise NoPropertyError(f"{_FORMS}; got {path!r}{meant}")
+    parts, key = _parts(case, group), ".".join(keys).rstrip(".")
+    if name not in parts:
+        raise NoPropertyError(unknown(_GROUPS[group], name, parts))
+    numbers = _numbers(case, group, name)
+    if key not in numbers:
+        own, near = f"{group}.{name}.{key}", suggestion(key, numbers)
+        message = f"{group}.{name} has no property {key!r}{near}"
+        if reduce(below, key.split("."), parts[name]) is not None:
+            message = f"{own} cannot vary as it is in this file"
+        elif key in type(parts[name]).model_fields or key in [f"drive.{each}" for each in DRIVEN]:
+            message = f"{own} has no value in this file: give it an initial value"
+        message += f"; can vary: {listed(numbers)}"
+        raise NoPropertyError(message)
+    return numbers[key]
 
 
 def known_property(case: Any, path: str) -> Quantity | None:
@@ -91,87 +97,43 @@ def known_property(case: Any, path: str) -> Quantity | None:
         return None
 
 
-def is_place(path: str) -> bool:
-    """True where a property is a length, a place or an angle of the mechanism."""
-    group, _, key, *_ = path.split(".")
-    return key in ("length", "angle", *_VECTORS.get(group, ()))
+def _parts(case: Any, group: str) -> Mapping[str, Any]:
+    owner = case if group == "coordinates" else case.mechanism
+    parts: Mapping[str, Any] = getattr(owner, group)
+    return parts
 
 
-def _meant(mechanism: Mechanism, group: str, path: str) -> str:
-    """The group that was left out or misspelt, as a question."""
-    if group in (*_GROUPS, "coordinates"):
-        return ""
-    for known in _GROUPS:
-        if group in getattr(mechanism, known):
-            return f"; did you mean '{known}.{path}'?"
-    return suggestion(group, (*_GROUPS, "coordinates"))
-
-
-def _part(mechanism: Mechanism, group: str, name: str) -> Any:
-    known = getattr(mechanism, group)
-    if name not in known:
-        raise NoPropertyError(unknown(_GROUPS[group], name, known))
-    return known[name]
-
-
-def _of_component(
-    mechanism: Mechanism, group: str, name: str, key: str, inner: Sequence[str]
-) -> Quantity:
-    """What a component of a place, or of the angles in space, may be."""
-    part, owner, axes = _part(mechanism, group, name), f"{group}.{name}.{key}", "xyz"
-    if group == "links" and not isinstance(part, RigidLink):
-        raise NoPropertyError(f"{owner} cannot vary: the places in a link can where it is rigid")
-    if mechanism.space == "planar":
-        axes = "xy"
-        if key == "orientation":
-            instead = f"vary joints.{name}.angle"
-            raise NoPropertyError(f"{owner} is for spatial mechanisms: {instead}")
-    if key == "position" and isinstance(part, NutJoint):
-        axes = "x"  # it stands on the axis of its shaft
-    value = getattr(part, key)
-    if key == "nodes":
-        if not inner or inner[0] not in value:
-            raise NoPropertyError(unknown("node with a place", ".".join(inner[:1]), value))
-        value, owner, inner = value[inner[0]], f"{owner}.{inner[0]}", inner[1:]
-    if len(inner) != 1 or inner[0] not in [str(k) for k in range(len(axes))]:
-        forms = listed([f"{owner}.{k}" for k in range(len(axes))])
-        raise NoPropertyError(f"{owner} varies by component ({', '.join(axes)}): {forms}")
-    if value is None and group == "links":  # joints and bodies are at their node, and not turned
-        raise NoPropertyError(f"{owner} has no value in this file: give it an initial value")
-    return _VECTORS[group][key]
-
-
-def _of_part(mechanism: Mechanism, group: str, name: str, key: str) -> Quantity:
-    part, owner = _part(mechanism, group, name), f"{group}.{name}"
+def _numbers(case: Any, group: str, name: str) -> dict[str, Quantity]:
+    """The numbers of one part that can vary, by the keys that lead to them."""
+    part, mechanism = _parts(case, group)[name], case.mechanism
     spatial = mechanism.space == "spatial"
-    if (group, key) == ("joints", "angle") and spatial:
-        raise NoPropertyError(f"{owner}.angle is for planar mechanisms: vary {owner}.orientation.2")
-    real = {k: q for k, q in quantities(type(part)).items() if (group, k) not in _FIXED}
-    if key not in real:
-        message = f"{owner} has no property {key!r}{suggestion(key, real)}"
-        if key in type(part).model_fields:
-            message = f"{owner}.{key} is not a real number and cannot vary"
-        raise NoPropertyError(f"{message}; can vary: {listed(real)}")
-    if key == "inertia" and spatial:
-        raise NoPropertyError(f"{owner}.inertia is a tensor in space and cannot vary")
-    solids = [
-        link
-        for link, each in mechanism.links.items()
-        if isinstance(each, SolidLink) and each.material == name
-    ]
-    if (group, key) == ("materials", "poissons_ratio") and solids:
-        raise NoPropertyError(
-            f"{owner}.{key} cannot vary: the matrices of the solid {solids[0]} are made for one; "
-            f"vary {owner}.youngs_modulus or {owner}.density"
-        )
-    written = getattr(part, key)
-    if written is None:
-        raise NoPropertyError(f"{owner}.{key} has no value in this file: give it an initial value")
-    if isinstance(written, tuple):
-        raise NoPropertyError(
-            f"{owner}.{key} is a list in this file and cannot vary: give one number"
-        )
-    return real[key]
+    if group == "coordinates":
+        given = [key for key in DRIVEN if getattr(part.drive, key, None) is not None]
+        return {f"drive.{key}": drive_quantity(mechanism, part, key) for key in given}
+    fixed = {"roll", "reduce_to", "lead"}  # which matrices are made for
+    fixed |= {"angle"} if group == "springs" or spatial else {"orientation"}
+    fixed |= {"inertia"} if spatial else set()  # a tensor
+    solids = (link for link in mechanism.links.values() if isinstance(link, SolidLink))
+    if group == "materials" and name in [solid.material for solid in solids]:
+        fixed.add("poissons_ratio")
+    found = {
+        key: kind
+        for key, kind in quantities(type(part)).items()
+        if key not in fixed and isinstance(getattr(part, key), float)
+    }
+    n = 3 if spatial else 2
+    for key, kind in _VECTORS.get(group, {}).items():
+        value: Any = getattr(part, key, None)
+        if key in fixed or (group == "links" and not isinstance(part, RigidLink)):
+            continue
+        if key == "position" and isinstance(part, NutJoint):
+            n = 1  # it stands on the axis of its shaft
+        if group != "links":  # joints and bodies are at their node, and not turned
+            found |= {f"{key}.{k}": kind for k in range(n)}
+        elif value is not None:
+            places = {f"nodes.{node}" for node in value} if key == "nodes" else {key}
+            found |= {f"{place}.{k}": kind for place in sorted(places) for k in range(n)}
+    return found
 
 
 def quantities(model: type[Part]) -> dict[str, Quantity]:
@@ -189,21 +151,6 @@ def _quantity(annotation: Any, metadata: Sequence[object]) -> Quantity | None:
         return None
     inner = (get_args(a) for a in get_args(annotation) if get_origin(a) is Annotated)
     return next((q for kind, *more in inner if (q := _quantity(kind, more)) is not None), None)
-
-
-def _of_drive(
-    mechanism: Mechanism, known: Mapping[str, Coordinate], name: str, key: str
-) -> Quantity:
-    if key not in DRIVEN:
-        wrong = f"a drive has no property {key!r}{suggestion(key, DRIVEN)}"
-        raise NoPropertyError(f"{wrong}; can vary: {listed(DRIVEN)}")
-    if name not in known:
-        raise NoPropertyError(unknown("coordinate", name, known))
-    if getattr(known[name].drive, key, None) is None:
-        raise NoPropertyError(
-            f"coordinate {name!r} has no drive {key}: write drive: {{{key}: ...}}"
-        )
-    return drive_quantity(mechanism, known[name], key)
 
 
 def drive_quantity(mechanism: Mechanism, coordinate: Coordinate, key: str) -> Quantity:
@@ -244,17 +191,220 @@ def with_value(part: Any, path: Sequence[str | int], value: float) -> Any:
     return part.model_copy(update={key: with_value(getattr(part, str(key)), rest, value)})
 
 
+# --- Looking into a document
+
+
+def walk(part: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object]]:
+    """Key path and content of everything from ``part`` down, but for bare numbers."""
+    yield path, part
+    inner: Any = ()
+    if isinstance(part, Part):
+        fields = type(part).model_fields.items()
+        inner = [(field.alias or name, getattr(part, name)) for name, field in fields]
+    elif isinstance(part, Mapping):
+        inner = part.items()
+    elif isinstance(part, tuple):
+        inner = ((k, each) for k, each in enumerate(part) if type(each) is not float)
+    for key, each in inner:  # the entries of a design stand in it directly
+        apart = isinstance(part, Design) and key == "entries"
+        yield from walk(each, path if apart else (*path, key))
+
+
+def followed_modes(document: Document) -> list[tuple[KeyPath, FollowedMode]]:
+    """Key path and content of every mode that is named by its shape."""
+    found = walk(document.targets, ("targets",))
+    return [(path, mode) for path, mode in found if isinstance(mode, FollowedMode)]
+
+
+def coordinate_lists(document: Document) -> Iterator[tuple[KeyPath, Sequence[float]]]:
+    """Key path and content of whatever has an entry for each coordinate."""
+    for path, row in walk(document):
+        match [key for key in path if isinstance(key, str)]:
+            case (
+                ["expansion" | "measurements", "q"]
+                | ["trajectory", "q" | "points" | "start"]
+                | ["targets", *_, "at", "q"]
+            ) if isinstance(row, tuple) and not any(isinstance(each, tuple) for each in row):
+                yield path, row
+
+
+def freedoms(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
+    """Names of a joint's freedoms, in order; none if there is no such joint."""
+    return FREEDOMS[mechanism.joints[joint].type] if joint in mechanism.joints else ()
+
+
+def driven(mechanism: Mechanism, coordinate: Coordinate) -> str | None:
+    """The freedom of its joint that a coordinate is; None where that cannot be told."""
+    known, component = freedoms(mechanism, coordinate.joint), coordinate.component
+    if component is None:
+        return known[0] if len(known) == 1 else None
+    return str(component) if str(component) in known else None
+
+
+def guessed(document: Document, joint: str, count: int) -> tuple[str, ...]:
+    """The freedoms that a list of ``count`` guesses of a joint gives: all of them, or the passive.
+
+    None of them if there is no such joint, or no list of this length can be meant.
+    """
+    known = freedoms(document.mechanism, joint)
+    own = [body for body in document.coordinates.values() if body.joint == joint]
+    taken = {driven(document.mechanism, body) for body in own}
+    passive = tuple(freedom for freedom in known if freedom not in taken)
+    return next((each for each in (known, passive) if len(each) == count), ())
+
+
+def _of_freedom(freedom: str | None) -> Quantity:
+    """Angle or length; anything where the freedom is unknown."""
+    if freedom is None:
+        return ANY
+    return PLACE if freedom == "translation" else ANGLE
+
+
+def _of_only(known: tuple[str, ...]) -> Quantity:
+    return _of_freedom(known[0] if len(known) == 1 else None)
+
+
+def places(design: Design) -> dict[str, dict[str, KeyPath]]:
+    """Where the file names the properties of each component of y, by their paths."""
+    found: dict[str, dict[str, KeyPath]] = {}
+    for name, entry in design.entries.items():
+        if isinstance(entry, Choices):
+            first: KeyPath = ("design", name, "choices", next(iter(entry.choices)))
+            columns = column_names(name, entry.properties)
+            for column, path in zip(columns, entry.properties, strict=True):
+                found[column] = {path: (*first, path)}
+        elif isinstance(entry.parameter, str):
+            found[name] = {entry.parameter: ("design", name, "parameter")}
+        else:
+            found[name] = {}
+            for k, own in enumerate(entry.parameter):
+                place: KeyPath = ("design", name, "parameter", k)
+                found[name] |= (
+                    {own: place} if isinstance(own, str) else {p: (*place, p) for p in own}
+                )
+    return found
+
+
+# --- Values whose unit another key decides: the schema, which sees one part at a time, cannot know
+
+
+def values_are_what_they_are_of(document: Document) -> Iterator[Finding]:
+    """Each has the dimension, and keeps the limits, that the other key gives it."""
+    amounts = ((path, v.amount if isinstance(v, Tolerance) else v) for path, v in walk(document))
+    written = [(path, value) for path, value in amounts if isinstance(value, Written)]
+    texts = [(path, value) for path, value in _posed(document) if isinstance(value, str)]
+    for path, value in (*written, *texts):
+        try:
+            _read(value, _kind_at(document, path))
+        except QuantityError as error:
+            yield path, str(error)
+
+
+def followed_designs(document: Document) -> Iterator[tuple[KeyPath, float]]:
+    """The values, in SI, of parameters where a mode is named by its shape; not those of choices."""
+    for path, value in _posed(document):
+        yield path, _read(value, _kind_at(document, path))
+
+
+def _posed(document: Document) -> Iterator[tuple[KeyPath, float | str]]:
+    entries = document.design.entries
+    for path, mode in followed_modes(document):
+        for name, value in mode.design.items():
+            if name in entries and not isinstance(entries[name], Choices):
+                yield (*path, "design", name), value
+
+
+def _read(value: object, kind: Quantity | None) -> float:
+    """In SI what is of that ``kind``; None: it can have no unit. Raises QuantityError."""
+    given = value.text if isinstance(value, Written) else value
+    if isinstance(given, float) and given.is_integer() and abs(given) < 1e9:
+        given = int(given)  # as people write it
+    if kind is None and isinstance(given, str):
+        message = "terms of different dimensions: give a plain number in SI units, got "
+        raise QuantityError(message + shown(given))
+    if kind is not None and kind.rate:
+        return replace(kind, dimension=None).checked(read_rate(given, kind.dimension), shown(given))
+    if kind is not None and kind is not ANY:
+        return kind.read(given)
+    return read_quantity(given, None)
+
+
+_EXERTED = {PLACE: quantity("force", above=0), ANGLE: quantity("torque or energy", above=0)}
+
+
+def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
+    """What the value at a path is; ANY where that is not known, None where no unit can be meant."""
+    design, moved = document.design, document.coordinates
+    keys = [key for key in path if isinstance(key, str)]
+
+    def of(property_path: str) -> Quantity:
+        return known_property(document, property_path) or ANY
+
+    def parameter(name: str) -> Quantity:
+        column = design.parameters.get(name)
+        return of(column.parameter) if column else ANY
+
+    def amount(kind: Quantity, *, rate: bool = False, above: float | None = None) -> Quantity:
+        return ANY if kind is ANY else Quantity(kind.dimension, rate=rate, above=above)
+
+    def coordinate(name: str) -> Quantity:
+        known = moved.get(name)
+        return _of_freedom(driven(document.mechanism, known)) if known else ANY
+
+    match keys:
+        case ["design", "mass", "price"] if design.mass is not None:
+            return Quantity(DIMENSIONS["mass"], above=0, rate=True)
+        case ["design", "torque", name, "max"]:
+            return _EXERTED.get(coordinate(name), ANY)
+        case ["design", "constraints", name, "min" | "max"]:
+            kinds = {parameter(term) for term in design.constraints[name].terms} - {ANY}
+            dimensions = [*{kind.dimension for kind in kinds}]
+            return None if dimensions[1:] else Quantity(dimensions[0]) if dimensions else ANY
+        case ["design", _, "choices", _, "price"]:
+            return Quantity()
+        case ["design", _, "choices", _, own]:
+            return of(own)
+        case ["design", name, "price", *own]:
+            return amount(of(own[0]) if own else parameter(name), rate=True)
+        case ["design", name, "tolerance", *own]:
+            return amount(of(own[0]) if own else parameter(name), above=0)
+        case ["design", name, _]:
+            return parameter(name)
+        case ["targets", *_, "design", name]:
+            return parameter(name)
+        case ["measurements", "deviation"]:
+            return amount(FREQUENCY, above=0)
+        case ["expansion", "y"]:
+            columns = [*design.parameters]
+            return parameter(columns[int(path[-1])]) if int(path[-1]) < len(columns) else ANY
+        case ["trajectory", "set", own]:
+            return of(own)
+        case ["trajectory", "set", own, "add"]:
+            return amount(of(own))
+        case ["trajectory", "branch", joint]:
+            return _of_only(freedoms(document.mechanism, joint))
+        case ["mechanism", "assembly", "at", name]:
+            return coordinate(name)
+        case ["mechanism", "assembly", "guess", joint]:
+            guess = document.mechanism.assembly.guess[joint]  # type: ignore[union-attr]
+            known = guessed(document, joint, len(guess) if isinstance(guess, tuple) else 1)
+            several = isinstance(guess, tuple) and known
+            return _of_freedom(known[int(path[-1])]) if several else _of_only(known)
+        case ["coordinates", name, "drive", key]:
+            return drive_quantity(document.mechanism, moved[name], key)
+    names, k = [*moved], int(path[-1])
+    return coordinate(names[k]) if k < len(names) else ANY
+
+
 # --- Rules
 
 
 def parameters_name_properties(document: Document) -> Iterator[Finding]:
-    """The path of a design parameter names a number that can vary."""
-    for own in places(document.design).values():
-        yield from _no_properties(document, own)
-
-
-def _no_properties(document: Document, own: Mapping[str, KeyPath]) -> Iterator[Finding]:
-    for path, place in own.items():
+    """The paths of design parameters, and of what trajectories set, name numbers that can vary."""
+    named = [one for own in places(document.design).values() for one in own.items()]
+    for place, _, motion in named_trajectories(document.trajectory):
+        named += [(path, (*place, "set", path)) for path in motion.set]
+    for path, place in named:
         try:
             property_at(document, path)
         except NoPropertyError as error:
@@ -274,11 +424,15 @@ def properties_of_one_parameter_are_alike(document: Document) -> Iterator[Findin
                 yield own[path], f"{message} has no unit, so that they need parameters of their own"
 
 
-def load_cases_set_properties(document: Document) -> Iterator[Finding]:
-    """Trajectories set numbers that can vary; to design parameters they can only add."""
-    owner = {path: name for name, own in places(document.design).items() for path in own}
+def each_property_has_one_owner(document: Document) -> Iterator[Finding]:
+    """Components of the design have properties of their own; to them trajectories can only add."""
+    owner: dict[str, str] = {}
+    for name, own in places(document.design).items():
+        for path, place in own.items():
+            if path in owner:
+                yield place, f"{path} is a design parameter already: {owner[path]!r}"
+            owner.setdefault(path, name)
     for place, _, motion in named_trajectories(document.trajectory):
-        yield from _no_properties(document, {path: (*place, "set", path) for path in motion.set})
         for path, value in motion.set.items():
             if path in owner and not isinstance(value, Added):
                 message = f"is the design parameter {owner[path]!r}, which a trajectory cannot set"
@@ -303,150 +457,102 @@ def parameters_agree_with_the_file(document: Document) -> Iterator[Finding]:
                 )
 
 
-def starts_outside(document: Document) -> Iterator[Finding]:
-    """Warnings where what the file has as design is outside its bounds, or none of those listed.
-
-    Bounds and lists say where the answer may be, so that the start need not be there.
-    """
-    design = document.design
-    start = [value_at(document, column.parameter) for column in design.parameters.values()]
-    listed_only = {k for catalogue in design.catalogues for k in catalogue.columns}
-    slips = set[int]()
-    for k, (name, column) in enumerate(design.parameters.items()):
-        dimension = property_at(document, column.parameter).dimension
-        unit, bounds = dimension.si if dimension else "", f"[{column.min:g}, {column.max:g}]"
-        value = start[k]
-        if column.min <= value <= column.max:
-            continue
-        why, (meant, size) = "the optimum will lie inside", _MEANT.get(unit, ("", 0.0))
-        if size * column.min <= value <= size * column.max:
-            why = f"a bare number is in {unit}: was {bounds} {meant} meant?"
-            slips.add(k)
-        elif k in listed_only:
-            continue
-        message = f"initial value {value:g} {unit} of {column.parameter} is outside "
-        yield ("design", name), f"{message}{bounds} {unit}; {why}"
-    for catalogue in design.catalogues:
-        own = tuple(start[k] for k in catalogue.columns)
-        if own not in catalogue.rows and not slips.intersection(catalogue.columns):
-            message = f"the initial value is none of those listed: {listed(catalogue.choices)}"
-            yield ("design", catalogue.name), message
-
-
 # --- What a design, or a trajectory with it, could break
 
-Varied = Mapping[str, Sequence[tuple[int, float]]]  # properties by path: Σ factor · entry
-Box = Sequence[tuple[float, float]]  # SI: the least and the largest value of each entry
+
+class Limit(NamedTuple):
+    """Σ factor · entry of the loads and the design + ``offset`` ≥ 0, or > 0 where ``strict``."""
+
+    factors: Mapping[int, float]
+    offset: float
+    strict: bool
+    words: str  # what must be
 
 
-def bounds_hold_nothing_impossible(document: Document) -> Iterator[Finding]:
-    """Mechanisms exist wherever the design may go; each problem is at the bound to narrow.
+def limits(case: Any) -> Iterator[Limit]:
+    """What the properties that vary in a case may be, and what dimensions of its sections."""
 
-    A robust one may go further by its tolerances.
+    def limit(terms: Mapping[str, float], offset: float, strict: bool, words: str) -> Limit:
+        factors = dict[int, float]()
+        for path, factor in terms.items():
+            for k, own in case.varied.get(path, ()):
+                factors[k] = factors.get(k, 0.0) + factor * own
+            offset += 0.0 if path in case.varied else factor * case.value_at(path)
+        return Limit({k: f for k, f in factors.items() if f}, offset, strict, words)
+
+    for path, kind in zip(case.varied, case.quantities(case.varied), strict=True):
+        unit = f" {kind.dimension.si}" if kind.dimension and kind.dimension.si else ""
+        for sign, value, factor in (
+            (">", kind.above, 1.0),
+            (">=", kind.at_least, 1.0),
+            ("<", kind.below, -1.0),
+            ("<=", kind.at_most, -1.0),
+        ):
+            if value is not None:
+                words = f"{path} must be {sign} {value:g}{unit}"
+                yield limit({path: factor}, -factor * value, sign in "<>", words)
+    for name, section in case.mechanism.sections.items():
+        for own in section.limits():
+            small, large = (f"sections.{name}.{key}" for key in (own.small, own.large))
+            if {small, large} & set(case.varied):
+                words = f"section {name!r} {own.beyond}: {own.small} {own}"
+                yield limit({small: -own.factor, large: 1.0}, 0.0, not own.may_meet, words)
+
+
+def bounds_hold_nothing_impossible(case: Any) -> Iterator[Finding]:
+    """Mechanisms exist at the bounds of the design, and with each of its choices and trajectories.
+
+    A robust one may go further by its tolerances. Limits are linear, so that the least room of each
+    entry, or of those that are chosen together, decides.
     """
-    design = document.design
-    columns = list(design.parameters.values())
-    owner = [
-        name
-        for name, e in design.entries.items()
-        for _ in (e.properties if isinstance(e, Choices) else (name,))
-    ]
-    varied, box = design.varied, [(column.min, column.max) for column in columns]
-    for k, column in enumerate(columns):
-        if document.assignment.robust and column.tolerance is not None:
-            low, high = (column.tolerance.deviation(end) for end in box[k])
-            prop = property_at(document, column.parameter)
-            if 0 in (prop.at_least, prop.above):  # as masses are never below 0
-                low = min(low, max(column.min, 0.0))
-            box[k] = column.min - low, column.max + high
-    for row, message in impossible(document.mechanism.sections, varied, box):
-        k, factor = next(iter(row.items()))
-        body = design.entries[owner[k]]
-        if isinstance(body, Choices):
-            advice = "give the choices by dimensions that can be combined, such as thickness"
-            yield ("design", owner[k], "choices"), f"between these choices {message}; {advice}"
-        else:
-            place = _bound(design, owner[k], factor > 0.0)
-            yield place, f"at this bound {message}; narrow the bounds"
-    # A bound itself was read, what deviates from it was not.
-    deviates = [document.assignment.robust and bool(column.tolerance) for column in columns]
-    first = {column.parameter for column, more in zip(columns, deviates, strict=True) if not more}
-    together = {path: terms for path, terms in varied.items() if path not in first}
-    for path, side, message in _outside(document, together, box):
-        ((k, factor),) = varied[path]
-        place = _bound(design, owner[k], (side == 0) == (factor > 0.0))
-        where = "at this bound with its tolerance" if deviates[k] else "at this bound"
-        yield place, f"{where} {message}; narrow the bounds"
+    n, ranges, columns = len(case.loads), [*_ranges(case)], [*case.design.parameters.values()]
+
+    def least(k: int, factor: float, value: float) -> float:
+        tolerance = columns[k - n].tolerance if case.assignment.robust and k >= n else None
+        deviation = tolerance.deviation(value) if tolerance else 0.0
+        kind = case.design_quantities[k - n] if tolerance else ANY
+        if 0 in (kind.at_least, kind.above) and factor > 0.0:  # as masses are never below 0
+            deviation = min(deviation, max(value, 0.0))
+        return factor * value - abs(factor) * deviation
+
+    for limit in limits(case):
+        terms, blamed = [limit.offset], dict[int, KeyPath]()
+        for entries, rows in ranges:
+            if own := [k for k in entries if k in limit.factors]:
+                at = [entries.index(k) for k in own]
+                room = [
+                    sum(least(k, limit.factors[k], row[i]) for k, i in zip(own, at, strict=True))
+                    for _, row in rows
+                ]
+                terms.append(min(room))
+                blamed |= dict.fromkeys(own, rows[room.index(min(room))][0])
+        slack = _ROUND_OFF * sum(map(abs, terms))
+        if sum(terms) < -slack or (limit.strict and sum(terms) <= 0.0):
+            first = next((k for k in limit.factors if k < n), next(iter(limit.factors)))
+            place = blamed[first]
+            if first < n:
+                yield (*place, [*case.loads.values()][first].path), f"with this {limit.words}"
+                continue
+            with_more = " with its tolerance" if case.assignment.robust else ""
+            bound = "at this bound" if place[-1] in ("min", "max") else "with one of these"
+            yield place, f"{bound}{with_more} {limit.words}; narrow the bounds"
 
 
-def _bound(design: Design, name: str, lower: bool) -> KeyPath:
-    """Where the file gives a bound of a parameter, or its values."""
-    entry = design.entries[name]
-    if isinstance(entry, Choices):
-        return "design", name, "choices"
-    return ("design", name, "values" if entry.values is not None else "min" if lower else "max")
+_ROUND_OFF = 1e-9  # of the terms of a limit
 
 
-def load_cases_set_nothing_impossible(document: Document) -> Iterator[Finding]:
-    """Mechanisms exist along each trajectory that sets or adds something."""
-    design = document.design
-    bounds = [(column.min, column.max) for column in design.parameters.values()]
-    for place, _, motion in named_trajectories(document.trajectory):
-        varied, box = dict(design.varied), list(bounds)
-        for path, value in motion.set.items():
-            amount = value.add if isinstance(value, Added) else value
-            if isinstance(value, Added) and path not in varied:
-                amount += value_at(document, path)
-            varied[path] = (*varied.get(path, ()), (len(box), 1.0))
-            box.append((amount, amount))
-        paths = list(motion.set)
-        for row, message in impossible(document.mechanism.sections, varied, box):
-            for k in [k for k in row if k >= len(bounds)][:1]:
-                yield (*place, "set", paths[k - len(bounds)]), message
-        added = {p: varied[p] for p in paths if isinstance(motion.set[p], Added)}
-        for path, _, message in _outside(document, added, box):
-            yield (*place, "set", path), f"with this {message}"
-
-
-def _outside(document: Document, varied: Varied, box: Box) -> Iterator[tuple[str, int, str]]:
-    """Path, end (0 least, 1 largest) and what is wrong of properties beyond what they may be."""
-    for path, terms in varied.items():
-        prop = property_at(document, path)
-        for side, value in enumerate(least_and_largest(terms, box)):
-            try:
-                prop.checked(value, f"{value:g}")
-            except QuantityError as error:
-                yield path, side, f"{path} {error}"
-                break
-
-
-def least_and_largest(terms: Sequence[tuple[int, float]], box: Box) -> tuple[float, float]:
-    """The least and the largest value of Σ factor · entry with each entry in its range."""
-    ends = [sorted((factor * box[k][0], factor * box[k][1])) for k, factor in terms]
-    return sum(low for low, _ in ends), sum(high for _, high in ends)
-
-
-def impossible(
-    sections: Mapping[str, Section], varied: Varied, box: Box
-) -> Iterator[tuple[dict[int, float], str]]:
-    """(factors by entry, what is wrong) of entries that can break a section.
-
-    Each limit is linear in the entries, so the worst corner of their box decides; along a taper the
-    limits hold between ends at which they hold. The factors are of the room that the limit leaves,
-    those of what must be smaller first.
-    """
-    for name, section in sections.items():
-        for limit in section.limits():
-            row, terms, at_worst = dict[int, float](), {}, {}
-            for key, factor in ((limit.small, -float(limit.factor)), (limit.large, 1.0)):
-                terms[key] = varied.get(f"sections.{name}.{key}", ())
-                for k, own in terms[key]:
-                    row[k] = row.get(k, 0.0) + factor * own
-            for key, parts in terms.items():
-                corner = [factor * box[k][row[k] < 0.0] for k, factor in parts]
-                at_worst[key] = sum(corner) if parts else getattr(section, key)
-            a, b = at_worst[limit.small], at_worst[limit.large]
-            row = {k: factor for k, factor in row.items() if factor}
-            if row and not limit.holds(a, b):
-                message = f"section {name!r} {limit.beyond}: {limit.small} {a:g} m {limit}, "
-                yield row, f"{message}which can be {b / limit.factor:g} m"
+def _ranges(case: Any) -> Iterator[tuple[Sequence[int], list[tuple[KeyPath, Sequence[float]]]]]:
+    """Entries that take their values together, and these, each with its place in the file."""
+    n, listed_only = len(case.loads), set[int]()
+    values = [*zip(*(load.along for load in case.loads.values()), strict=True)]
+    paths = [(*path, "set") for path, *_ in named_trajectories(case.trajectory)]
+    yield range(n), [*zip(paths, values, strict=False)]
+    for each in case.design.catalogues:
+        listed_only |= set(each.columns)
+        key = "choices" if isinstance(case.design.entries[each.name], Choices) else "values"
+        where = [("design", each.name, key)] * len(each.rows)
+        yield [n + k for k in each.columns], [*zip(where, each.rows, strict=True)]
+    for k, (name, column) in enumerate(case.design.parameters.items()):
+        if k not in listed_only:
+            ends = (("min", column.min), ("max", column.max))
+            yield [n + k], [(("design", name, key), (value,)) for key, value in ends]

@@ -171,8 +171,8 @@ def distinct(text: str) -> AfterValidator:
 class Written(float):
     """A number in SI whose dimension another key decides, with the ``text`` that gives it.
 
-    It is NaN where it cannot be read, or is beyond a limit. What is wrong with it `rules.values`
-    says.
+    It is NaN where it cannot be read, or is beyond a limit. Rules say what is wrong
+    with it.
     """
 
     __slots__ = ("text",)
@@ -191,8 +191,8 @@ class Quantity:
 
     Accepts a bare number (SI) or text with a unit; the validated value is SI. ``elsewhere`` says
     where the dimension comes from when it is another key that decides it: that is then for
-    `rules.values`, and text becomes a `Written`. ``rate``: it is an amount for one unit of that,
-    such as `3 / kg`.
+    rules, and it becomes a `Written`. ``rate``: it is an amount for one unit of that, such as
+    `3 / kg`.
     """
 
     dimension: Dimension | None = None
@@ -213,7 +213,8 @@ class Quantity:
                 self.checked(si, "")
             except QuantityError:
                 return Written(math.nan, value)
-            return Written(si, value) if isinstance(value, str) else si
+            bare = self.at_most is not None and not isinstance(value, str)
+            return si if bare else Written(si, value)
         if self.dimension is None and isinstance(value, str):
             raise QuantityError(f"expected a number without unit, got text {shown(value)}")
         return self.checked(read_quantity(value, self.dimension), shown(value))

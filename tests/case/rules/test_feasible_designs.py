@@ -100,3 +100,12 @@ def test_a_box_keeps_a_hole_all_over_the_bounds(
     found = refusals(text)
     assert [path for path, _ in found] == ([f"design.d.{bound}"] if bound else [])
     assert all("is no box whose torsion and shear are known well" in said for _, said in found)
+
+
+@pytest.mark.parametrize(("wall", "refused"), [("15 mm", False), ("31 mm", True)])
+def test_every_choice_by_itself_is_a_section(wall: str, refused: bool) -> None:
+    """The largest wall of a list need not fit the smallest tube."""
+    small = "{sections.pipe.outer_diameter: 20 mm, sections.pipe.thickness: 1 mm}"
+    large = f"{{sections.pipe.outer_diameter: 60 mm, sections.pipe.thickness: {wall}}}"
+    found = refusals(edited(DIAMETER, f"{{choices: {{x: {small}, y: {large}}}}}"))
+    assert [path for path, _ in found] == (["design.d.choices"] if refused else [])

@@ -22,65 +22,33 @@ SLIPS = {
     "modulus times 1000": ("youngs_modulus: 69 GPa", "¦youngs_modulus: 69 TPa", "is the unit right?"),
     "density in g/mm3": ("density: 2700", "¦density: 0.0027", "is the unit right?"),
     "density times 1000": ("density: 2700", "¦density: 2.7e6", "is the unit right?"),
-    "no density": ("density: 2700", "¦density: 0", "massless"),
+    "no density": ("density: 2700", "¦density: 0", "0 kg/m3 is outside"),
     "length in mm": ("length: 0.45", "¦length: 450", "is the unit right?"),
     "length in mm, as mm": ("length: 0.45", "¦length: 450", "write 450 mm if that was meant"),
     "short length in mm": ("length: 0.6", "¦length: 90", "90 m is 3000 times the depth of section 'rod': a bare number is in m; was 90 mm meant?"),
-    "diameter in mm": ("rod: {shape: circle, diameter: 30 mm}", "¦rod: {shape: circle, diameter: 30}", "write 30 mm if that was meant"),
+    "diameter in mm": ("rod: {shape: circle, diameter: 30 mm}", "rod: {shape: circle, ¦diameter: 30}", "write 30 mm if that was meant"),
     "section in mm": ("area: 7.0632e-4, bending_inertia: 3.97e-8", "¦area: 706.32, bending_inertia: 39700", "A bare number is in m2"),
     "position in mm": ("follower: fore.start}", "follower: fore.start, ¦position: [300, 0]}", "write 300 mm if that was meant"),
     "waypoints in mm": ("waypoints: [[0.3, 0.1], [0.2, 0.2]]", "¦waypoints: [[300, 100], [200, -200]]", "write 300 mm if that was meant"),
-    "constraint above the bounds": ("max: 200 g", "¦min: 300 g", "no design meets this: within the bounds of m the sum is from 0 to 0.25, and 0.3 is its min"),
-    "constraint below the bounds": ("{m: 1}, max: 200 g", "{m: -2}, ¦max: -0.6", "the sum is from -0.5 to 0, and -0.6 is its max"),
     "stubby": ("length: 0.45", "¦length: 0.3", "7.5 times the depth of section 'pipe'"),
     "angle in degrees": ("angle: 10 deg", "¦angle: 30", "was it meant in deg?"),
-    "mounting under an absolute angle": ("follower: fore.start}", "follower: fore.start, ¦angle: 10 deg}", "has no effect: coordinate 'q2' is absolute"),
     "point in degrees": ("order: 4", "order: 4, ¦q: [104, 304]", "304 rad is more than two turns"),
     "start in degrees": ("tip: hand.end", "tip: hand.end\n  ¦start: [0, -90]", "was it meant in deg?"),
     "target in mHz": ("frequency: 190 Hz", "¦frequency: 1.9e8", "is the unit right?"),
     "tolerance of 200 %": ("max_error: 2 %", "¦max_error: 2", "200 % accepts nearly anything"),
     "tolerance of 150 %": ("max_error: 2 %", "¦max_error: 150 %", "150 % accepts nearly anything"),
-    "point outside the bounds": ("order: 4", "order: 4, y: [0.1, ¦50 mm]", "outside the bounds of 'd'"),
     "start outside the bounds": ("d: {parameter: sections.rod.diameter, min: 20 mm", "¦d: {parameter: sections.rod.diameter, min: 31 mm", "initial value 0.03 m of sections.rod.diameter is outside [0.031, 0.04] m"),
     "bounds in mm": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm", "¦d: {parameter: sections.rod.diameter, min: 20, max: 40", "[20, 40] m; a bare number is in m: was [20, 40] mm meant?"),
     "bounds in g": ("m: {parameter: bodies.tool.mass, min: 0, max: 250 g", "¦m: {parameter: bodies.tool.mass, min: 50, max: 250", "[50, 250] kg; a bare number is in kg: was [50, 250] g meant?"),
-    "payload in g": ("mass: 0.1}", "¦mass: 1000}", "1000 kg would strain the beam 'hand' that carries it by 0.8"),
-    "largest payload in g": ("m: {parameter: bodies.tool.mass, min: 0, max: 250 g}", "m: {parameter: bodies.tool.mass, min: 0, ¦max: 250}", "250 kg would strain the beam 'hand'"),
-    "payload of a load case in g": ("tip: hand.end", "tip: hand.end\n  set: {bodies.tool.inertia: 0, ¦bodies.tool.mass: {add: 800}}", "800 kg would strain"),
     "listed values in mm": ("min: 20 mm, max: 40 mm", "¦values: [25, 30]", "25 m is outside 1e-05 … 5: is the unit right? A bare number is in m: write 25 mm"),
     "one bound in mm": ("min: 20 mm, max: 40 mm", "min: 20 mm, ¦max: 40", "40 m is outside 1e-05 … 5"),
     "listed values in mm, the start among them": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "¦d: {parameter: sections.rod.diameter, values: [25, 35]}", "was [25, 35] mm meant?"),
     "listed stiffness in kN m/rad": ("  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "  ¦d: {parameter: coordinates.q2.drive.stiffness, values: [0.08, 0.12]}", "a bare number is in N m/rad: was [0.08, 0.12] kN m/rad meant?"),
-    "share of a place at 0": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm", "d: {parameter: joints.elbow.position.0, min: 0, max: 4 mm, ¦tolerance: 5 %", "may be 0, where nothing deviates: give an amount"),
     "choices in mm": ("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "{choices: {a: {¦sections.rod.diameter: 25}, b: {sections.rod.diameter: 30}}}", "25 m is outside"),
     "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
     "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),
 }
 # fmt: on
-
-
-@pytest.mark.parametrize(
-    ("limits", "said"),
-    [
-        ("{mode: 1, at_least: 200 Hz}, {mode: 1, at_most: 185 Hz}", "and at least 200 Hz"),
-        ("{mode: 1, at_least: 200 Hz}, {mode: 2, at_most: 185 Hz}", "and mode 1 below it at least"),
-        ("{modes: all, at_least: 200 Hz}, {modes: [2, 3], at_most: 185 Hz}", "mode 1 below it"),
-        ("{mode: 2, at_least: 200 Hz}, {mode: 1, at_most: 185 Hz}", ""),
-        ("{mode: 1, at_least: 180 Hz}, {mode: 1, at_most: 185 Hz}", ""),
-        (
-            "{mode: 1, at_least: 9 Hz, during: [0 s, 1 s]}, {mode: 1, at_most: 8, during: [1, 2]}",
-            "",
-        ),
-    ],
-)
-def test_limits_that_contradict_each_other_are_warned_of(limits: str, said: str) -> None:
-    found = [
-        text
-        for _, _, text in warnings_of(TEXT[: TEXT.index("targets:")] + f"targets: [{limits}]\n")
-    ]
-    assert ([said in text for text in found if "no design meets both" in text] or [False])[
-        0
-    ] == bool(said)
 
 
 @pytest.mark.parametrize(("old", "new", "message"), SLIPS.values(), ids=SLIPS)
@@ -104,17 +72,12 @@ def test_an_ordinary_arm_gives_no_warning() -> None:
         ("density: 2700", "density: 22590"),  # osmium
         ("density: 2700", "density: 20"),  # foam
         ("angle: 10 deg", "angle: 720 deg"),
-        ("order: 4", "order: 4, y: [0, 40 mm]"),
-        ("order: 4", "order: 4, y: [250 g, 20 mm]"),
         ("frequency: 190 Hz", "frequency: 0.01"),
         ("frequency: 190 Hz", "frequency: 900 kHz"),
         ("max_error: 2 %", "max_error: 50 %"),
-        ("max: 200 g", "min: 250 g"),  # just within the bounds
         ("waypoints: [[0.3, 0.1]", "waypoints: [[-90, 0.1]"),
         ("length: 0.6", "length: 70"),
         ("min: 20 mm, max: 40 mm", "min: 1 mm, max: 4"),
-        ("mass: 0.1}", "mass: 0.1}\n    base: {at: upper.start, mass: 2000}"),  # on its support
-        ("max: 250 g", "max: 15"),  # 26 times the beam, and strained by 0.01 %
     ],
 )
 def test_an_unusual_but_possible_value_gives_no_warning(old: str, new: str) -> None:

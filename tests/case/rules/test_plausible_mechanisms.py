@@ -11,12 +11,10 @@ from eigassign.case import load
 
 # fmt: off
 SLIPS = {
-    "node in mm": (PLANAR, "tip: [0.2, 0], top: [0, 200 mm]}\n      beams:\n        lower", "tip: [200, 0], top: [200, 200 mm]}\n      beams:\n        ¦lower", "200 m of length is outside"),
+    "node in mm": (PLANAR, "tip: [0.2, 0], top: [0, 200 mm]}\n      beams:\n        lower", "tip: [200, 0], top: [200, 200 mm]}\n      beams:\n        lower", "200 m is outside"),
     "length of a rigid link in mm": (PLANAR, "length: 0.2, mass: 5", "¦length: 200, mass: 5", "is the unit right?"),
     "stubby taper": (PLANAR, "length: 0.5, material: steel, section: {start: bar, end: thin}, elements: 4, shear: true", "¦length: 0.09, material: steel, section: {start: thin, end: bar}, elements: 4", "9 times the depth of section 'bar'"),
     "stubby profile": (PLANAR, "length: 2, material", "¦length: 0.7, material", "8.8 times the depth of section 'profile'"),
-    "modulus of another metal": (SPATIAL, "shear_modulus: 80 GPa", "¦shear_modulus: 800 GPa", "E / G is 0.263"),
-    "torsion in mm4": (SPATIAL, "torsion_constant: 2 cm4", "¦torsion_constant: 4 cm4", "which no section can have"),
     "inertia of another section": (SPATIAL, "inertia_y: 2 cm4", "¦inertia_y: 20000 cm4", "cannot belong to one section"),
     "shear coefficient in per cent": (SPATIAL, "shear_coefficient: 0.85", "¦shear_coefficient: 85", "outside 0.05 … 1.2"),
     "tensor of no body": (SPATIAL, "inertia: [0.01, 0.02, 0.02]", "¦inertia: [0.05, 0.02, 0.02]", "a principal moment exceeds the other two's sum"),
@@ -45,11 +43,7 @@ def test_a_slip_is_warned_of(base: str, old: str, new: str, message: str, tmp_pa
     [
         ("inertia: [0.01, 0.02, 0.02]", "inertia: [0, 0.02, 0.02]"),  # a thin rod
         ("inertia: [0.01, 0.02, 0.02]", "inertia: [0.04, 0.02, 0.02]"),  # a thin disc
-        ("torsion_constant: 2 cm4", "torsion_constant: 3 cm4"),  # round
-        ("torsion_constant: 2 cm4", "torsion_constant: 0.01 cm4"),  # an open profile
         ("0, 100, 0.4]", "0, 1000, 0.4]"),  # a screw of many turns
-        ("shear_modulus: 80 GPa", "poissons_ratio: -0.3"),  # an auxetic foam
-        ("shear_modulus: 80 GPa", "shear_modulus: 5 GPa"),  # fibres along the beam
         ("length: 1, material: steel, section: round", "length: 0.26, material: steel, section: round"),
     ],
 )  # fmt: skip
