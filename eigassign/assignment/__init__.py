@@ -24,12 +24,12 @@ __all__, __getattr__, __dir__ = face(
         ),
         "program": "LinearConstraint Program solve_program",
         "requirements.kinds": (
-            "AssignedFrequency ForbiddenBand HighestFrequency LowerLimit ModeGap UpperLimit"
+            "AssignedFrequency ForbiddenBand HighestFrequency KINDS LowerLimit ModeGap UpperLimit"
         ),
-        "requirements.quantity": "MassLimit",
+        "requirements.quantity": "limit_between",
         "requirements.requirement": "Frequencies Requirement Solved",
         "requirements.sampling": (
-            "KINDS design_limits followed_modes requirements_of sample_target time_weights "
+            "design_limits followed_modes requirements_of sample_target time_weights "
             "trapezoidal_weights"
         ),
     },

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.requirements import Tolerances
 from eigassign.assignment.program import LinearConstraint
-from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity
+from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity, StaticLimit
 from eigassign.assignment.requirements.sampling import design_limits
-from eigassign.assignment.requirements.static_limit import StaticLimit
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, MissingMassError

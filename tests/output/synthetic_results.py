@@ -239,9 +239,9 @@ def as_limit(target: TargetStudy, kind: str, lower_hz: Floats, upper_hz: Floats)
     violated = np.minimum(below, above) if kind == "keep_out" else np.maximum(below, above)
     error = ErrorSummary(target.error.initial, _error(violated), one_shot=target.error.one_shot)
     along = tuple(replace(one, error=error) for one in target.along)
-    modes = (1, 2) if kind == "gap" else (1,)
+    terms = {"gap": ((2, 1.0), (1, -1.0)), "keep_out": ()}.get(kind, ((1, 1.0),))
     asked = KINDS[kind](
-        label=f"mode 1 {kind}", place="targets[0]", modes=(1,), terms=KINDS[kind].terms_of(modes),
+        label=f"mode 1 {kind}", place="targets[0]", modes=(1,), terms=terms,
         rows=target.asked.rows, lower=lower_hz, upper=upper_hz, along=target.asked.along,
     )  # fmt: skip
     return replace(

@@ -21,11 +21,13 @@ from eigassign.assignment.requirements.requirement import (
     Requirement,
     Solved,
     Terms,
-    in_hz,
 )
 from eigassign.case.schema.targets import (
+    AnyTarget,
     AtLeastTarget,
     AtMostTarget,
+    FrequencyFile,
+    FrequencyProfile,
     FrequencyTarget,
     GapTarget,
     Harmonic,
@@ -39,16 +41,6 @@ class AssignedFrequency(Requirement):
 
     form = FrequencyTarget
     columns = ("target", "initial", "one shot", "predicted", "exact")
-
-    @staticmethod
-    def asked(target: FrequencyTarget) -> str:
-        """The words for what is asked of the mode."""
-        return f"at {in_hz(target.frequency)}"
-
-    @staticmethod
-    def edges(target: FrequencyTarget, *hz: Floats) -> Edges:
-        """The frequency, twice."""
-        return hz[0], hz[0]
 
     def errors(self, solved: Solved) -> Floats:
         """The errors f / f_d − 1 (n,)."""
@@ -69,16 +61,6 @@ class HighestFrequency(Requirement):
     columns = ("initial", "exact")
     is_aim = True
 
-    @staticmethod
-    def asked(target: HighestTarget) -> str:
-        """The words for what is asked of the mode."""
-        return "as high as can be"
-
-    @staticmethod
-    def edges(target: HighestTarget, *hz: Floats) -> Edges:
-        """0 Hz, and no upper edge."""
-        return np.zeros(1), np.full(1, np.inf)
-
     def stake(self, solved: Solved, raised: float) -> float:
         """The share of its frequency that a model has raised it by at most."""
         return raised / (1.0 + raised) if np.isfinite(raised) else 1.0
@@ -94,53 +76,17 @@ class LowerLimit(Requirement):
 
     form = AtLeastTarget
 
-    @staticmethod
-    def asked(target: AtLeastTarget) -> str:
-        """The words for what is asked of the mode."""
-        return f"at least {in_hz(target.at_least)}"
-
-    @staticmethod
-    def edges(target: AtLeastTarget, *hz: Floats) -> Edges:
-        """The limit, and no upper edge."""
-        return hz[0], np.full_like(hz[0], np.inf)
-
 
 class UpperLimit(Requirement):
     """The frequency of a mode is at most ``hz``; too stiff a model is on the safe side."""
 
     form = AtMostTarget
 
-    @staticmethod
-    def asked(target: AtMostTarget) -> str:
-        """The words for what is asked of the mode."""
-        return f"at most {in_hz(target.at_most)}"
-
-    @staticmethod
-    def edges(target: AtMostTarget, *hz: Floats) -> Edges:
-        """No lower edge, and the limit."""
-        return np.full_like(hz[0], -np.inf), hz[0]
-
 
 class ModeGap(Requirement):
-    """The frequencies of two modes differ by at least ``hz``."""
+    """The frequencies of two modes differ by at least ``hz``: the higher less the lower one."""
 
     form = GapTarget
-
-    @staticmethod
-    def asked(target: GapTarget) -> str:
-        """The words for what is asked of the modes."""
-        return f"at least {target.gap.at_least:g} Hz apart"
-
-    @staticmethod
-    def edges(target: GapTarget, *hz: Floats) -> Edges:
-        """The distance, and no upper edge."""
-        return hz[0], np.full_like(hz[0], np.inf)
-
-    @staticmethod
-    def terms_of(modes: tuple[int, ...]) -> Terms:
-        """The higher mode less the lower one."""
-        low, high = modes
-        return (high, 1.0), (low, -1.0)
 
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it
@@ -164,29 +110,6 @@ class ForbiddenBand(Requirement):
 
     form = KeepOutTarget
     columns = ("lower", "upper")
-
-    @staticmethod
-    def asked(target: KeepOutTarget) -> str:
-        """The words for what is asked of the modes."""
-        band = target.keep_out
-        if not isinstance(band, Harmonic):
-            return "clear of {:g} … {:g} Hz".format(*band)
-        times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
-        return f"clear of {times}{in_hz(band.of)} ± {100 * band.margin:g} %"
-
-    @staticmethod
-    def edges(target: KeepOutTarget, *hz: Floats) -> Edges:
-        """The edges as they are given, or about a multiple of a frequency."""
-        band = target.keep_out
-        if not isinstance(band, Harmonic):
-            return hz[0], hz[1]
-        middle = band.harmonic * hz[0]
-        return middle * (1.0 - band.margin), middle * (1.0 + band.margin)
-
-    @staticmethod
-    def terms_of(modes: tuple[int, ...]) -> Terms:
-        """No terms: which mode is at an edge depends on k."""
-        return ()
 
     @property
     def bands(self) -> tuple[ForbiddenBand, ...]:
@@ -308,3 +231,48 @@ def _by_count(down: Floats, up: Floats) -> list[Floats]:
         np.maximum(down[:, :k].max(axis=1, initial=none), up[:, k:].max(axis=1, initial=none))
         for k in range(down.shape[1] + 1)
     ]
+
+
+KINDS: dict[str, type[Requirement]] = {
+    one.form.kind: one
+    for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap, HighestFrequency)
+}  # by the key that only their targets have
+
+
+def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
+    """What is asked of modes in words, and both edges where its frequencies are ``hz``, each (n,).
+
+    Those of a band are as they are given, or about a multiple of a frequency.
+    """
+    endless = np.array(np.inf)
+    match target:
+        case FrequencyTarget():
+            return f"at {_in_hz(target.frequency)}", hz[0], hz[0]
+        case AtLeastTarget():
+            return f"at least {_in_hz(target.at_least)}", hz[0], endless
+        case AtMostTarget():
+            return f"at most {_in_hz(target.at_most)}", -endless, hz[0]
+        case GapTarget():
+            return f"at least {target.gap.at_least:g} Hz apart", hz[0], endless
+        case KeepOutTarget(keep_out=Harmonic() as band):
+            times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
+            words = f"clear of {times}{_in_hz(band.of)} ± {100 * band.margin:g} %"
+            middle = band.harmonic * hz[0]
+            return words, middle * (1.0 - band.margin), middle * (1.0 + band.margin)
+        case KeepOutTarget():
+            return "clear of {:g} … {:g} Hz".format(*target.keep_out), hz[0], hz[1]
+    return "as high as can be", np.array(0.0), endless
+
+
+def _in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:
+    return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"
+
+
+def terms_of(target: AnyTarget, modes: tuple[int, ...]) -> Terms:
+    """The terms of a requirement on these modes; of a band none: it depends on k which count."""
+    if isinstance(target, KeepOutTarget):
+        return ()
+    if isinstance(target, GapTarget):
+        low, high = modes
+        return (high, 1.0), (low, -1.0)
+    return ((modes[0], 1.0),)

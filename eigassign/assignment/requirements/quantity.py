@@ -1,16 +1,22 @@
-"""A quantity of the design keeps within its limits: mass, loads of drives, sums of parameters."""
+"""A quantity of the design is within limits: mass, loads of drives, sums of parameters, ways.
+
+The way that a node gives under a force along a direction, or under the weight, has a row w ≤ limit
+at every sample, and of a stiffness 1/w ≥ k those of w ≤ 1/k. With a force that no parameter changes
+w = bᵀK⁻¹b is convex in K.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import ClassVar, Self
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
 from eigassign.assignment.program import Floats, LinearConstraint
 from eigassign.assignment.requirements.requirement import (
+    EdgeRows,
     Edges,
     Frequencies,
     Ints,
@@ -19,43 +25,55 @@ from eigassign.assignment.requirements.requirement import (
     Solved,
 )
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.targets import PushedNode, StaticTarget
 from eigassign.case.units import handy, limit_unit
-from eigassign.mechanism.assembly.mode_shapes import TotalMass
+from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
+from eigassign.modal.statics import Flexibility, compliances, sags
 
-Path = Trajectories | None
-_MASS = "design.mass"
+# Number and target, its rows, those of them along each trajectory, and the words for these
+Placed = tuple[int, StaticTarget, slice, tuple[tuple[str, slice], ...], str]
+UNITS = {"stiffness": "N/m", "compliance": "m/N", "sag": "m"}
+RIGID = 1e-24  # m/N or m: what no case can ask for, and round-off of a node that cannot move
 _NO_MODES = Frequencies(np.zeros((1, 0)), np.zeros((1, 0, 0)))
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class LimitedQuantity(Requirement):
-    """low ≤ quantity(y) ≤ high, in SI units; no kind of target, for it belongs to no mode."""
+    """low ≤ amount(y) ≤ high, in SI units; no kind of target, for it belongs to no mode.
+
+    Its only term is the quantity. ``noun`` stands before an amount, ``allowed`` are its limits,
+    infinite without one, and ``extreme`` the words for the least and the most that there is. It
+    ``is_decided`` where no design keeps it if a search from a few starts finds none: the designs
+    that keep it are a convex set.
+    """
 
     is_goal = False
-    extreme: ClassVar[tuple[str, str]] = ("the least is", "the most is")
 
-    @classmethod
-    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
-        """Yield what the case file limits, and nothing where it limits nothing."""
-        raise NotImplementedError
-
-    @classmethod
-    def between(cls, low: float, high: float, quantity: Quantity, label: str, place: str) -> Self:
-        """The limits, infinite without one, of a quantity that has one value for all samples."""
-        lower, upper = np.array([low]), np.array([high])
-        return cls(label, place, ((quantity, 1.0),), slice(0, 1), lower, upper)
+    noun: str = ""
+    unit: str = ""
+    allowed: tuple[float, float] = (-np.inf, np.inf)
+    extreme: tuple[str, str] = ("the least found is", "the most found is")
+    is_affine: bool = True
+    is_decided: bool = True
+    row_place: Callable[[Floats, int], str] | None = None  # of a design's row, in words
 
     @property
-    def is_affine(self) -> bool:
-        """True where it is affine in the design, and so allows a convex set of designs."""
-        return True
+    def quantity(self) -> Any:
+        """What it limits."""
+        return self.terms[0][0]
 
     @property
-    def is_decided(self) -> bool:
-        """True where no design keeps it if a search from a few starts finds none."""
-        return True
+    def constraint(self) -> LinearConstraint | None:
+        """The same as a row of the program, kept exactly by each step; None of most."""
+        return self.quantity if isinstance(self.quantity, LinearConstraint) else None
+
+    @property
+    def in_one_shot(self) -> bool:
+        """True of linear limits."""
+        return self.constraint is not None
 
     def range_over(self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved) -> Edges:
         """Its range over designs between two (n_y,); endless where it is not affine."""
@@ -68,42 +86,24 @@ class LimitedQuantity(Requirement):
 
     # --- Amounts in words
 
-    @property
-    def unit(self) -> str:
-        """The SI unit that its amounts are said in."""
-        return ""
-
-    @property
-    def allowed(self) -> tuple[float, float]:
-        """The limits of the amount, infinite without one."""
-        return float(self.lower[0]), float(self.upper[0])
-
-    def where(self, y: Floats) -> str:
-        """The place where a design (n_y,) has its amount, in words behind it; nothing of most."""
-        return ""
-
-    @property
-    def noun(self) -> str:
-        """The quantity, before an amount of it."""
-        return self.label
-
     def worst(self, y: Floats) -> tuple[int, float, Floats]:
         """The row where the quantity of a design (n_y,) is largest, its value and slopes there."""
         value, slopes = self.value(y, _NO_MODES)
         k = int(np.abs(value).argmax())
         return k, float(value[k]), slopes[k]
 
+    def amount_of(self, value: float) -> tuple[float, float]:
+        """The amount that a value of its rows stands for, and its slope in that."""
+        return value, 1.0
+
     def amount(self, y: Floats) -> float:
         """The quantity of a design (n_y,), SI, where it is worst."""
-        return self.amount_of(self.worst(y)[1])
-
-    def amount_of(self, value: float) -> float:
-        """The amount that a value of its rows stands for."""
-        return value
+        return self.amount_of(self.worst(y)[1])[0]
 
     def slopes(self, y: Floats) -> Floats:
         """The slopes (n_y,) of the amount at a design (n_y,)."""
-        return self.worst(y)[2]
+        _, value, slopes = self.worst(y)
+        return np.asarray(self.amount_of(value)[1] * slopes)
 
     def violation(self, amount: float, reach: float, near: float = 0.0) -> float:
         """The way of an amount beyond a limit, relative to that; 0 within both.
@@ -111,7 +111,11 @@ class LimitedQuantity(Requirement):
         Of a limit of 0 relative to ``reach``, what the quantity changes over the bounds; a share
         ``near`` of the larger of both is nothing.
         """
-        ways = [(s * (amount - edge), abs(edge)) for s, edge in self._edges if np.isfinite(edge)]
+        ways = [
+            (sign * (amount - edge), abs(edge))
+            for sign, edge in zip((-1.0, 1.0), self.allowed, strict=True)
+            if np.isfinite(edge)
+        ]
         far = (way / (edge or reach or 1.0) for way, edge in ways if way > near * max(edge, reach))
         return max(far, default=0.0)
 
@@ -122,24 +126,30 @@ class LimitedQuantity(Requirement):
 
     def stated(self, y: Floats, extreme: float | None) -> str:
         """``mass 5.47 kg, at most 3 kg``, and where given what the most extreme design has."""
-        words = f"{self.noun} {self._said(self.amount(y))}{self.where(y)}, {self._asked}"
+        where = "" if self.row_place is None else f" at {self.row_place(y, self.worst(y)[0])}"
+        words = f"{self.noun} {said(self.amount(y), self.unit)}{where}, {self._asked}"
         if extreme is None:
             return words
-        return f"{words}; {self.extreme[int(extreme < self._edges[0][1])]} {self._said(extreme)}"
+        return f"{words}; {self.extreme[int(extreme < self.allowed[0])]} {said(extreme, self.unit)}"
 
     @property
     def _asked(self) -> str:
-        limits = zip(("at least", "at most"), self._edges, strict=True)
-        said = (f"{word} {self._said(edge)}" for word, (_, edge) in limits if np.isfinite(edge))
-        return " and ".join(said)
+        limits = zip(("at least", "at most"), self.allowed, strict=True)
+        words = (f"{word} {said(edge, self.unit)}" for word, edge in limits if np.isfinite(edge))
+        return " and ".join(words)
 
     @property
-    def _edges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        low, high = self.allowed
-        return (-1.0, low), (1.0, high)
+    def in_words(self) -> str:
+        """Its name in a sentence about limits; of one that is named by its key, in words."""
+        return f"the limit of the {self.noun}" if self.label == self.place else self.name
 
-    def _said(self, amount: float) -> str:
-        return said(amount, self.unit)
+    def relaxed(self, side: str, share: float) -> str:
+        """The words for a limit that is relaxed by a share of it."""
+        if self.label != self.place:
+            return super().relaxed(side, share)
+        (low, high), is_less = self.allowed, side == "lower" and np.isfinite(self.allowed[0])
+        edge, more = (low, "less") if is_less else (high, "more")
+        return f"{handy(share * edge, self.unit)} {more} {self.noun}"
 
 
 def said(amount: float, unit: str) -> str:
@@ -148,168 +158,223 @@ def said(amount: float, unit: str) -> str:
     return f"{amount / size:.4g} {name}".rstrip()
 
 
-class MassLimit(LimitedQuantity):
-    """The mass in kg of all links and bodies, those that never move included."""
-
-    unit = "kg"
-    noun = "mass"
-    extreme = ("the lightest design has", "the heaviest design has")
-
-    @classmethod
-    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
-        """Yield the limits of the mass, if there are any."""
-        given = file.design.mass
-        if given is not None and (given.min, given.max) != (None, None):
-            yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
-
-    @property
-    def is_affine(self) -> bool:
-        """True where the mass is affine in the design."""
-        mass = self.terms[0][0]
-        return isinstance(mass, TotalMass) and mass.is_affine
-
-    @property
-    def in_words(self) -> str:
-        """Its name in a sentence about limits."""
-        return "the limit of the mass"
-
-    def relaxed(self, side: str, share: float) -> str:
-        """The words for a limit that is relaxed by a share of it."""
-        edge, more = (self.upper, "more") if side == "upper" else (self.lower, "less")
-        return f"{handy(share * float(edge[0]), 'kg')} {more} mass"
+def limit_between(
+    low: float | None, high: float | None, quantity: Quantity, label: str, place: str, **more: Any
+) -> LimitedQuantity:
+    """The limits, if any, of a quantity that has one value for all samples."""
+    allowed = -np.inf if low is None else low, np.inf if high is None else high
+    rows = slice(0, 1), np.array(allowed[:1]), np.array(allowed[1:])
+    more = {"noun": label, "extreme": ("the least is", "the most is")} | more
+    return LimitedQuantity(label, place, ((quantity, 1.0),), *rows, allowed=allowed, **more)
 
 
-@dataclass(frozen=True, eq=False)
-class CarriedLoad:
-    """The load of one drive, in N m or N: (m,) at all instants, with slopes (m, n_y).
+def quantity_limits(
+    file: CaseFile, model: Model, path: Trajectories | None
+) -> Iterator[LimitedQuantity]:
+    """The limits of the mass of all links and bodies, of drives, and linear ones of parameters."""
+    mass, key = file.design.mass, "design.mass"
+    if mass is not None and (mass.min, mass.max) != (None, None):
+        yield limit_between(
+            *(mass.min, mass.max, model.total_mass, key, key),
+            noun="mass",
+            unit="kg",
+            extreme=("the lightest design has", "the heaviest design has"),
+            is_affine=model.total_mass.is_affine,
+        )
+    if path is not None and file.design.torque:
+        yield from _drive_limits(file, model, path)
+    for name, given in file.design.constraints.items():
+        factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])
+        units = {unit for c, unit in zip(factors, file.design_units, strict=True) if c}
+        yield limit_between(
+            *(given.min, given.max, LinearConstraint(name, factors), name),
+            f"design.constraints.{name}",
+            unit=units.pop() if len(units) == 1 else "",
+        )
 
-    ``loads`` are those of all drives at a design, as its bytes: see `DriveForces.along`.
-    """
 
-    loads: Callable[[bytes], tuple[Ints, Floats, Floats]]
-    path: Trajectories
-    name: str
-    column: int
-    unit: str
-    is_affine: bool
-
-    def samples(self, y: Floats) -> tuple[Ints, Floats, Floats]:
-        """The samples (m,), and its values and slopes there, at a design y (n_y,)."""
-        samples, tau, slopes = self.loads(np.asarray(y, dtype=np.float64).tobytes())
-        return samples, tau[:, self.column], slopes[:, self.column]
-
-    def __call__(self, y: Floats) -> tuple[Floats, Floats]:
-        """Values and slopes alone."""
-        return self.samples(y)[1:]
-
-
+@dataclass(frozen=True, repr=False, eq=False)
 class DriveLimit(LimitedQuantity):
     """|τ| ≤ max of the drive of a coordinate along `path.whole.finely`; its amount: the peak."""
 
-    extreme = ("the least found is", "the least found is")
+    column: int = 0  # of all drives
 
-    @classmethod
-    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
-        """Yield the limits of all drives, along all trajectories whole."""
-        if path is None or not file.design.torque:
-            return
-
-        fine = path.whole.finely
-
-        @lru_cache(maxsize=1)  # all drives ask for the same design
-        def loads(y: bytes) -> tuple[Ints, Floats, Floats]:
-            return model.drives.along(fine, np.frombuffer(y), slopes=True)
-
-        affine = model.drives.is_affine and not path.follows_design
-        for column, (name, unit) in enumerate(zip(file.coordinates, file.drive_units, strict=True)):
-            if name in file.design.torque:
-                load = CarriedLoad(loads, fine, name, column, unit, affine)
-                edge = np.full(len(load(initial_design(file))[0]), file.design.torque[name].max)
-                place = f"design.torque.{name}"
-                yield cls(place, place, ((load, 1.0),), slice(0, len(edge)), -edge, edge)
-
-    @property
-    def load(self) -> CarriedLoad:
-        """What it limits."""
-        load = self.terms[0][0]
-        assert isinstance(load, CarriedLoad)
-        return load
-
-    @property
-    def is_affine(self) -> bool:
-        """True where the load is affine in the design, at every sample."""
-        return self.load.is_affine
-
-    @property
-    def is_decided(self) -> bool:
-        """True where the designs that keep it are a convex set: else a search may miss some."""
-        return self.is_affine
-
-    @property
-    def unit(self) -> str:
-        """N m, or N."""
-        return self.load.unit
-
-    @property
-    def noun(self) -> str:
-        """``torque of q1``."""
-        return f"{'force' if self.unit == 'N' else 'torque'} of {self.load.name}"
-
-    @property
-    def allowed(self) -> tuple[float, float]:
-        """The limit of the peak."""
-        return -np.inf, float(self.upper[0])
-
-    def amount_of(self, value: float) -> float:
+    def amount_of(self, value: float) -> tuple[float, float]:
         """The magnitude of a load."""
-        return abs(value)
+        return abs(value), float(np.sign(value))
 
-    def slopes(self, y: Floats) -> Floats:
-        """The slopes (n_y,) of the peak."""
-        _, tau, slopes = self.worst(y)
-        return np.asarray(np.sign(tau) * slopes)
 
-    def where(self, y: Floats) -> str:
-        """`` at sample 12 (t = 0.3 s)``."""
-        return f" at {self.load.path.where(int(self.load.samples(y)[0][self.worst(y)[0]]))}"
+def _drive_limits(file: CaseFile, model: Model, path: Trajectories) -> Iterator[LimitedQuantity]:
+    """The limits of all drives, along all trajectories whole: loads of one evaluation a design."""
+    fine = path.whole.finely
 
-    @property
-    def in_words(self) -> str:
-        """Its name in a sentence about limits."""
-        return f"the limit of the {self.noun}"
+    @lru_cache(maxsize=1)
+    def loads(y: bytes) -> tuple[Ints, Floats, Floats]:
+        return model.drives.along(fine, np.frombuffer(y), slopes=True)
 
-    def relaxed(self, side: str, share: float) -> str:
-        """The words for a limit that is relaxed by a share of it."""
-        return f"{handy(share * self.allowed[1], self.unit)} more {self.noun}"
+    def load(column: int, y: Floats) -> tuple[Floats, Floats]:
+        _, tau, slopes = loads(np.asarray(y, dtype=np.float64).tobytes())
+        return tau[:, column], slopes[:, column]
+
+    def place(y: Floats, row: int) -> str:
+        return fine.where(int(loads(np.asarray(y, dtype=np.float64).tobytes())[0][row]))
+
+    affine = model.drives.is_affine and not path.follows_design
+    for column, (name, unit) in enumerate(zip(file.coordinates, file.drive_units, strict=True)):
+        if name in file.design.torque:
+            most, own = file.design.torque[name].max, partial(load, column)
+            edge = np.full(len(own(initial_design(file))[0]), most)
+            key = f"design.torque.{name}"
+            yield DriveLimit(
+                *(key, key, ((own, 1.0),), slice(0, len(edge)), -edge, edge),
+                noun=f"{'force' if unit == 'N' else 'torque'} of {name}",
+                unit=unit,
+                allowed=(-np.inf, most),
+                is_affine=affine,
+                is_decided=affine,
+                row_place=place,
+                column=column,
+            )
+
+
+# --- Ways that nodes give
 
 
 @dataclass(frozen=True, eq=False)
-class LinearLimit(LimitedQuantity):
-    """low ≤ Σ c_j y_j ≤ high: linear in the design, so that each step can keep it exactly.
+class Way:
+    """The way that a target's node gives at ``rows`` of a path, m/N or m: (n,), slopes (n, n_y).
 
-    Its ``unit`` is that of all its parameters, if they have one.
+    Its components are ``columns`` of what is ``found`` at a design, as its bytes; ``by`` is what
+    that is evaluated by, of True by a finer mesh.
     """
 
-    in_one_shot = True
-    unit: str = ""
+    target: StaticTarget
+    place: str  # its key path
+    model: Model
+    path: Trajectories
+    rows: slice
+    columns: slice
+    by: Callable[[bool], Flexibility]
+    found: Callable[[bytes], tuple[Floats, Floats]]
 
-    @classmethod
-    def of_case(cls, file: CaseFile, model: Model, path: Path) -> Iterator[LimitedQuantity]:
-        """Yield the linear limits between design parameters."""
-        for name, given in file.design.constraints.items():
-            factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])
-            low, high = _ends(given.min, given.max)
-            row = LinearConstraint(name, factors, low, high)
-            units = {unit for c, unit in zip(factors, file.design_units, strict=True) if c}
-            limit = cls.between(low, high, row, name, f"design.constraints.{name}")
-            yield replace(limit, unit=units.pop() if len(units) == 1 else "")
+    def __call__(self, y: Floats) -> tuple[Floats, Floats]:
+        """Values and slopes at a design y (n_y,); raises MechanismError where a joint is free."""
+        w, slopes = self.found(np.asarray(y, dtype=np.float64).tobytes())
+        return self._length(w[self.rows, self.columns], slopes[self.rows, self.columns])
+
+    def at(self, q: Floats, y: Floats, finer: bool = False) -> Floats:
+        """The values (n,) at any poses q (n, n_q), or by a ``finer`` mesh."""
+        x = self.model.x(q, y)
+        w, slopes = self.by(finer).at(x, np.zeros(x.shape[1], dtype=bool))
+        return self._length(w[:, self.columns], slopes[:, self.columns])[0]
+
+    def _length(self, w: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+        if not np.isfinite(w).all():
+            coordinates = self.model.poses.case.coordinates.items()
+            free = " and ".join(name for name, c in coordinates if c.moves == "free")
+            message = f"moves freely in this direction, because nothing holds {free}: give it a"
+            message = f"{self.target.place.at} {message} drive stiffness, or lock it"
+            raise MechanismError(self.place, message)
+        size = np.linalg.norm(w, axis=1)
+        along = w / np.where(size > 0.0, size, 1.0)[:, None]
+        return size, np.einsum("nm,nmy->ny", along, slopes)
 
     @property
-    def constraint(self) -> LinearConstraint | None:
-        """The same as a row of the program."""
-        row = self.terms[0][0]
-        return row if isinstance(row, LinearConstraint) else None
+    def is_convex(self) -> bool:
+        """True where K is affine and the force fixed: designs that give way so far are convex."""
+        n = self.path.q.shape[1]
+        design = np.arange(n + len(self.model.y_names)) >= n
+        fixed = self.by(False).forces.is_fixed(design) and not self.path.follows_design
+        return fixed and isinstance(self.target.place, PushedNode) and self.model.pencil.is_affine
 
 
-def _ends(low: float | None, high: float | None) -> tuple[float, float]:
-    return -np.inf if low is None else low, np.inf if high is None else high
+class StaticLimit(LimitedQuantity):
+    """The limit of what a static target asks of a node; its amount is the worst of all samples."""
+
+    @property
+    def way(self) -> Way:
+        """What it limits."""
+        way: Way = self.quantity
+        return way
+
+    def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
+        """Yield the rows of the way; the upper edge of that is the lower one of a stiffness."""
+        side = "lower" if self.way.target.limit == "at_least" else "upper"
+        yield from (replace(rows, side=side) for rows in super().edge_rows(factor))
+
+    def curve_of(self, y: Floats) -> Floats:
+        """The stiffness, compliance or sag (n,) at its samples; NaN where nothing gives way."""
+        return np.array([self.amount_of(float(w))[0] for w in self.way(y)[0]])
+
+    def amount_of(self, value: float) -> tuple[float, float]:
+        """The stiffness, compliance or sag of a way, and its slope."""
+        if self.way.target.limit == "at_most":
+            return value, 1.0
+        return (1.0 / value, -1.0 / value**2) if value > RIGID else (np.nan, np.nan)
+
+
+def static_limits(
+    file: CaseFile, model: Model, path: Trajectories, asked: Sequence[Placed]
+) -> Iterator[StaticLimit]:
+    """The limits of static targets, of all that are pushed from one factorisation of K a sample.
+
+    Raises MechanismError at a target where nothing gives way, or a free joint does.
+    """
+    pushed = [each[1].place for each in asked if isinstance(each[1].place, PushedNode)]
+    nodes = {place.at: [p.direction for p in pushed if p.at == place.at] for place in pushed}
+    columns = [(node, direction) for node, own in nodes.items() for direction in own]
+    together = _found(model, path, partial(compliances, model, nodes))
+    for k, target, rows, along, where in asked:
+        place, some, (by, found), towards = target.place, slice(None), together, ""
+        if isinstance(place, PushedNode):
+            first = columns.index((place.at, place.direction))
+            some = slice(first, first + 1)
+            towards = f" along [{', '.join(f'{v:g}' for v in place.direction)}]"
+        else:
+            by, found = _found(model, path, partial(sags, model, place.at))
+        way = Way(target, f"targets[{k}].{target.kind}", model, path, rows, some, by, found)
+        if way(initial_design(file))[0].max() <= RIGID:
+            message = f"nothing gives way at {place.at} in any pose: all is rigid and locked"
+            raise MechanismError(way.place, message)
+        noun, unit, edge = f"{target.kind} of {place.at}{towards}", UNITS[target.kind], target.edge
+        is_least = target.limit == "at_least"
+        upper = np.full(rows.stop - rows.start, 1.0 / edge if is_least else edge)
+        yield StaticLimit(
+            label=f"{noun} {target.limit.replace('_', ' ')} {said(edge, unit)}{where}",
+            place=f"targets[{k}]",
+            terms=((way, 1.0),),
+            rows=rows,
+            lower=np.full_like(upper, -np.inf),
+            upper=upper,
+            along=along,
+            trajectory=target.trajectory,
+            noun=noun,
+            unit=unit,
+            allowed=(edge, np.inf) if is_least else (-np.inf, edge),
+            is_affine=False,  # the inverse of K is not
+            is_decided=way.is_convex,
+            row_place=partial(_sample_place, path, rows),
+        )
+
+
+def _sample_place(path: Trajectories, rows: slice, y: Floats, row: int) -> str:
+    return path.where(rows.start + row)
+
+
+def _found(
+    model: Model, path: Trajectories, made: Callable[[bool], Flexibility]
+) -> tuple[Callable[[bool], Flexibility], Callable[[bytes], tuple[Floats, Floats]]]:
+    """What is made, once for each mesh, and with it the ways (n, m) and slopes of a design."""
+    by = lru_cache(maxsize=2)(made)
+
+    @lru_cache(maxsize=32)  # all targets ask for the same design, and searches come back to some
+    def found(design: bytes) -> tuple[Floats, Floats]:
+        y = np.frombuffer(design)
+        q, of_design = path.at(y)
+        x = model.x(q, y)
+        wanted = np.arange(x.shape[1]) >= q.shape[1]
+        wanted[: model.pencil.n_joints] = path.follows_design
+        w, slopes = by(False).at(x, wanted)
+        return w, path.in_design(slopes, of_design)
+
+    return by, found

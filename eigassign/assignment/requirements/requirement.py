@@ -28,8 +28,6 @@ from eigassign.brief import Brief
 from eigassign.case.schema.targets import (
     AnyTarget,
     FollowedMode,
-    FrequencyFile,
-    FrequencyProfile,
 )
 from eigassign.errors import UsageError
 
@@ -112,23 +110,6 @@ class Requirement(Brief):
             object.__setattr__(self, side, frozen(getattr(self, side)))
         if not (np.isfinite(self.weight) and self.weight > 0.0):
             raise UsageError(f"target weight: {self.weight} given; must be finite and above 0")
-
-    # --- From a target of the case file
-
-    @staticmethod
-    def asked(target: Any) -> str:
-        """The words for what is asked of the mode."""
-        raise NotImplementedError
-
-    @staticmethod
-    def edges(target: Any, *hz: Floats) -> Edges:
-        """Lower and upper edge where the target's frequencies are ``hz``, each (n,)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def terms_of(modes: tuple[int, ...]) -> Terms:
-        """The terms of a requirement on these modes."""
-        return ((modes[0], 1.0),)
 
     @property
     def kind(self) -> str:
@@ -369,8 +350,3 @@ def time_shares(goals: Sequence[Requirement], time_weights: Floats) -> tuple[Flo
     own = [one.weight * one.time_weights(time_weights) for one in goals]
     total = sum(weights.sum() for weights in own)
     return tuple(weights / total for weights in own)
-
-
-def in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:
-    """A frequency of a target in words."""
-    return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"

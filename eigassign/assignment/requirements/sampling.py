@@ -15,22 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from eigassign.assignment.program import Floats, frozen
-from eigassign.assignment.requirements.kinds import (
-    AssignedFrequency,
-    ForbiddenBand,
-    HighestFrequency,
-    LowerLimit,
-    ModeGap,
-    UpperLimit,
-)
+from eigassign.assignment.requirements.kinds import KINDS, asked_of, terms_of
 from eigassign.assignment.requirements.quantity import (
-    DriveLimit,
     LimitedQuantity,
-    LinearLimit,
-    MassLimit,
+    Placed,
+    quantity_limits,
+    static_limits,
 )
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.static_limit import Placed, static_limits
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted
 from eigassign.case.schema.targets import (
@@ -51,11 +43,6 @@ _Curve = float | FrequencyProfile | FrequencyFile
 _Knots = tuple[ArrayLike, ArrayLike | None]
 _SLACK = 1e-9  # of the duration: rounding of a time grid, far below a step
 _LINEAR = 1e-12  # relative: a point of a profile this near to a straight line is on it
-KINDS: dict[str, type[Requirement]] = {
-    one.form.kind: one
-    for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap, HighestFrequency)
-}  # by the key that only their targets have
-QUANTITIES: tuple[type[LimitedQuantity], ...] = (MassLimit, DriveLimit, LinearLimit)
 
 
 def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ...]:
@@ -85,7 +72,7 @@ def design_limits(
     Raises CaseError where a part of a trajectory has no sample, MechanismError where a node is
     rigid, or nothing holds it.
     """
-    limits = [one for kind in QUANTITIES for one in kind.of_case(file, model, path)]
+    limits = list(quantity_limits(file, model, path))
     if path is not None:
         limits += static_limits(file, model, path, list(_static(file, path)))
     return tuple(limits)
@@ -206,22 +193,21 @@ def time_weights(path: Trajectories) -> Floats:
 def _of_target(
     file: CaseFile, place: str, target: AnyTarget, path: Trajectories
 ) -> Iterator[Requirement]:
-    kind = KINDS[target.kind]
     rows = _rows(file, place, target, path)
     along = tuple(_along(path, rows))
     sampled = (
         _sampled(file, curve, f"{place}.{dotted(keys)}", rows, path)
         for keys, curve in target.frequencies
     )
-    edges = kind.edges(target, *sampled)
+    words, *edges = asked_of(target, *sampled)
     lower, upper = (np.broadcast_to(edge, rows.stop - rows.start) for edge in edges)
     own = followed_modes(file)
     for named in target.named:
         followed = tuple(mode for mode in named if isinstance(mode, FollowedMode))
         modes = tuple(m if isinstance(m, int) else own.index(m) - len(own) for m in named)
-        terms = kind.terms_of(modes)
-        yield kind(
-            label=f"{_who(named)} {kind.asked(target)}{_where(target)}",
+        terms = terms_of(target, modes)
+        yield KINDS[target.kind](
+            label=f"{_who(named)} {words}{_where(target)}",
             place=place,
             modes=tuple(mode for mode in modes if mode > 0 or not terms),
             terms=terms,

@@ -28,9 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin
-from eigassign.assignment.requirements.quantity import DriveLimit
+from eigassign.assignment.requirements.quantity import RIGID, DriveLimit, StaticLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
-from eigassign.assignment.requirements.static_limit import RIGID, StaticLimit
 from eigassign.errors import LostModeError, MissingMassError, TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
@@ -195,7 +194,7 @@ def _drive_room(model: Model, asked: DriveLimit, trajectory: Trajectory, y: Floa
         times = trajectory.time_s
         time_s = np.interp(at, np.arange(len(times)), times)
         tau = model.drives.exerted(trajectory, time_s, y)
-        return np.asarray(1.0 - np.abs(tau[:, asked.load.column]) / asked.allowed[1])
+        return np.asarray(1.0 - np.abs(tau[:, asked.column]) / asked.allowed[1])
 
     return room
 

@@ -264,7 +264,7 @@ class _Deviations:
             both = (nominal, first), (self.y, self.response(self.y))
             amounts = [float(of.value(*design)[0][k]) for design in both]
             if isinstance(of, LimitedQuantity):
-                amounts = [of.amount_of(value) for value in amounts]
+                amounts = [of.amount_of(value)[0] for value in amounts]
             yield RobustTarget(
                 label=of.asked_words if isinstance(of, LimitedQuantity) else name,
                 unit=of.unit if isinstance(of, LimitedQuantity) else "Hz",

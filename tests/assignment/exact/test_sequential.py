@@ -16,12 +16,12 @@ from eigassign.assignment import (
     End,
     LinearConstraint,
     LowerLimit,
-    MassLimit,
     Objective,
     Requirements,
     UpperLimit,
     best_first,
     first_order,
+    limit_between,
     minimise,
 )
 from eigassign.errors import AccuracyError
@@ -192,7 +192,7 @@ def test_limits_of_frequencies_and_quantities_have_a_side() -> None:
     limits = (
         LowerLimit("stiff", "", ((1, 1.0),), rows, hz, endless),
         UpperLimit("soft", "", ((2, 1.0),), rows, -endless, hz),
-        MassLimit.between(1.0, 2.0, lambda y: (1.0, y), "mass", ""),
+        limit_between(1.0, 2.0, lambda y: (1.0, y), "mass", ""),
     )
     asked = Requirements(limits, np.ones(2))
     sides = [asked.owner(k) for k in (1, 2, 4, 5)]
