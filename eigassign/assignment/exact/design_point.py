@@ -20,7 +20,7 @@ from scipy.optimize import nnls
 
 from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
 from eigassign.assignment.program import Floats
-from eigassign.assignment.requirements.crossing import MEET, NeighbourPairs
+from eigassign.assignment.requirements.requirement import MEET, NeighbourPairs
 
 Indices = NDArray[np.intp]
 

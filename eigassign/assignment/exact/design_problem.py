@@ -20,7 +20,7 @@ from typing import TypeVar
 import numpy as np
 
 from eigassign.assignment.program import Floats, LinearConstraint, Program, solve_program
-from eigassign.assignment.requirements.crossing import NeighbourPairs
+from eigassign.assignment.requirements.requirement import NeighbourPairs
 
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies

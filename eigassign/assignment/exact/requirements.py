@@ -30,13 +30,14 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, Objective
 from eigassign.assignment.program import Floats
-from eigassign.assignment.requirements.crossing import NeighbourPairs, joined
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Frequencies,
+    NeighbourPairs,
     Requirement,
     Solved,
     difference,
+    joined,
     time_shares,
 )
 
