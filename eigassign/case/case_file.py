@@ -45,7 +45,6 @@ from eigassign.case.rules.files import (
     named_files,
     not_allowed,
     unreadable,
-    with_listed,
 )
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
@@ -478,14 +477,9 @@ def checked(
     bad = [] if allow_outside else [*not_allowed(named, path.parent)]
     bad = bad or [*unreadable([each for each in named if not each.spare])]
     unread = {place for place, _ in bad}
-    tree, more = with_listed(source.tree, [n for n in named if n.path not in unread], path.parent)
-    unread |= {place for place, _ in more} | {n.path for n in named if n.path[0] == "design"}
-    document, schema_findings = validated(tree, path.parent)
-    empty = {place[:3] for place in unread if "sections" in place}  # which a file would have filled
-    findings = [*bad, *more]
-    for place, why in (*islice(keys_have_values(tree), 2 * MOST_PROBLEMS), *schema_findings):
-        if place not in unread and place[:3] not in empty:
-            findings.append((place, why))
+    document, found = validated(source.tree, path.parent)
+    found = [*islice(keys_have_values(source.tree), 2 * MOST_PROBLEMS), *found]
+    findings = bad + [finding for finding in found if finding[0] not in unread]
     if document is not None and not findings:
         findings = [*islice(inconsistent(document), 2 * MOST_PROBLEMS)]
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]

@@ -180,13 +180,11 @@ MOTION = """\
   waypoints: [[0.3, 0.1], [0.2, 0.2]]
   branch: {elbow: [10 deg, 170 deg]}
 """
-PROFILES = edited("{shape: circle, diameter: 30 mm}", "{file: table.csv, name: a}")
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        PROFILES,
         edited(MOTION, "  file: table.csv\n"),
         TEXT + "measurements: {file: table.csv}\n",  # of which a run records what they are
     ],

@@ -1,42 +1,24 @@
-"""Files that the case names, and choices listed in a file.
+"""Files that the case names.
 
 A case may come from somebody else. So the files that it names lie below its own folder, links
 followed, unless whoever runs it says otherwise; and what is no file of a sensible size is refused
 before anything is read of it.
-
-A file has a line for each: its name in the first column, whatever that is called, its values in
-columns named by their paths, of sections by their keys, with units in the header, and a column
-`price` if each has one.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from eigassign.case.reader import (
     Finding,
     KeyPath,
     Tree,
     at,
-    dotted,
-    items,
-    listed,
-    suggestion,
-    unknown,
 )
-from eigassign.case.rules.properties import NoPropertyError, property_at, quantities
-from eigassign.case.schema.design import PRICE
-from eigassign.case.schema.document import validated
-from eigassign.case.schema.links import SHAPES
-from eigassign.case.schema.parts import Quantity
-from eigassign.case.table import CsvColumn, read_table, read_words
-from eigassign.case.units import PLAIN
-from eigassign.errors import MechanismError
 from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
 _SPARE = ("measurements", "sweep")
@@ -50,8 +32,6 @@ _PLACES: tuple[tuple[KeyPath, int], ...] = (  # where files are named, and how l
     (("targets", "*", "keep_out", "of", "file"), TABLE),
     (("measurements", "file"), TABLE),
     (("sweep", "file"), TABLE),
-    (("mechanism", "sections", "*", "file"), TABLE),
-    (("design", "*", "choices", "file"), TABLE),  # with what sections are by then
     *(((*_SUPERELEMENT, key), MATRIX) for key in (*_MATRIX, "file", "nodes_file")),
     ((*_SUPERELEMENT, "nodes_file", "*"), MATRIX),
     (("mechanism", "links", "*solid", "mesh"), MESH),
@@ -129,89 +109,3 @@ def unreadable(named: Sequence[NamedFile]) -> Iterator[Finding]:
     for each in named:
         if (reason := objection(each.file, each.limit)) is not None:
             yield each.path, f"no such file: {printable(each.file)} ({reason})"
-
-
-def with_listed(tree: Tree, named: Sequence[NamedFile], folder: Path) -> tuple[Tree, list[Finding]]:
-    """``tree`` with the sections and choices that ``named`` files list, in SI; what is wrong there.
-
-    A file that cannot be read lists nothing, nor do choices of a mechanism of wrong form.
-    """
-    findings: list[Finding] = []
-    for each in named:
-        file, key = Path(each.file), dotted(each.path)
-        try:
-            match each.path:
-                case ("mechanism", "sections", str(name), "file"):
-                    own = dict(items(tree, "mechanism", "sections", name))
-                    profile = str(own.get("name"))
-                    read = dict(_lines(file, key, partial(_of_section, name, own.get("shape"))))
-                    if profile not in read:
-                        message = unknown("profile", profile, read)
-                        findings.append(((*each.path[:-1], "name"), message))
-                        continue
-                    lines = own | {k: v for k, v in read[profile].items() if k != PRICE}
-                    tree = _put(
-                        tree,
-                        each.path[:3],
-                        {k: lines[k] for k in lines if k not in ("file", "name")},
-                    )
-                case ("design", str(name), "choices", "file"):
-                    document, _ = validated({**tree, "design": {}, "targets": ()}, folder)
-                    if document is not None:
-                        asked = partial(property_at, document)
-                        tree = _put(tree, each.path[:3], dict(_lines(file, key, asked)))
-        except MechanismError as error:
-            findings.append((each.path, error.message))
-    return tree, findings
-
-
-def _of_section(name: str, shape: object, key: str) -> Quantity:
-    model = SHAPES.get(shape if isinstance(shape, str) else "bare")
-    known = quantities(model) if model else {}
-    if key not in known:
-        message = f"sections.{name} has no property {key!r}{suggestion(key, known)}"
-        raise NoPropertyError(f"{message}; can vary: {listed(known)}")
-    return known[key]
-
-
-def _put(tree: Any, place: KeyPath, value: object) -> Any:
-    """``tree`` with ``value`` at ``place``."""
-    if not place:
-        return value
-    first, *rest = place
-    return {**tree, first: _put(tree[first], tuple(rest), value)}
-
-
-def _lines(
-    file: Path, key: str, quantity: Callable[[str], Quantity]
-) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Yield the values of each line by its name, of columns that are each a ``quantity``.
-
-    Raises MechanismError at ``key``.
-    """
-    header = read_words(file, key)[0][1]
-    name, *paths = (cell.partition("[")[0].strip() for cell in header)
-    columns = []
-    for cell, path in zip(header, (name, *paths), strict=True):
-        try:
-            asked = None if path == PRICE else quantity(path)
-        except NoPropertyError as error:
-            if path == name:
-                columns.append(CsvColumn(name))
-                continue
-            raise MechanismError(key, f"{file.name}: column {path}: {error}") from None
-        if path == name:
-            message = f"{file.name}: the first column names the choices: put one before {name}"
-            raise MechanismError(key, message)
-        if path == PRICE != cell:
-            message = f"{file.name}: column {cell}: prices are plain numbers: call it {PRICE}"
-            raise MechanismError(key, message)
-        columns.append(CsvColumn(path, ((asked and asked.dimension) or PLAIN,)))
-    table = read_table(file, key, columns)
-    lines: dict[str, str] = {}
-    for k, choice in enumerate(table.words[name]):
-        if choice in lines:
-            message = f"{table.where(k)}: {choice!r} is listed already, in {lines[choice]}"
-            raise MechanismError(key, message)
-        lines[choice] = table.where(k)
-        yield choice, {path: table.numbers[path][k] for path in paths}

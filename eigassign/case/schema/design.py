@@ -23,7 +23,6 @@ from eigassign.case.schema.parts import (
     FrozenDict,
     Named,
     OneOrList,
-    OrFile,
     Part,
     Quantity,
     Told,
@@ -173,8 +172,7 @@ class Choices(Part):
 
     Keys:
         choices: by name, each with values by path, and its `price` if all have one; all set the
-            same properties. Or `file`, a CSV file with a line for each: its name in the first
-            column, the paths as the names of the others
+            same properties
         price: for one unit of a property, by its path
         tolerance: how far a property may deviate from what is chosen either way, by its path
     """
@@ -183,7 +181,6 @@ class Choices(Part):
         Mapping[str, Annotated[Mapping[str, YValue], Field(min_length=1), Frozen]],
         Field(min_length=1, max_length=MOST_CHOICES),
         Frozen,
-        OrFile(1),
     ]
     price: ByReference[Price] = FrozenDict()
     tolerance: ByReference[Tolerance] = FrozenDict()

@@ -31,7 +31,6 @@ from eigassign.case.schema.parts import (
     Told,
     ValueOr,
     Vector,
-    kinds,
     needs_one_of,
     one_of,
     only_in,
@@ -237,7 +236,6 @@ Section: TypeAlias = Annotated[
     BareSection | CircleSection | TubeSection | RectangleSection | BoxSection | IProfileSection,
     KindBy("shape", default="bare"),
 ]
-SHAPES = kinds(Section)
 
 
 Elements: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]

@@ -26,7 +26,6 @@ from eigassign.case.schema.parts import (
     Named,
     OneOrList,
     OneOrMoreNamed,
-    OrFile,
     Orientation,
     Part,
     Placed,
@@ -395,8 +394,7 @@ class Mechanism(Part):
         gravity: the acceleration of a fall, in the axes of the ground; or `none`: left out on
             purpose
         materials: of beams and solids
-        sections: cross-sections of beams; `{file: profiles.csv, name: UPN80}` is the line of that
-            name in a CSV file with a column for each key
+        sections: cross-sections of beams
         links: beams, rigid bodies, frames of beams, and parts given by matrices or meshes
         joints: of links with each other and with the ground
         bodies: rigid bodies on nodes
@@ -407,7 +405,7 @@ class Mechanism(Part):
     space: Literal["planar", "spatial"]
     gravity: OneOrList[Literal["none"], _Acceleration] | None = None
     materials: Named[Material] = FrozenDict()
-    sections: Named[Annotated[Section, OrFile(2)]] = FrozenDict()
+    sections: Named[Section] = FrozenDict()
     links: OneOrMoreNamed[Link]
     joints: Named[Joint]
     bodies: Named[Body] = FrozenDict()

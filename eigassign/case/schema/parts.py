@@ -417,21 +417,6 @@ class KindBy:
         return Told(which).__get_pydantic_core_schema__(union, handler)
 
 
-@dataclass(frozen=True)
-class OrFile:
-    """The JSON Schema of what may also stand in a CSV file, which is read before the schema.
-
-    ``most`` keys say which file, and what of it.
-    """
-
-    most: int
-
-    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
-        """As it is, or texts with the key `file`."""
-        file = {"type": "object", "additionalProperties": {"type": "string"}, "required": ["file"]}
-        return {"anyOf": [handler(core), {**file, "maxProperties": self.most}]}
-
-
 def kinds(union: Any) -> dict[str, type[Part]]:
     """Models of a union annotated with ``KindBy``, by the word that stands for each."""
     models, by_key = get_args(union)

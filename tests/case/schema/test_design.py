@@ -1,7 +1,6 @@
 """What stands under `design` becomes one vector y, catalogues over its columns, and limits."""
 
 import re
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -176,12 +175,6 @@ PRICED = """\
       light: {sections.bar.area: 4 cm2, sections.bar.bending_inertia: 2 cm4, price: 12.5}
       heavy: {price: 20, sections.bar.bending_inertia: 5 cm4, sections.bar.area: 6 cm2}
 """
-TABLE = """\
-# of a supplier
-name;price;sections.bar.area [cm2];sections.bar.bending_inertia [cm4]
-light;12,5;4;2
-heavy;20;6;5
-"""
 
 
 def test_choices_have_a_price_each_that_is_no_column_of_the_design() -> None:
@@ -189,18 +182,6 @@ def test_choices_have_a_price_each_that_is_no_column_of_the_design() -> None:
     assert list(design.parameters) == ["m", "boom.area", "boom.bending_inertia"]
     assert design.catalogues[0].prices == (12.5, 20.0)
     assert with_entries(BOOM).design.catalogues[0].prices == ()
-
-
-def test_choices_of_a_table_are_those_of_the_case_file(tmp_path: Path) -> None:
-    (tmp_path / "bars.csv").write_text(TABLE)
-    text = edited(D, "  boom: {choices: {file: bars.csv}}\n")
-    from_file = parse(text.encode(), tmp_path / "case.yaml")
-    inline = with_entries(PRICED).design
-    assert from_file.design.catalogues == inline.catalogues
-    assert from_file.design.parameters == inline.parameters
-    assert list(from_file.files) == ["bars.csv"]
-    assert read(from_file.resolved()) == from_file
-    assert accepts(SCHEMA, read_yaml(text.encode(), "case.yaml").tree)
 
 
 @pytest.mark.parametrize(
@@ -220,75 +201,8 @@ def test_prices_of_choices_that_make_no_sense_are_refused(
     assert expected in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("[cm4]", "[mm]", "column sections.bar.bending_inertia: [mm] is no unit of"),
-        ("sections.bar.area", "sections.bar.aera", "column sections.bar.aera: sections.bar has no"),
-        ("heavy", "light", "bars.csv:4: 'light' is listed already, in bars.csv:3"),
-        ("20;6", "x;6", "bars.csv:4: column price: 'x' is not a finite number"),
-        (TABLE, "name;price\na;3\n", "sets no property"),
-        ("price", "price [EUR]", "column price [EUR]: prices are plain numbers"),
-        (TABLE, "sections.bar.area;price\n3;4\n", "the first column names the choices: put one"),
-        (TABLE, "", "is not a text file|a header and rows are expected"),
-    ],
-)
-def test_tables_of_choices_that_make_no_sense_are_refused_with_their_line(
-    tmp_path: Path, old: str, new: str, expected: str
-) -> None:
-    (tmp_path / "bars.csv").write_text(TABLE.replace(old, new))
-    text = edited(D, "  boom: {choices: {file: bars.csv}}\n")
-    with pytest.raises(CaseError) as error:
-        parse(text.encode(), tmp_path / "case.yaml")
-    assert any(one in str(error.value) for one in expected.split("|"))
-
-
-PROFILES = "profile, area [cm2], bending_inertia [cm4], price\nflat, 4, 2, 5\nI80, 7.6, 80, 9\n"
-
-
-def with_profile(folder: Path, table: str, name: str = "I80") -> CaseFile:
-    (folder / "own.csv").write_text(table)
-    text = re.sub(r"bar: \{.*\}", f"bar: {{file: own.csv, name: {name}}}", edited(D, D))
-    assert accepts(SCHEMA, read_yaml(text.encode(), "case.yaml").tree)
-    return parse(text.encode(), folder / "case.yaml")
-
-
-def test_a_section_is_a_line_of_a_table_of_profiles(tmp_path: Path) -> None:
-    case = with_profile(tmp_path, PROFILES)
-    bar = case.mechanism.sections["bar"]
-    assert (bar.area, bar.bending_inertia) == pytest.approx((7.6e-4, 8e-7))
-    assert list(case.files) == ["own.csv"]
-    assert read(case.resolved()) == case
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("I80", "I90", "sections.bar.name: unknown profile 'I80'; did you mean 'I90'?; known"),
-        ("[cm4]", "[mm]", "sections.bar.file: own.csv:1: column bending_inertia: [mm] is no unit"),
-        ("price", "weight", "sections.bar has no property 'weight'"),
-    ],
-)
-def test_profiles_that_make_no_sense_are_refused(
-    tmp_path: Path, old: str, new: str, expected: str
-) -> None:
-    with pytest.raises(CaseError) as error:
-        with_profile(tmp_path, PROFILES.replace(old, new))
-    (problem,) = error.value.problems
-    assert expected in str(problem)
-
-
 @pytest.mark.parametrize("shape", ["angle", "channel", "l_profile", "UPN80", "u_profile", "T"])
 def test_sections_that_twist_under_their_load_are_refused_with_the_reason(shape: str) -> None:
     text = re.sub(r"bar: \{.*\}", f"bar: {{shape: {shape}, height: 60 mm}}", edited(D, D))
     with pytest.raises(CaseError, match=r"shear centre is not its centroid\).*type solid"):
         read(text)
-
-
-def test_a_table_of_choices_lies_in_the_folder_of_the_case(tmp_path: Path) -> None:
-    (tmp_path / "bars.csv").write_text(TABLE)
-    (tmp_path / "cases").mkdir()
-    text = edited(D, "  boom: {choices: {file: ../bars.csv}}\n").encode()
-    with pytest.raises(CaseError, match="outside the folder of the case file"):
-        parse(text, tmp_path / "cases" / "case.yaml")
-    assert parse(text, tmp_path / "cases" / "case.yaml", allow_outside=True).design.catalogues
