@@ -30,7 +30,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.roundoff": "rounding_error",
         "exact.solver": "eigenvalues lowest_modes modes",
         "exact.sparse": "solve_sparse",
-        "exact.substructure": "Inner proved solve_large solve_together",
+        "exact.substructure": "solve_large solve_together",
         "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
         "expansion": "Expansion NearestExpansion expand",
         "model": "Model",

@@ -1,4 +1,4 @@
-"""Many samples of a large pencil solved together, and proof that no mode of any was missed.
+"""Many samples of a large pencil solved together.
 
 Along a trajectory K and M vary in the rows and columns of few unknowns only: S, those at joints,
 the held and the free coordinates. With I all others, K_II and M_II are the same at every sample.
@@ -8,35 +8,20 @@ inverse form M z = μ K z reads, in the rows of I times K_II⁻¹,
     T w + b(θ) u_S = μ w,   T = K_II⁻¹ M_II,   b = K_II⁻¹ (M_IS − M_II K_II⁻¹ K_IS) .
 
 T is one operator for all samples, self-adjoint in K_II. Galerkin's method on w = W a and all of u_S
-gives pairs (μ̂, a, u_S) from matrices of some tens of rows at each sample. Their residuals
+gives pairs (μ̂, a, u_S) from matrices of some tens of rows at each sample. Their residuals, less
+what W holds, are ρ = R (a, u_S), R that part of the columns of T W and of those b is made of. W
+grows by the leading directions of the residuals of all samples at once until |ρ| ≤ 1e-8 μ̂
+everywhere: λ is then as exact as arithmetic makes it, for its error is of second order in ρ.
 
-    ρ = T W a + b u_S − μ̂ W a
-
-lie in the span of T W and of the few columns that b is made of: on a K_II-orthonormal basis Q of it
-|ρ| is the length of a short vector. W grows by the leading directions of the residuals of all
-samples at once until |ρ| ≤ 1e-9 μ̂ everywhere: as exact as arithmetic makes λ, whose error is of
-second order in ρ.
-
-What W and S do not hold is D = (1 − P) T (1 − P) at every sample alike, P the projection on W. With
-m the number of negative pivots of K_II − M_II/ν, T has m eigenvalues above ν; where as many Ritz
-values θ_i of T on W lie above it, with residuals r_i, by Haynsworth's inertia formula
-
-    D ≤ ν' = ν + Σ_i |r_i|² / (θ_i − ν) .
-
-Let μ̂_c be the last pair that counts and R the residuals of the pairs beyond it. For ν' < x < μ̂_c,
-again by inertia,
-
-    diag(μ̂_j) + RᵀR/(x − ν') < x  for j > c
-        ⟹   0 ≤ μ_i − μ̂_i ≤ μ̂_i max_j≤c c |ρ_j|² / (μ̂_j (μ̂_c − x))  for i ≤ c:
-
-the pairs are those of the c lowest modes, and one factorisation has proved it for all
-samples. A sample where this fails is solved by itself.
+What T has above half of the least μ̂ is in W: it is counted there, and by the negative pivots of
+K_II − M_II/ν, ν that half. So no mode is missed that S does not feel, of which no residual knows;
+and a pair j beyond the last that counts, c, lacks |ρ_j|²/(μ̂_c − ν) at most, which has to leave it
+below μ̂_c.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +44,6 @@ from eigassign.modal.exact.sparse import block, principal, solve_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -98,7 +82,7 @@ class Split:
 
     inner: Ints
     outer: Ints
-    is_outer: Flags
+    is_outer: NDArray[np.bool_]
     place: Ints
 
 
@@ -126,8 +110,7 @@ def _coupling(
 ) -> tuple[Floats, Floats]:
     """G (n_I, g) and H (n_samples, g, s) with K_IS or M_IS = G H(θ).
 
-    G holds the columns of all terms, unit vectors of the same direction once: solved twice, they
-    would differ by the round-off of K_II alone, and Q would take that for a direction.
+    G holds the columns of all terms, unit vectors of the same direction once.
     """
     entries = np.flatnonzero(~split.is_outer[pencil.rows] & split.is_outer[pencil.columns])
     terms = weights[entries].tocoo()
@@ -193,69 +176,37 @@ def _definite(K: sparse.csc_array) -> linalg.SuperLU:
     return factor
 
 
-# --- What is the same at every sample: T on a growing basis
+# --- Galerkin's method on W and S
 
-BLOCK = 16  # vectors made orthonormal at once
-DEPENDENT = 1e-12  # remainder, relative to the vector, below which it is taken as dependent
-ROUND_OFF = 0.1  # of a remainder orthogonalised again, below which it was nothing else
+# Samples that repay what they share, at 300 to 10⁴ unknowns (benchmarks/many_samples.py).
+FEWEST = 20
+CONVERGED = 1e-8  # |ρ|/μ̂: the vectors' error; that of λ is of second order in it
+BESIDE = 2  # pairs beyond the last that are looked at
+MOST_VECTORS = 250  # of W: beyond, a sample's own matrices are as large as a sparse solve
+AT_FIRST = 16  # samples that W grows for before it is tried at all
 
 
 @dataclass(frozen=True, eq=False)
-class Inner:
-    """K_II and M_II, the basis Q, and W = Q ``W``, T W = Q ``TW`` in its coordinates.
+class Galerkin:
+    """The operator T, and arrays over n samples of what differs; S with its f free ones last."""
 
-    T goes through K_II⁻¹, which a fine mesh makes inexact. It serves the residuals; the matrices
-    of Galerkin's method are made of M_II and the vectors themselves.
-    """
-
-    K: sparse.csr_array
+    K: sparse.csr_array  # K_II
     M: sparse.csr_array
     factor: linalg.SuperLU
-    Q: Floats  # (n_I, q), QᵀK_II Q = I
-    W: Floats  # (q, k) orthonormal
-    TW: Floats  # (q, k)
-    vectors: Floats  # (n_I, k): W itself
-    mass: Floats  # (k, k): WᵀM_II W
-
-    @classmethod
-    def empty(cls, K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU) -> Inner:
-        """The operator without a vector."""
-        none, long = np.zeros((0, 0)), np.zeros((K.shape[0], 0))
-        return cls(K.T, M.T, factor, long, none, none, long, none)
+    X: Floats  # (n_I, h) with K_II⁻¹ K_IS = X follow
+    follow: Floats  # (n, h, s)
+    A: Floats  # (n_I, g) with M_IS − M_II K_II⁻¹ K_IS = A drive
+    drive: Floats  # (n, g, s)
+    inverse: Floats  # (n, s − f, s − f): L⁻¹ with Σ = L Lᵀ
+    mass: Floats  # (n, s, s): M_SS after the change of unknowns
 
     def solve(self, forces: Floats) -> Floats:
         """K_II⁻¹ times ``forces`` (n_I, r); SuperLU wants at least one."""
-        return self.factor.solve(forces) if forces.size else forces
+        return np.asarray(self.factor.solve(forces)) if forces.size else forces
 
-    def spanning(self, vectors: Floats) -> tuple[Inner, Floats]:
-        """The same with Q grown to hold ``vectors`` (n_I, r), and these in its coordinates."""
-        Q, parts = self.Q, [np.zeros((self.Q.shape[1], 0))]
-        for i in range(0, vectors.shape[1], BLOCK):
-            # twice: a small remainder is not orthogonal to Q yet, or nothing but round-off
-            once, across, within = _remainder(self.K, Q, vectors[:, i : i + BLOCK], DEPENDENT)
-            twice, more, again = _remainder(self.K, Q, once, ROUND_OFF)
-            Q = np.hstack([Q, twice])
-            parts.append(np.vstack([across + more @ within, again @ within]))
-        found = np.hstack([_taller(part, Q.shape[1]) for part in parts])
-        W, TW = (_taller(A, Q.shape[1]) for A in (self.W, self.TW))
-        return replace(self, Q=Q, W=W, TW=TW), found
-
-    def with_vectors(self, coordinates: Floats) -> Inner:
-        """The same with W grown by vectors given in coordinates of Q (q, r)."""
-        k = self.W.shape[1]
-        W = np.linalg.qr(np.hstack([self.W, coordinates]))[0]
-        new = W[:, k:]
-        vectors = self.Q @ new
-        heavy = self.M @ vectors
-        across, square = self.vectors.T @ heavy, vectors.T @ heavy
-        grown, image = self.spanning(self.solve(heavy))
-        return replace(
-            grown,
-            W=np.hstack([grown.W, _taller(new, grown.Q.shape[1])]),
-            TW=np.hstack([grown.TW, image]),
-            vectors=np.hstack([self.vectors, vectors]),
-            mass=np.block([[self.mass, across], [across.T, 0.5 * (square + square.T)]]),
-        )
+    def modes(self, count: int) -> Floats:
+        """Vectors (n_I, count) of the largest eigenvalues of T."""
+        return largest_modes(self.factor, self.K, lambda v: np.asarray(self.M @ v), count)[1]
 
     def above(self, nu: float) -> int:
         """Number of eigenvalues of T above ν; UNCERTAIN where one is too near."""
@@ -263,144 +214,104 @@ class Inner:
         S = sparse.diags_array(scale)
         return negative_pivots(sparse.csc_array(S @ (self.K - self.M / nu) @ S))
 
-    def modes(self, count: int) -> Floats:
-        """Vectors (n_I, count) of the largest eigenvalues of T."""
-        return largest_modes(self.factor, self.K, lambda v: np.asarray(self.M @ v), count)[1]
+    def grown(self, W: Floats, vectors: Floats) -> Floats:
+        """W with the K_II-orthonormal directions that ``vectors`` add to it."""
+        vectors = vectors / np.sqrt(np.einsum("ij,ij->j", vectors, self.K @ vectors))
+        for _ in range(2):
+            vectors = vectors - W @ (W.T @ (self.K @ vectors))
+            values, turns = np.linalg.eigh(vectors.T @ (self.K @ vectors))
+            # 1e-14 is the round-off of squares of lengths
+            kept = values > 1e-14
+            vectors = vectors @ (turns[:, kept] / np.sqrt(values[kept]))
+        return np.hstack([W, vectors])
 
-    def largest_outside(self, nu: float) -> float | None:
-        """ν' ≥ the largest eigenvalue of D; None where W lacks a mode above ν, or may lack one."""
-        values, shapes = np.linalg.eigh(self.mass)
-        above = values > nu
-        if above.sum() != self.above(nu):
-            return None
-        theta, v = values[above], shapes[:, above]
-        rest = self.TW @ v - self.W @ (v * theta)
-        return nu + float((np.square(rest).sum(axis=0) / (theta - nu)).sum())
-
-
-def _taller(A: Floats, rows: int) -> Floats:
-    return np.vstack([A, np.zeros((rows - len(A), A.shape[1]))])
-
-
-def _remainder(
-    K: sparse.csr_array, Q: Floats, vectors: Floats, least: float
-) -> tuple[Floats, Floats, Floats]:
-    """Orthonormal R, A and B with ``vectors`` (n, r) = Q A + R B, by Gram-Schmidt.
-
-    Parts below ``least`` are left out.
-    """
-    K_vectors = K @ vectors
-    size = np.sqrt(np.maximum(np.einsum("ij,ij->j", vectors, K_vectors), 0.0))
-    across = Q.T @ K_vectors
-    rest = vectors - Q @ across
-    r, rank = vectors.shape[1], 0
-    R, KR, within = np.zeros_like(rest), np.zeros_like(rest), np.zeros((r, r))
-    for j, v in enumerate(rest.T):
-        part = KR[:, :rank].T @ v
-        v = v - R[:, :rank] @ part
-        Kv = K @ v
-        length = np.sqrt(max(float(v @ Kv), 0.0))
-        within[:rank, j] = part
-        if length > least * size[j]:
-            R[:, rank], KR[:, rank], within[rank, j] = v / length, Kv / length, length
-            rank += 1
-    return R[:, :rank], across, within[:rank]
+    def pairs(self, W: Floats, some: Ints) -> tuple[Floats, Floats, Floats]:
+        """μ̂ (n, p), descending, a (n, k, p) and u_S (n, s, p), of unit K-norm, at ``some``."""
+        inverse, mass = self.inverse[some], self.mass[some]
+        k, e, s = W.shape[1], inverse.shape[1], mass.shape[1]
+        n, low = len(mass), np.swapaxes(inverse, 1, 2)
+        M = np.empty((n, k + s, k + s))
+        M[:, :k, :k], M[:, k:, k:] = W.T @ (self.M @ W), mass
+        M[:, :k, k:] = (W.T @ self.A) @ self.drive[some]
+        M[:, k:, :k] = np.swapaxes(M[:, :k, k:], 1, 2)
+        E, F = slice(0, k + e), slice(k + e, k + s)
+        coupling, M_c = condense_blocks(M[:, E, E].copy(), M[:, F, E], M[:, F, F])
+        M_c[:, k:] = inverse @ M_c[:, k:]
+        M_c[:, :, k:] = M_c[:, :, k:] @ low
+        mu, v = np.linalg.eigh(M_c)
+        mu, v = mu[:, ::-1], v[:, :, ::-1].copy()
+        v[:, k:] = low @ v[:, k:]
+        return mu, v[:, :k], np.concatenate([v[:, k:], -coupling @ v], axis=1)
 
 
-# --- The samples on that basis
-
-
-@dataclass(frozen=True, eq=False)
-class Outer:
-    """Arrays over n samples of what differs; S with its f free coordinates last."""
-
-    inverse: Floats  # (n, s − f, s − f): L⁻¹ with Σ = L Lᵀ
-    mass: Floats  # (n, s, s): M_SS after the change of unknowns
-    drive: Floats  # (n, g, s): M_IS after it is A drive, with A (n_I, g) the same at all samples
-    b: Floats  # (n, q0, s) in the first coordinates of Q: K_II⁻¹ A drive
-    follow: Floats  # (n, h, s): u_I = w − X follow u_S
-
-    def at(self, some: Ints) -> Outer:
-        """The arrays of some samples."""
-        return Outer(*(getattr(self, each.name)[some] for each in fields(self)))
-
-
-def _prepared(
-    pencil: Pencil, split: Split, theta: Floats, empty: Inner
-) -> tuple[Inner, Outer, Floats, Floats] | None:
-    """T without vectors W yet, the samples, X (n_I, h) with K_II⁻¹ K_IS = X follow, and A.
-
-    None where b has too many columns. Raises MechanismError where Σ is indefinite.
-    """
+def _galerkin(pencil: Pencil, split: Split, theta: Floats) -> Galerkin | None:
+    """None where K_II is not definite; raises MechanismError where Σ is not."""
+    K, M = (
+        principal(pencil, w @ theta[:, 0], split.inner) for w in (pencil.stiffness, pencil.mass)
+    )
+    factor = definite_factor(K)
+    if factor is None:
+        return None
     K_SS, M_SS = (_outer_block(pencil, split, w, theta) for w in (pencil.stiffness, pencil.mass))
     stiff, follow = _coupling(pencil, split, pencil.stiffness, theta)
     heavy, push = _coupling(pencil, split, pencil.mass, theta)
-    h = stiff.shape[1]
-    if h + heavy.shape[1] > MOST_VECTORS:
-        return None
-    X = empty.solve(stiff)
-    MX = empty.M @ X
-    A, drive = np.hstack([MX, heavy]), np.concatenate([-follow, push], axis=1)
-    inner, inputs = empty.spanning(empty.solve(A))
-    down = np.swapaxes(follow, 1, 2)
+    X = factor.solve(stiff) if stiff.size else stiff
+    MX, down = M.T @ X, np.swapaxes(follow, 1, 2)
     sigma = K_SS - down @ (stiff.T @ X) @ follow
     cross = np.swapaxes(push, 1, 2) @ (heavy.T @ X) @ follow
     mass = M_SS - cross - np.swapaxes(cross, 1, 2) + down @ (X.T @ MX) @ follow
     elastic = slice(0, len(split.outer) - len(pencil.rigid))
     inverse = inverse_factor(sigma[:, elastic, elastic])
-    return inner, Outer(inverse, mass, drive, inputs @ drive, follow), X, A
+    A, drive = np.hstack([MX, heavy]), np.concatenate([-follow, push], axis=1)
+    return Galerkin(K.T, M.T, factor, X, follow, A, drive, inverse, mass)
 
 
-@dataclass(frozen=True, eq=False)
-class RitzPairs:
-    """Ritz pairs of n samples, μ̂ descending: (n, p), a (n, k, p), u_S (n, s, p)."""
-
-    mu: Floats
-    a: Floats
-    u: Floats
-
-
-def _ritz(inner: Inner, outer: Outer, A: Floats) -> RitzPairs:
-    """z = [a; u_S] has unit K-norm."""
-    k, e, s = inner.W.shape[1], outer.inverse.shape[1], outer.mass.shape[1]
-    n, low = len(outer.mass), np.swapaxes(outer.inverse, 1, 2)
-    M = np.empty((n, k + s, k + s))
-    M[:, :k, :k], M[:, k:, k:] = inner.mass, outer.mass
-    M[:, :k, k:] = (inner.vectors.T @ A) @ outer.drive
-    M[:, k:, :k] = np.swapaxes(M[:, :k, k:], 1, 2)
-    E, F = slice(0, k + e), slice(k + e, k + s)
-    coupling, M_c = condense_blocks(M[:, E, E].copy(), M[:, F, E], M[:, F, F])
-    M_c[:, k:] = outer.inverse @ M_c[:, k:]
-    M_c[:, :, k:] = M_c[:, :, k:] @ low
-    mu, v = np.linalg.eigh(M_c)
-    mu, v = mu[:, ::-1], v[:, :, ::-1].copy()
-    v[:, k:] = low @ v[:, k:]
-    return RitzPairs(mu, v[:, :k], np.concatenate([v[:, k:], -coupling @ v], axis=1))
-
-
-def _residuals(inner: Inner, outer: Outer, pairs: RitzPairs) -> Floats:
-    """ρ (n, q, p) in coordinates of Q: their length is that in K_II.
-
-    μ̂ W a cancels what W has of the rest: in a fine mesh down to the round-off of K itself, by
-    which T is not self-adjoint, and no vector would make it smaller.
-    """
-    rho = inner.TW @ pairs.a
-    rho[:, : outer.b.shape[1]] += outer.b @ pairs.u
-    return np.asarray(rho - inner.W @ (inner.W.T @ rho))
-
-
-# --- The whole
-
-# Samples that repay what they share, at 300 to 10⁴ unknowns (benchmarks/many_samples.py).
-FEWEST = 20
-CONVERGED = 1e-9  # |ρ|/μ̂: the vectors' error; that of λ is of second order in it
-MOST_VECTORS = 250  # of W: beyond, a sample's own matrices are as large as a sparse solve
-BESIDE = 4  # modes above the highest wanted one that the cut may take in
-NEGLIGIBLE = 1e-12  # relative error of λ: below the round-off of any solver
+def _converged(one: Galerkin, count: int) -> tuple[Floats, tuple[Floats, Floats, Floats]] | None:
+    """W grown until all residuals are small, and the pairs; None if that fails."""
+    n, R = len(one.mass), one.solve(one.A)  # R: b's columns and T W, less what W holds
+    start, every = np.random.default_rng(0).standard_normal((len(R), count)), np.arange(n)
+    W = one.grown(R[:, :0], one.solve(one.M @ start))
+    some = np.unique(np.linspace(0, n - 1, min(n, AT_FIRST)).round().astype(int))
+    known = 0
+    for _ in range(25):
+        mu, a, u = found = one.pairs(W, some)
+        if mu.shape[1] < count or (mu[:, :count] <= 0.0).any():
+            return None  # so few have mass
+        new = W[:, known:]
+        R -= new @ ((one.K @ new).T @ R)
+        image = one.solve(one.M @ new)
+        R, known = np.hstack([R, image - W @ (W.T @ (one.K @ image))]), W.shape[1]
+        p = count if len(some) == n else min(count + BESIDE, mu.shape[1])
+        c = np.concatenate([one.drive[some] @ u, a], axis=1)[..., :p].swapaxes(0, 1)
+        scale = np.maximum(mu[:, :p], mu[:, [count - 1]])
+        rho = R @ (c / scale).reshape(len(c), -1)
+        K_rho = one.K @ rho
+        off = np.sqrt(np.maximum((rho * K_rho).sum(axis=0), 0.0)).reshape(-1, p)
+        # pairs beyond count as far as what they lack could bring them before the last
+        open_ = ((off > CONVERGED) & (mu[:, :p] / scale + 2.0 * off**2 >= 1.0)).ravel()
+        if open_.any():
+            sizes, turns = np.linalg.eigh(rho[:, open_].T @ K_rho[:, open_])
+            # what is below a fiftieth of the largest is left to later rounds, as more than 24 are
+            new = rho[:, open_] @ turns[:, sizes > 4e-4 * sizes[-1]][:, -24:]
+        elif len(some) < n:
+            some = every
+            continue
+        else:
+            nu = 0.5 * float(mu[:, count - 1].min())
+            inside = one.above(nu)
+            if inside == (np.linalg.eigvalsh(W.T @ (one.M @ W)) > nu).sum():
+                return W, found
+            if not 0 < inside <= 64:
+                return None
+            new = one.modes(inside)
+        if W.shape[1] + new.shape[1] > MOST_VECTORS:
+            return None
+        W = one.grown(W, new)
+    return None
 
 
 def solve_large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
-    """Modes at θ (n_theta, n_samples): together where that is proved, the others one by one."""
+    """Modes at θ (n_theta, n_samples): together where that works, else one by one."""
     parts = range(0, theta.shape[1], 256)  # so many at once, for memory
     found = [_large(pencil, theta[:, i : i + 256], count, vectors) for i in parts]
     return Modes(np.concatenate([f.lam for f in found]), np.concatenate([f.phi for f in found]))
@@ -408,151 +319,41 @@ def solve_large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Mod
 
 def _large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     together = solve_together(pencil, theta, count, vectors) if theta.shape[1] >= FEWEST else None
-    if together is None:
-        return solve_sparse(pencil, theta, count, vectors)
-    modes, sure = together
-    if not sure.all():
-        alone = solve_sparse(pencil, theta[:, ~sure], count, vectors)
-        modes.lam[~sure], modes.phi[~sure] = alone.lam, alone.phi
-    return modes
+    return together or solve_sparse(pencil, theta, count, vectors)
 
 
-def solve_together(
-    pencil: Pencil, theta: Floats, count: int, vectors: bool
-) -> tuple[Modes, Flags] | None:
-    """Modes at θ (n_theta, n_samples), and at which samples they are proved; None if at none.
-
-    Where they are not proved the rows mean nothing.
-    """
+def solve_together(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes | None:
+    """Modes at θ (n_theta, n_samples); None where they have to be found one by one."""
     varying = varying_unknowns(pencil, theta)
     if varying is None:
         return None
     split = _split(pencil, varying)
-    K, M = (
-        principal(pencil, w @ theta[:, 0], split.inner) for w in (pencil.stiffness, pencil.mass)
-    )
-    factor = definite_factor(K)
-    if factor is None:
-        return None
     try:
-        prepared = _prepared(pencil, split, theta, Inner.empty(K, M, factor))
-        if prepared is None:
-            return None
-        inner, outer, X, A = prepared
-        solved = _converged(inner, outer, A, count)
-    except (MechanismError, AccuracyError):
+        one = _galerkin(pencil, split, theta)
+        solved = None if one is None else _converged(one, count)
+    except (MechanismError, AccuracyError, linalg.ArpackError):
         return None  # of one sample, which is named where it is solved by itself
-    if solved is None:
+    if one is None or solved is None:
         return None
-    inner, pairs, sure = solved
-    shapes = []
-    for part, phi in _shapes(pencil, split, inner, outer, X, pairs, count):
-        sure[part] &= _have_mass(pencil, theta[:, part], phi, pairs.mu[part, :count])
+    W, (mu, a, u) = solved
+    shapes, columns = [], np.hstack([W, one.X])
+    step = max(1, 2_000_000 // (pencil.n_dof * count))  # 16 MB of shapes at once
+    for i in range(0, len(mu), step):
+        part, scale = slice(i, i + step), 1.0 / np.sqrt(mu[i : i + step, None, :count])
+        moved = np.concatenate([a[part], -one.follow[part] @ u[part]], axis=1)[..., :count] * scale
+        phi = np.empty((len(moved), pencil.n_dof, count))
+        phi[:, split.inner], phi[:, split.outer] = columns @ moved, u[part, :, :count] * scale
+        if not _have_mass(pencil, theta[:, part], phi, mu[part, :count]):
+            return None
         if vectors:
             shapes.append(positive_at_top(phi))
-    lam = 1.0 / pairs.mu[:, :count]
-    return Modes(lam, np.concatenate(shapes) if vectors else np.zeros((len(lam), 0, count))), sure
-
-
-def _converged(
-    inner: Inner, outer: Outer, A: Floats, count: int
-) -> tuple[Inner, RitzPairs, Flags] | None:
-    """W grown until all residuals are small and the modes are proved; None if that fails."""
-    n = len(outer.mass)
-    start = np.random.default_rng(0).standard_normal((inner.K.shape[0], count))
-    inner, seeds = inner.spanning(inner.solve(inner.M @ start))
-    inner = inner.with_vectors(seeds)
-    every = np.arange(n)
-    some = np.unique(np.linspace(0, n - 1, min(n, 16)).round().astype(int))  # W is for these first
-    looked_inside = False
-    for _ in range(25):
-        part = outer.at(some)
-        pairs = _ritz(inner, part, A)
-        if pairs.mu.shape[1] < count or (pairs.mu[:, :count] <= 0.0).any():
-            return None  # so few have mass
-        cut = _cuts(pairs.mu, count)
-        rho = _residuals(inner, part, pairs)
-        counts = np.arange(pairs.mu.shape[1]) < cut[:, None]
-        relative = np.where(counts[:, None], rho / pairs.mu[:, None], 0.0)
-        if np.sqrt(np.square(relative).sum(axis=1).max(initial=0.0)) > CONVERGED:
-            leftover = relative.transpose(1, 0, 2).reshape(len(inner.W), -1)
-            U, size, _ = np.linalg.svd(leftover, full_matrices=False)
-            # what is below a fiftieth of the largest is left to later rounds, as more than 24 are
-            new = U[:, : min(int((size > 0.02 * size[0]).sum()), 24)]
-        elif len(some) < n:
-            some = every
-            continue
-        else:
-            nu = 0.5 * float(np.take_along_axis(pairs.mu, cut[:, None] - 1, axis=1).min())
-            outside = inner.largest_outside(nu)
-            if outside is not None:
-                return inner, pairs, proved(pairs.mu, rho, cut, outside)
-            inside = inner.above(nu)
-            if looked_inside or not 0 < inside <= 64:
-                return None
-            looked_inside = True
-            inner, new = inner.spanning(inner.modes(inside))
-        if inner.W.shape[1] + new.shape[1] > MOST_VECTORS:
-            return None
-        inner = inner.with_vectors(new)
-    return None
-
-
-def _cuts(mu: Floats, count: int) -> Ints:
-    """Number c (n,) ≥ count of pairs of each sample that count: the next one lies apart."""
-    beyond = np.hstack([mu, np.zeros((len(mu), 1))])
-    last = min(count + BESIDE, mu.shape[1])
-    ratio = beyond[:, count : last + 1] / mu[:, count - 1 : last]
-    apart = ratio <= 0.8  # no need to look further
-    return np.asarray(
-        count + np.where(apart.any(axis=1), apart.argmax(axis=1), ratio.argmin(axis=1))
+    return Modes(
+        1.0 / mu[:, :count], np.concatenate(shapes) if vectors else np.zeros((len(mu), 0, count))
     )
 
 
-def proved(mu: Floats, rho: Floats, cut: Ints, nu: float) -> Flags:
-    """True where the first ``cut`` pairs are those of the lowest modes; ν' is ``nu``."""
-    sure = np.zeros(len(mu), dtype=bool)
-    for k, c in enumerate(cut):
-        last, beyond = mu[k, c - 1], mu[k, c:]
-        x = 0.5 * (last + max(beyond.max(initial=0.0), nu))
-        if x >= last:
-            continue
-        size = np.square(rho[k, :, :c]).sum(axis=0) / mu[k, :c]
-        gram = rho[k, :, c:].T @ rho[k, :, c:]
-        outside = np.linalg.eigvalsh(gram / (x - nu) + np.diag(beyond))
-        sure[k] = outside.max(initial=0.0) < x and c * size.max() < NEGLIGIBLE * (last - x)
-    return sure
-
-
-# --- The modes of the whole model
-
-
-def _shapes(
-    pencil: Pencil,
-    split: Split,
-    inner: Inner,
-    outer: Outer,
-    X: Floats,
-    pairs: RitzPairs,
-    count: int,
-) -> Iterator[tuple[slice, Floats]]:
-    """φ (n, n_dof, count) with φᵀMφ = 1, of some samples at a time."""
-    columns = np.hstack([inner.vectors, X])
-    step = max(1, 2_000_000 // (pencil.n_dof * count))  # 16 MB of shapes at once
-    for i in range(0, len(pairs.mu), step):
-        part = slice(i, i + step)
-        scale = 1.0 / np.sqrt(pairs.mu[part, None, :count])
-        a, u = pairs.a[part, :, :count] * scale, pairs.u[part, :, :count] * scale
-        moved = np.concatenate([a, -outer.follow[part] @ u], axis=1).transpose(1, 0, 2)
-        inside = columns @ moved.reshape(columns.shape[1], -1)
-        phi = np.empty((len(u), pencil.n_dof, count))
-        phi[:, split.inner] = inside.reshape(-1, len(u), count).transpose(1, 0, 2)
-        phi[:, split.outer] = u
-        yield part, phi
-
-
-def _have_mass(pencil: Pencil, theta: Floats, phi: Floats, mu: Floats) -> Flags:
-    """True at the samples (n,) where no μ may be round-off."""
+def _have_mass(pencil: Pencil, theta: Floats, phi: Floats, mu: Floats) -> bool:
+    """True where no μ of the samples (n,) may be round-off."""
     E, F = pencil.elastic, pencil.rigid
     coupling = np.zeros((len(phi), len(F), len(E)))
     if len(F):
@@ -560,4 +361,4 @@ def _have_mass(pencil: Pencil, theta: Floats, phi: Floats, mu: Floats) -> Flags:
         coupling = np.asarray(np.linalg.solve(M_F[:, :, F], M_F[:, :, E]))
     sizes = mass_sizes(pencil, theta, coupling)
     noise = mu * np.einsum("ki,kic->kc", sizes, np.square(phi[:, E]))
-    return np.asarray(~may_be_roundoff(mu, noise, len(E), margin=1.0).any(axis=1))
+    return not may_be_roundoff(mu, noise, len(E), margin=1.0).any()
