@@ -28,11 +28,10 @@ from scipy import sparse
 from scipy.linalg import lapack
 
 from eigassign.errors import MechanismError, UsageError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, principal
 from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import NO_MASS
-from eigassign.modal.exact.sparse import principal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

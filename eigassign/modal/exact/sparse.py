@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import (
     factorise,
     has_positive_pivots,
@@ -75,35 +74,3 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     else:
         raise MissingMassError(int(sure.argmin()))
     return lam, positive_at_top(phi)
-
-
-# --- Symmetric sparse matrices from the non-zeros of the pencil, without sorting or duplicates
-
-Ints = NDArray[np.intp]
-
-
-def principal(pencil: Pencil, data: Floats, dofs: Ints) -> sparse.csc_array:
-    """The rows and columns ``dofs`` (ascending) of a symmetric matrix from its non-zeros.
-
-    The pencil's pattern runs row by row; read column by column it is the same symmetric matrix.
-    Entries that happen to be zero are left out: they would only cause fill-in.
-    """
-    position = np.full(pencil.n_dof, -1, dtype=np.int32)
-    position[dofs] = np.arange(len(dofs), dtype=np.int32)
-    rows, columns = position[pencil.rows], position[pencil.columns]
-    keep = (rows >= 0) & (columns >= 0) & (data != 0.0)
-    counts = np.bincount(rows[keep], minlength=len(dofs))
-    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    shape = (len(dofs), len(dofs))
-    return sparse.csc_array((data[keep], columns[keep], starts), shape=shape)
-
-
-def block(pencil: Pencil, data: Floats, rows: Ints) -> Floats:
-    """The rows ``rows`` of a matrix, dense: (len(rows), n_dof)."""
-    position = np.full(pencil.n_dof, -1, dtype=np.intp)
-    position[rows] = np.arange(len(rows))
-    slot = position[pencil.rows]
-    keep = slot >= 0
-    out = np.zeros((len(rows), pencil.n_dof))
-    out[slot[keep], pencil.columns[keep]] = data[keep]
-    return out

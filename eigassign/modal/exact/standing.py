@@ -19,13 +19,12 @@ from scipy.linalg import eigh, lapack
 from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, MechanismError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, principal
 from eigassign.mechanism.elements.craig_bampton import (
     definite_factor,
     factorise,
     has_positive_pivots,
 )
-from eigassign.modal.exact.sparse import principal
 
 Floats = NDArray[np.float64]
 Label = Callable[[int], str]

@@ -29,7 +29,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import definite_factor, largest_modes
 from eigassign.modal.exact.condensation import (
     Modes,
@@ -40,7 +40,7 @@ from eigassign.modal.exact.condensation import (
 )
 from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
-from eigassign.modal.exact.sparse import block, principal, solve_sparse
+from eigassign.modal.exact.sparse import solve_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -29,9 +29,8 @@ from scipy.linalg import blas, lapack
 from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import factorise, lu
-from eigassign.modal.exact.sparse import block, principal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
