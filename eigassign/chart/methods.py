@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from eigassign.chart.question import Bench, Points
-from eigassign.modal.exact.condensation import condense
+from eigassign.modal.exact.dense import condense
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce

@@ -34,8 +34,7 @@ from eigassign.brief import counted, of_modes
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil, theta_at, theta_slopes
 from eigassign.modal.arguments import chunks, mode_numbers, samples, whole_within
-from eigassign.modal.exact.condensation import condense_blocks
-from eigassign.modal.exact.dense import inverse_factor
+from eigassign.modal.exact.dense import condense_blocks, inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.projection import project
 from eigassign.modal.taylor.vectors import vectors_to_order

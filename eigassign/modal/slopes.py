@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import chunks, solve_blocks
-from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import lowest_modes
 
 Floats = NDArray[np.float64]

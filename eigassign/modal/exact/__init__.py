@@ -2,8 +2,7 @@
 
 In reading order:
 
-    condensation  the modes as data, the condensed mass M_c, and how many modes have mass
-    dense         small pencils: many samples at once, or one through LAPACK
+    dense         the modes as data, small pencils, and how many modes have mass
     sparse        large pencils: Lanczos with one sparse factorisation
     standing      poses that fall under the weight, and loads beyond buckling
     inertia       how many modes lie below a frequency, by pivots alone

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import lowest_modes
 
 Floats = NDArray[np.float64]

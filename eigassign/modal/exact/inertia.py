@@ -31,7 +31,7 @@ from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil, principal
 from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.modal.arguments import chunks
-from eigassign.modal.exact.condensation import NO_MASS
+from eigassign.modal.exact.dense import NO_MASS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

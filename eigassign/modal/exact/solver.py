@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from eigassign.errors import MechanismError, MissingMassError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import whole
-from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.exact.dense import solve_dense
+from eigassign.modal.exact.dense import Modes, solve_dense
 from eigassign.modal.exact.standing import require_hanging, require_standing
 from eigassign.modal.exact.substructure import solve_large
 

@@ -13,7 +13,7 @@ from eigassign.mechanism.elements.craig_bampton import (
     has_positive_pivots,
     largest_modes,
 )
-from eigassign.modal.exact.condensation import (
+from eigassign.modal.exact.dense import (
     Modes,
     mass_sizes,
     may_be_roundoff,

@@ -31,14 +31,14 @@ from scipy.sparse import linalg
 from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import definite_factor, largest_modes
-from eigassign.modal.exact.condensation import (
+from eigassign.modal.exact.dense import (
     Modes,
     condense_blocks,
+    inverse_factor,
     mass_sizes,
     may_be_roundoff,
     positive_at_top,
 )
-from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
 from eigassign.modal.exact.sparse import solve_sparse
 

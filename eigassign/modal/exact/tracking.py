@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from eigassign.errors import Candidate, LostModeError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import chunks, solve_blocks
-from eigassign.modal.exact.condensation import block
+from eigassign.modal.exact.dense import block
 from eigassign.modal.exact.solver import lowest_modes
 
 Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import CaseError, LostModeError
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.tracking import (
     COINCIDENT,
     EXTRA,

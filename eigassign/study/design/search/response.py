@@ -32,7 +32,7 @@ from eigassign.assignment.requirements.requirement import Frequencies, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.dense import Modes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
