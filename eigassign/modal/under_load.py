@@ -31,8 +31,8 @@ from eigassign.mechanism.assembly.mode_shapes import shapes
 from eigassign.mechanism.assembly.sagged import sagged
 from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.kinematics.parameters import is_imported
+from eigassign.modal.exact.inertia import buckling_share
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.exact.standing import buckling_share
 from eigassign.modal.finer_meshes import standing_frequencies
 from eigassign.modal.model import Model
 

@@ -4,8 +4,7 @@ In reading order:
 
     dense         the modes as data, small pencils, and how many modes have mass
     sparse        large pencils: Lanczos with one sparse factorisation
-    standing      poses that fall under the weight, and loads beyond buckling
-    inertia       how many modes lie below a frequency, by pivots alone
+    inertia       modes below a frequency, poses that fall or buckle: by pivots alone
     substructure  many samples of a large pencil together, and proof that no mode was missed
     solver        the dispatcher: dense or sparse, and as many modes as there are
     roundoff      how many digits of a frequency the matrices themselves hold
