@@ -20,7 +20,7 @@ from eigassign.errors import LIMP, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.forces import Forces, forces
 from eigassign.modal.arguments import chunks, solve_blocks
-from eigassign.modal.exact.substructure import solve_large_statics
+from eigassign.modal.exact.large import solve_large_statics
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import works_changed
 

@@ -18,7 +18,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import whole
 from eigassign.modal.exact.dense import Modes, solve_dense
 from eigassign.modal.exact.inertia import require_hanging, require_standing
-from eigassign.modal.exact.substructure import solve_large
+from eigassign.modal.exact.large import solve_large
 
 Floats = NDArray[np.float64]
 
