@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from eigassign.chart.results import Asked, Timing
 from eigassign.errors import CaseError
-from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import rounding_error
 from eigassign.study.planning import at_corners, corners, joint_map, scattered
 from eigassign.study.scene import Scene
 

@@ -4,7 +4,6 @@ In reading order:
 
     arguments    samples of (q, y), modes and orders as callers give them, checked
     exact        exact elastic modes
-    slopes       slopes of exact eigenvalues in coordinates and design
     projection   the pencil's terms projected on a basis
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced      Ritz on the Taylor vectors
@@ -25,17 +24,14 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "adaptive_order": "MARGIN raise_order",
-        "exact.clusters": "clusters",
         "exact.inertia": "count_below",
-        "exact.roundoff": "rounding_error",
-        "exact.solver": "eigenvalues lowest_modes modes",
+        "exact.solver": "clusters eigenvalues exact_slopes lowest_modes modes rounding_error",
         "exact.large": "solve_large solve_sparse solve_together",
         "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
         "expansion": "Expansion NearestExpansion expand",
         "model": "Model",
         "projection": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
-        "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "statics": "Flexibility compliances sags",
         "storage": "expansion_arrays tree_arrays",

@@ -20,7 +20,7 @@ from eigassign.brief import Brief, counted, cut, of_modes
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
-from eigassign.modal.exact.clusters import CLUSTER_GAP
+from eigassign.modal.exact.solver import CLUSTER_GAP
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.vectors import (
     LocalSpace,

@@ -35,9 +35,8 @@ from eigassign.mechanism.kinematics.forward import Kinematics, LinkFrames
 from eigassign.mechanism.kinematics.parameters import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.inertia import require_standing
-from eigassign.modal.exact.solver import eigenvalues, modes
+from eigassign.modal.exact.solver import eigenvalues, exact_slopes, modes
 from eigassign.modal.finer_meshes import FINE, mesh_error, standing_frequencies
-from eigassign.modal.slopes import exact_slopes
 from eigassign.modal.solid_error import SolidLinks, solid_error
 
 Floats = NDArray[np.float64]

@@ -45,9 +45,14 @@ from eigassign.mechanism.assembly.dynamics.under_load import StiffnessUnderLoad
 from eigassign.mechanism.assembly.dynamics.velocity_terms import VelocityTerms
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Rates
-from eigassign.modal.exact.clusters import CLUSTER_GAP, LEAST_GAP, clusters, whole_clusters
 from eigassign.modal.exact.dense import Modes
-from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.exact.solver import (
+    CLUSTER_GAP,
+    LEAST_GAP,
+    clusters,
+    lowest_modes,
+    whole_clusters,
+)
 from eigassign.modal.taylor.bordered import Solve
 from eigassign.modal.taylor.rayleigh import inverse_root, quadratics
 from eigassign.modal.taylor.recursion import expand_subspace

@@ -21,8 +21,8 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.forces import Forces, forces
 from eigassign.modal.arguments import chunks, solve_blocks
 from eigassign.modal.exact.large import solve_large_statics
+from eigassign.modal.exact.solver import works_changed
 from eigassign.modal.model import Model
-from eigassign.modal.slopes import works_changed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

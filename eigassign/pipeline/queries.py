@@ -25,7 +25,7 @@ from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.superelement import part_lines
 from eigassign.mechanism.kinematics.parameters import is_imported, resting_pose, written_loads
-from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import rounding_error
 from eigassign.output.figures import mechanism
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.reports import page as report

@@ -5,8 +5,6 @@ In reading order:
     dense     the modes as data, small pencils, and how many modes have mass
     large     large pencils: one sample by Lanczos, many samples together
     inertia   modes below a frequency, poses that fall or buckle: by pivots alone
-    solver    the dispatcher: dense or sparse, and as many modes as there are
-    roundoff  how many digits of a frequency the matrices themselves hold
-    clusters  neighbouring modes that are expanded together
+    solver    the modes of any pencil, their slopes, round-off and clusters
     tracking  a mode followed by its shape, along a path or from where it is named
 """

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
+from eigassign.modal.exact.solver import CLUSTER_GAP, whole_clusters
 from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.algebra import monomials_of, multiply

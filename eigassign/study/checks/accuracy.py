@@ -17,7 +17,7 @@ from eigassign.facts import about
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
-from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import rounding_error
 from eigassign.modal.model import Model
 from eigassign.study.checks.weight import WeightStudy, study_weight
 from eigassign.study.planning import poses_at

@@ -26,8 +26,8 @@ from eigassign.assignment.exact.sequential import PAYS, unseen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy_unit
 from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
+from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
-from eigassign.modal.slopes import in_hz
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks.accuracy import WEIGHT_POSES, judged_poses
 from eigassign.study.checks.weight import study_weight

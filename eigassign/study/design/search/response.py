@@ -33,9 +33,9 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.dense import Modes
+from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
 from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
 from eigassign.study.scene import OTHERS, Scene
 
