@@ -2,19 +2,18 @@
 
 In reading order:
 
-    arguments    samples of (q, y), modes and orders as callers give them, checked
-    exact        exact elastic modes
-    projection   the pencil's terms projected on a basis
-    taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
-    reduced      Ritz on the Taylor vectors
-    expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9))
-    storage      expansions as plain arrays
-    finer_meshes  what a mesh leaves out, measured by finer ones
-    solid_error  what meshes of solids leave out, estimated
-    model        the model of a case, as notebooks meet it
-    under_load   what the weight changes by its forces, and by bending the links
-    statics      what gives way under forces at nodes and the weight, with slopes
-    slow_motion  how much the neglected motion would move the frequencies
+    arguments       samples of (q, y), modes and orders as callers give them, checked
+    exact           exact elastic modes
+    projection      the pencil's terms projected on a basis
+    taylor          Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
+    reduced         Ritz on the Taylor vectors
+    expansion       the Taylor polynomial of eigenvalues (eqs. (7)-(9))
+    storage         expansions as plain arrays
+    mesh_error      what meshes of beams and solids leave out
+    model           the model of a case, as notebooks meet it
+    under_load      what the weight changes by its forces, and by bending the links
+    statics         what gives way under forces at nodes and the weight, with slopes
+    slow_motion     how much the neglected motion would move the frequencies
     adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
 """
 

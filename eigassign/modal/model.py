@@ -36,8 +36,13 @@ from eigassign.mechanism.kinematics.parameters import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.inertia import require_standing
 from eigassign.modal.exact.solver import eigenvalues, exact_slopes, modes
-from eigassign.modal.finer_meshes import FINE, mesh_error, standing_frequencies
-from eigassign.modal.solid_error import SolidLinks, solid_error
+from eigassign.modal.mesh_error import (
+    FINE,
+    SolidLinks,
+    mesh_error,
+    solid_error,
+    standing_frequencies,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -33,7 +33,7 @@ from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.kinematics.parameters import is_imported
 from eigassign.modal.exact.inertia import buckling_share
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.finer_meshes import standing_frequencies
+from eigassign.modal.mesh_error import standing_frequencies
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]

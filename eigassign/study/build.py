@@ -36,8 +36,8 @@ from eigassign.mechanism.trajectory.trajectory import (
     Trajectory,
     build_trajectory,
 )
+from eigassign.modal.mesh_error import solid_links
 from eigassign.modal.model import Model
-from eigassign.modal.solid_error import solid_links
 
 Floats = NDArray[np.float64]
 

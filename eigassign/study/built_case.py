@@ -30,7 +30,7 @@ from eigassign.mechanism.kinematics.parameters import initial_design, is_importe
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.solver import rounding_error
-from eigassign.modal.finer_meshes import standing_frequencies
+from eigassign.modal.mesh_error import standing_frequencies
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories, located
 from eigassign.study.planning import (

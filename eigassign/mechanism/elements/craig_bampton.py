@@ -10,7 +10,7 @@ what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ d
 rigid-body motion is in the span at every y. Under gravity that of an imported part holds its sag as
 well, K_ii⁻¹ (M r)_i of translations r: the weight's stiffness, which joins M r to the nodes
 (`assembly.loads.second_order`), is nothing then on what is left out. What that changes is measured
-against the whole links (`modal.finer_meshes`).
+against the whole links (`modal.mesh_error`).
 
 The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,
 as of rotations without inertia) do no harm.
