@@ -11,8 +11,7 @@ In reading order:
     storage         expansions as plain arrays
     mesh_error      what meshes of beams and solids leave out
     model           the model of a case, as notebooks meet it
-    under_load      what the weight changes by its forces, and by bending the links
-    statics         what gives way under forces at nodes and the weight, with slopes
+    under_load      what the weight does to frequencies, and what gives way under forces
     slow_motion     how much the neglected motion would move the frequencies
     adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
 """
@@ -32,9 +31,11 @@ __all__, __getattr__, __dir__ = face(
         "projection": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
-        "statics": "Flexibility compliances sags",
         "storage": "expansion_arrays tree_arrays",
-        "under_load": "WeightChanges buckling sag_changes sag_of_nodes strut_error weight_changes",
+        "under_load": (
+            "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "
+            "sags strut_error weight_changes"
+        ),
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.recursion": "expand_subspace",
     },

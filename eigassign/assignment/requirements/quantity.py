@@ -31,7 +31,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
-from eigassign.modal.statics import Flexibility, compliances, sags
+from eigassign.modal.under_load import Flexibility, compliances, sags
 
 # Number and target, its rows, those of them along each trajectory, and the words for these
 Placed = tuple[int, StaticTarget, slice, tuple[tuple[str, slice], ...], str]
