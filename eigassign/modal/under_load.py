@@ -20,7 +20,7 @@ along it, of one against the weight the sag along it. With u_l and u_r what give
 
     ∂(lᵀ K⁻¹ r)/∂x = ∂lᵀ/∂x u_r + u_lᵀ ∂r/∂x − u_lᵀ ∂K/∂x u_r ,
 
-from one factorisation of K a sample; of a large pencil from one for all samples (`substructure`).
+from one factorisation of K a sample; of a large pencil from one for all samples.
 """
 
 from __future__ import annotations

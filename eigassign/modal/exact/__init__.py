@@ -3,8 +3,8 @@
 In reading order:
 
     dense     the modes as data, small pencils, and how many modes have mass
-    large     large pencils: one sample by Lanczos, many samples together
     inertia   modes below a frequency, poses that fall or buckle: by pivots alone
+    large     large pencils: one sample by Lanczos, many samples together
     solver    the modes of any pencil, their slopes, round-off and clusters
     tracking  a mode followed by its shape, along a path or from where it is named
 """

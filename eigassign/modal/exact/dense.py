@@ -12,7 +12,7 @@ pivots, down to pivots of c n ε. G has as many columns as modes have mass, and 
 of C⁻¹ T G, K_E = C Cᵀ, are √μ: stiff modes keep digits there that they have lost in μ.
 
 M_c z = μ K_E z with K_E = C Cᵀ becomes A v = μ v, A = C⁻¹ M_c C⁻ᵀ and z = C⁻ᵀ v. Where a μ may be
-round-off, the sample is solved anew by `massless`.
+round-off, the sample is solved anew by `modes_with_mass`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ count is right where δ cannot carry the eigenvalue nearest to zero (vector v, |
 
 which is looked at every time; small models take c n ε for the left factor. A count that is not
 certain is not given. That is where a frequency is as near to σ as the round-off that the matrices
-themselves hold (see `roundoff`).
+themselves hold (see `solver`).
 
 Of coordinates S that nothing but the weight holds, K_g,SS tells whether they hang or stand. With H
 all other elastic unknowns and

@@ -5,7 +5,7 @@ With E the elastic unknowns (u and held coordinates) and F the free coordinates,
     K_E φ_E = λ M_c φ_E,   M_c = M_EE − M_EF M_FF⁻¹ M_FE,   φ_F = −M_FF⁻¹ M_FE φ_E
 
 solved in the inverse form M_c z = μ K_E z, μ = 1/λ, so that massless unknowns (μ = 0) are harmless.
-What may be round-off instead of a mode with mass is settled by `massless`, for all solvers alike.
+What may be round-off instead of a mode with mass is settled by `modes_with_mass`.
 
 With a mode φ of K φ = λ M φ, φᵀMφ = 1, and the affine pencil K = Σ_j θ_j K_j, M = Σ_j θ_j M_j,
 
