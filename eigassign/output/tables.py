@@ -376,7 +376,7 @@ def _appendix(results: RunResults) -> Iterator[Table]:
 
 
 def _approximation(results: RunResults) -> Table:
-    """Worst error of both expansions, along the trajectory and over maps."""
+    """Worst error of both expansions, along the trajectory and everywhere."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error of the frequency, against exact solves."
     rows = []
@@ -384,9 +384,6 @@ def _approximation(results: RunResults) -> Table:
         places: list[tuple[str, Comparison]] = []
         if study.over_time is not None:
             places.append((f"along {results.along}, initial design", study.over_time))
-        for over in (study.over_q, study.over_design):
-            if over is not None:
-                places.append((f"over {' and '.join(over.names)}", over.values))
         for where, values in places:
             worst = (percent(values.worst_taylor), percent(values.worst_linearised))
             rows.append((f"mode {study.mode}", where, str(study.order), *worst))

@@ -26,7 +26,7 @@ __all__, __getattr__, __dir__ = face(
         "build": "build_model",
         "built_case": "BuiltCase load_case settle_model",
         "comparison": (
-            "BETWEEN DESIGN_BOX TRAJECTORY compare grid_over q_grid "
+            "BETWEEN DESIGN_BOX TRAJECTORY compare "
             "reach_warnings study_expansions study_modes unseen_points "
             "validate_expansions"
         ),
@@ -48,7 +48,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "results": (
             "AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
-            "Comparison DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
+            "Comparison DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "ModeRow RangeRow RunResults SensitivityRow SolverRow TargetAlong "
             "TargetStudy TrajectoryRow ValidationRow"

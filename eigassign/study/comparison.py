@@ -5,10 +5,9 @@ stated error = 1.25 max |f / f_exact − 1|
 at up to 64 corners of the bounds of the design, each at the poses farthest from the expansion
 points, and at 128 points of a fixed sequence between the samples and all over the bounds.
 
-Only the exact solves cost anything, so all points of one study are solved in one batch. A mode
-study holds what the figures show: along the trajectory, over the box of y, over the box of q. A
-validation compares at three places, all of which count against ``validation.max_error``, since
-together they are what an assignment relies on:
+A mode study holds what the figures show, along the trajectory. A validation compares at three
+places, all of which count against ``validation.max_error``, since together they are what an
+assignment relies on:
 
 trajectory
     every sample of the trajectory, or of each of several, at the initial design;
@@ -24,7 +23,7 @@ wrong. Where the full set was too large for the order asked for, only the linear
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -40,14 +39,11 @@ from eigassign.study.planning import (
     SCATTERED,
     at_corners,
     corners,
-    joint_map,
     scattered,
-    travelled,
     unseen,
 )
 from eigassign.study.results import (
     Comparison,
-    DesignMap,
     ModeStudy,
     ValidationRow,
     frozen,
@@ -100,86 +96,12 @@ def expansion_lines(scene: Scene, found: tuple[Comparison, ...]) -> tuple[str, .
     )
 
 
-# --- At given points, and on grids over one or two entries of x = (q, y)
-
-# Points along the axes of a map of one and of two variables, both ends included; odd, so that the
-# middle is one of them; fewer where a single exact solve takes milliseconds.
-AXES = {1: 61, 2: 13}
-COARSE = {1: 21, 2: 7}
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A tensor grid over one or two entries of x, the others as in ``x0``."""
-
-    entries: tuple[int, ...]
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    axes: tuple[Floats, ...]
-    x0: Floats
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points along each axis."""
-        return tuple(len(axis) for axis in self.axes)
-
-    def points(self) -> Floats:
-        """The points of the grid, (n, n_x), the last axis varying fastest."""
-        mesh = np.meshgrid(*self.axes, indexing="ij")
-        x = np.tile(self.x0, (mesh[0].size, 1))
-        for entry, values in zip(self.entries, mesh, strict=True):
-            x[:, entry] = values.ravel()
-        return x
-
-
-def grid_over(scene: Scene, entries: Sequence[int], lower: Floats, upper: Floats) -> Grid | None:
-    """A grid over the first two of ``entries`` of x that have room between their bounds; or None.
-
-    The others are as at the expansion point.
-    """
-    model, x0 = scene.model, scene.expansions.full.x0
-    chosen = [k for k in range(len(entries)) if upper[k] > lower[k]][:2]
-    if not chosen:
-        return None
-    names = (*model.q_names, *model.y_names)
-    units = (*scene.file.q_units, *scene.file.design_units)
-    count = (AXES if model.pencil.is_dense else COARSE)[len(chosen)]
-    return Grid(
-        tuple(entries[k] for k in chosen),
-        tuple(names[entries[k]] for k in chosen),
-        tuple(units[entries[k]] for k in chosen),
-        tuple(frozen(np.linspace(lower[k], upper[k], count)) for k in chosen),
-        x0,
-    )
-
-
-def map_over(
-    model: Model, expansions: Expansions, grid: Grid | None
-) -> tuple[tuple[DesignMap, ...], tuple[str, ...]]:
-    """One map for each expanded mode; none without a grid.
-
-    Nor where the mechanism has no pose or no modes at one of its points, with a note on that.
-    """
-    if grid is None:
-        return (), ()
-    try:
-        compared = compare(model, expansions, grid.points())
-    except EigassignError as error:
-        return (), (f"no map over {' and '.join(grid.names)}: {error}",)
-    found = []
-    for values in compared:
-        parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
-        shaped = Comparison(*(part.reshape(grid.shape) for part in parts))
-        found.append(DesignMap(grid.names, grid.units, grid.axes, shaped))
-    return tuple(found), ()
-
-
 # --- Mode studies: what the figures show
 
 
 @dataclass(frozen=True)
 class ModeStudies:
-    """One study for each expanded mode, and why there are maps that they lack."""
+    """One study for each expanded mode, and what they say in words."""
 
     rows: tuple[ModeStudy, ...] = ()
     notes: tuple[str, ...] = ()
@@ -190,49 +112,19 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
     if scene.expanded is None:
         return ModeStudies()
     model, expansions = scene.model, scene.expanded
-    everywhere, lines = _everywhere(scene)
+    everywhere, lines = tuple[Comparison, ...](), tuple[str, ...]()
+    try:
+        everywhere = study_expansions(scene)
+        lines = expansion_lines(scene, everywhere)
+    except EigassignError as error:  # a design has no pose or modes
+        lines = (f"the expansion is not measured all over the bounds: {error}",)
     over_time: tuple[Comparison, ...] = ()
     if scene.trajectory is not None:
         x = model.x(scene.trajectory.q, scene.initial)
         over_time = compare(model, expansions, x, initial_hz)
-    over_design, no_design = map_over(model, expansions, design_grid(scene))
-    over_q, no_q = map_over(model, expansions, q_grid(scene))
-    x0 = (expansions.full.q0, expansions.full.y0)
-    parts = zip_longest(expansions.modes, over_time, over_design, over_q, everywhere)
-    rows = tuple(ModeStudy(m, expansions.order, *x0, t, y, q, all_) for m, t, y, q, all_ in parts)
-    return ModeStudies(rows, (*lines, *no_design, *no_q))
-
-
-def _everywhere(scene: Scene) -> tuple[tuple[Comparison, ...], tuple[str, ...]]:
-    """`study_expansions` in numbers and words; no numbers where a design has no pose or modes."""
-    try:
-        found = study_expansions(scene)
-    except EigassignError as error:
-        return (), (f"the expansion is not measured all over the bounds: {error}",)
-    return found, expansion_lines(scene, found)
-
-
-def design_grid(scene: Scene) -> Grid | None:
-    """Over the bounds of the first two design parameters, at q0."""
-    n_q = len(scene.q0)
-    return grid_over(scene, range(n_q, n_q + len(scene.model.y_names)), *scene.bounds)
-
-
-def q_grid(scene: Scene) -> Grid | None:
-    """Over the range that the joint angles travel, at y0, for the first two that matter.
-
-    A joint angle s_i = Σ_k S_ik q_k on which frequencies depend is moved by the last coordinate in
-    its row of S, the others staying at q0; so an arm turning as a whole is not mapped.
-    """
-    S, q0 = joint_map(scene.model), scene.q0
-    if scene.trajectory is None or not len(S):
-        return None
-    s, s0 = travelled(scene.file, scene.trajectory) @ S.T, S @ q0
-    moved = [int(np.flatnonzero(row)[-1]) for row in S]
-    ends = np.array([s.min(axis=0), s.max(axis=0)]) - s0
-    ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
-    lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
-    return grid_over(scene, moved, lower, upper)
+    about = expansions.order, expansions.full.q0, expansions.full.y0
+    parts = zip_longest(expansions.modes, over_time, everywhere)
+    return ModeStudies(tuple(ModeStudy(mode, *about, *each) for mode, *each in parts), lines)
 
 
 # --- Validation: is the expansion good enough

@@ -121,18 +121,8 @@ def _worst(errors: Floats) -> float:
     return worst if worst == worst else float("inf")
 
 
-@dataclass(frozen=True, repr=False)
-class DesignMap(Brief):
-    """A comparison over one or two entries of x = (q, y), the others at the expansion point."""
-
-    names: tuple[str, ...]  # one or two
-    units: tuple[str, ...]
-    axes: tuple[Floats, ...]  # one or two grids, SI
-    values: Comparison  # (n_1,) or (n_1, n_2)
-
-
 _OF_EXPANSIONS = Fact(
-    "over_time, over_q, over_design, and with a margin everywhere; of each taylor and linearised",
+    "over_time, and with a margin everywhere; of each taylor and linearised",
     name="max_relative",
     may_lack=True,
 )
@@ -140,15 +130,13 @@ _OF_EXPANSIONS = Fact(
 
 @dataclass(frozen=True, repr=False)
 class ModeStudy(Brief):
-    """The accuracy of the expansion of one mode at (q0, y0), against exact (Figure 3)."""
+    """The accuracy of the expansion of one mode at (q0, y0), against exact."""
 
     mode: int
     order: int
     q0: Floats
     y0: Floats
     over_time: Unwritten[Comparison | None]  # (n_t,) along the trajectory, at the initial design
-    over_design: Unwritten[DesignMap | None]  # at q0
-    over_q: Unwritten[DesignMap | None] = None  # at y0, over the range the trajectory travels
     everywhere: Unwritten[Comparison | None] = None  # between the samples, all over the bounds
 
     @property
@@ -163,10 +151,8 @@ class ModeStudy(Brief):
         self,
     ) -> Annotated[Mapping[str, Mapping[str, Share] | None], _OF_EXPANSIONS]:
         """The largest errors of both expansions by where they were looked for."""
-        maps = {"over_q": self.over_q, "over_design": self.over_design}
-        found = {"over_time": self.over_time, **{k: m and m.values for k, m in maps.items()}}
-        worst = {where: one.worst if one else None for where, one in found.items()}
-        return {**worst, "everywhere": self.stated}
+        along = None if self.over_time is None else self.over_time.worst
+        return {"over_time": along, "everywhere": self.stated}
 
 
 @dataclass(frozen=True)

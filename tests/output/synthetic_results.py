@@ -11,7 +11,6 @@ from eigassign.study import (
     AssignmentRow,
     CaseRow,
     Comparison,
-    DesignMap,
     DesignRow,
     DrawnBody,
     DrawnJoint,
@@ -54,7 +53,7 @@ def make_results(
     time = np.linspace(0.0, 1.0, n_t) if n_t > 1 else np.zeros(n_t)
     names = tuple(f"{prefix}q{i + 1}" for i in range(n_q))
     q = _joint_motion(time, n_q)
-    studies = tuple(_study(i + 1, time, n_y, n_q, scale_hz, prefix, varies) for i in range(1))
+    studies = tuple(_study(i + 1, time, n_y, n_q, scale_hz, varies) for i in range(1))
     parts = (n_t,) if parts is None else parts
     targets = tuple(_target(i + 1, time, scale_hz, parts) for i in range(n_targets if n_t else 0))
     return RunResults(
@@ -165,9 +164,7 @@ def _compare(shift: Floats, other: Floats, scale: float, varies: bool) -> Compar
     )
 
 
-def _study(
-    mode: int, time: Floats, n_y: int, n_q: int, scale: float, prefix: str, varies: bool
-) -> ModeStudy:
+def _study(mode: int, time: Floats, n_y: int, n_q: int, scale: float, varies: bool) -> ModeStudy:
     angle = 2.0 * np.pi * time
     over_time = _compare(np.sin(angle), np.cos(angle), scale, varies) if time.size else None
     return ModeStudy(
@@ -176,22 +173,7 @@ def _study(
         q0=np.linspace(1.8, 5.3, n_q),
         y0=np.full(n_y, 0.125),
         over_time=over_time,
-        over_design=_map(n_y, ("m", "kg"), scale, prefix, varies),
-        over_q=_map(min(n_q, 2) if time.size else 0, ("q", "rad"), scale, prefix, varies),
     )
-
-
-def _map(
-    count: int, kind: tuple[str, str], scale: float, prefix: str, varies: bool
-) -> DesignMap | None:
-    if count == 0:
-        return None
-    count = min(count, 2)
-    axes = tuple(np.linspace(0.0, 0.25, 21 + 4 * i) for i in range(count))
-    grid = np.meshgrid(*(8 * (axis - 0.125) for axis in axes), indexing="ij")
-    values = _compare(grid[0], grid[-1], scale, varies)
-    names = tuple(f"{prefix}{kind[0]}{i + 1}" for i in range(count))
-    return DesignMap(names, (kind[1],) * count, axes, values)
 
 
 def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> TargetStudy:

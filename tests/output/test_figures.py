@@ -66,10 +66,6 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
         "mechanism",
         "coordinates",
         "approximation_mode_1_time",
-        "approximation_mode_1_q",
-        "approximation_mode_1_q_2",
-        "approximation_mode_1_design",
-        "approximation_mode_1_design_2",
     ]
 
 
@@ -78,7 +74,7 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
 )
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
     files = render(run_figures(studied(make_results(**EVERY[name]))))
-    assert len(files) >= 9
+    assert len(files) >= 6
     for name, data in files.items():
         image = pixels(data)
         assert image.shape[1] == 880, name
@@ -197,20 +193,16 @@ def test_the_user_s_matplotlib_settings_change_nothing_and_are_left_alone(paper)
 
 def test_results_without_a_trajectory_plan_only_what_they_have():
     assert run_figures(make_results(n_t=0, n_y=0)) == ()
-    names = [plan.name for plan in run_figures(make_results(n_t=0, n_y=2))]
-    assert names == ["approximation_mode_1_design", "approximation_mode_1_design_2"]
 
 
 def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     study = paper.studies[0]
-    values = study.over_design.values
-    broken = values.linearised_hz.copy()
+    broken = study.over_time.linearised_hz.copy()
     broken[:3] = np.nan
-    holes = dataclasses.replace(values, linearised_hz=broken)
-    over = dataclasses.replace(study.over_design, values=holes)
-    studies = (dataclasses.replace(study, over_design=over),)
+    over = dataclasses.replace(study.over_time, linearised_hz=broken)
+    studies = (dataclasses.replace(study, over_time=over),)
     found = dataclasses.replace(paper, studies=studies)
-    drawn(found, "approximation_mode_1_design").canvas.draw()
+    drawn(found, "approximation_mode_1_time").canvas.draw()
 
 
 def test_names_lose_their_control_characters_and_their_middle():

@@ -176,22 +176,22 @@ def test_a_run_leaves_results_report_and_figures(tmp_path):
     [(("svg", "pdf"), "data:image/svg+xml;base64,"), (("pdf",), None), (("svg", "png"), "png")],
 )
 def test_the_report_is_right_with_figures_of_any_format(tmp_path, formats, embedded):
-    results = make_results(n_t=0, n_y=1)
+    results = replace(make_results(n_y=1), assignment=None, studies=())
     write_run(results, tmp_path, formats, "light")
-    (plan,) = run_figures(results)
+    plan, *others = run_figures(results)
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {
-        f"{plan.name}.{kind}" for kind in formats
+        f"{each.name}.{kind}" for kind in formats for each in (plan, *others)
     }
     parsed = Page((tmp_path / "report.html").read_text())
     assert plan.caption in parsed.text
     images = [attributes["src"] or "" for tag, attributes in parsed.tags if tag == "img"]
-    assert len(images) == (embedded is not None)
+    assert len(images) == (embedded is not None) * (1 + len(others))
     assert all((embedded or "") in image for image in images)
     assert (f"figures/{plan.name}.pdf" in parsed.text) == (embedded is None)
 
 
 def test_no_report_is_written_where_none_is_wanted(tmp_path):
-    write_run(make_results(n_t=0, n_y=1), tmp_path, ("png",), "none")
+    write_run(make_results(n_y=1), tmp_path, ("png",), "none")
     assert (tmp_path / "figures").exists()
     assert not (tmp_path / "report.html").exists()
 

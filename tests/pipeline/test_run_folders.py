@@ -93,7 +93,7 @@ def test_a_case_without_trajectory_is_expanded_where_it_says(tmp_path: Path) -> 
     outcome = expand_case(written(tmp_path, text), in_folder(tmp_path / "out"))
     (study,) = outcome.results.studies
     assert study.over_time is None
-    assert study.over_design is not None
+    assert study.everywhere is not None
     assert outcome.results.poses.tip_path is None
 
 

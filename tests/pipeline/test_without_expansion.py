@@ -139,11 +139,3 @@ assignment: {{starts: 1}}
 
 def test_lengths_with_which_a_loop_cannot_be_closed_end_nothing(tmp_path: Path) -> None:
     assert "cannot be closed" in without(solved(tmp_path, lengths("auto")))
-
-
-def test_a_map_over_lengths_that_do_not_close_a_loop_is_left_out(tmp_path: Path) -> None:
-    result = solved(tmp_path, lengths("4"))
-    (study,) = result.results.studies
-    assert study.over_time is not None
-    assert study.over_design is None
-    assert sum("no map over coupler: " in note for note in result.results.notes) == 1

@@ -32,8 +32,3 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
             comparison = one.studies[k].over_time
             if comparison is not None and comparison.exact_hz.size:
                 yield approximation.over_time(one, study, comparison)
-        loads = (results.trajectories[0].loads or ()) if results.trajectories else ()
-        point = (*results.q_names, *loads)
-        yield from approximation.over_entries(study, study.over_q, study.q0, point, "q")
-        names = tuple(row.name for row in results.design)
-        yield from approximation.over_entries(study, study.over_design, study.y0, names, "design")
