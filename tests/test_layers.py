@@ -16,6 +16,7 @@ OWNERS = {
     "yaml": {"case"},
     "pydantic": {"case"},
     "pydantic_core": {"case"},
+    "osqp": {"assignment"},
     "h5py": {"mechanism", "output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja

@@ -49,10 +49,10 @@ from numpy.typing import ArrayLike
 from eigassign.assignment.program import (
     RANK,
     SNAP,
-    TOUCH,
     Floats,
     LinearConstraint,
     Program,
+    Solved,
     feasible_point,
     frozen,
     smallest,
@@ -133,6 +133,7 @@ class Assignment(Brief):
 
     y: Floats
     lam: tuple[Floats, ...]
+    status: str
     iterations: int
     primal_residual: float
     dual_residual: float
@@ -185,7 +186,8 @@ def solve_assignment(
     G = np.vstack([np.eye(len(unit)), C[:, free] * unit / row_unit[:, None]])
     nothing = np.zeros(len(unit))
     program = Program(r, q.T @ error / np.sqrt(size), G, least, most, nothing)
-    x, mu, steps, rank = _optimum(program, tuple(row.name for row in constraints))
+    solved, rank = _optimum(program, tuple(row.name for row in constraints))
+    x, mu = solved.x, solved.mu
     primal, dual, gap = judge(program, x, mu)
     if not max(primal, dual, gap) <= ACCEPT:
         raise AccuracyError(
@@ -212,7 +214,8 @@ def solve_assignment(
     return Assignment(
         y=frozen(y),
         lam=tuple(frozen(model(y - y0)) for _, model in goals),
-        iterations=steps,
+        status=solved.status,
+        iterations=solved.iterations,
         primal_residual=primal,
         dual_residual=dual,
         gap=gap,
@@ -244,17 +247,16 @@ def _units(A: Floats, lower: Floats, upper: Floats, y0: Floats) -> Floats:
     return np.where(np.isfinite(unit), unit, np.where(y0 != 0.0, np.abs(y0), 1.0))
 
 
-def _optimum(program: Program, names: Sequence[str]) -> tuple[Floats, Floats, int, int]:
-    """x, multipliers, steps, and the rank of A: of all optima the one nearest to x = 0.
+def _optimum(program: Program, names: Sequence[str]) -> tuple[Solved, int]:
+    """The optimum and the rank of A: of all optima the one nearest to x = 0.
 
     The multipliers of one optimum belong to every other: those z that have the same A z.
     """
     n = program.cost.size
-    is_met = np.all((program.lower <= TOUCH) & (program.upper >= -TOUCH))
-    solved = solve_program(program, np.zeros(n) if is_met else None)
+    solved = solve_program(program)
     if solved is None:
         raise _contradiction(program, names)
-    x, mu, steps = solved
+    x, mu = solved.x, solved.mu
     sizes, seen = np.linalg.svd(program.A, full_matrices=False)[1:]
     seen = seen[sizes > RANK * np.max(sizes, initial=0.0)]
     if len(seen) < n:
@@ -267,11 +269,11 @@ def _optimum(program: Program, names: Sequence[str]) -> tuple[Floats, Floats, in
             cost=program.cost,
         )
         again = solve_program(nearest, x)
-        x = x if again is None else again[0]
+        x = x if again is None else again.x
     least, most = program.lower[:n], program.upper[:n]
     x = np.where(np.abs(x - least) <= SNAP, least, np.where(np.abs(x - most) <= SNAP, most, x))
     missing = ((mu > 0.0) & np.isinf(program.upper)) | ((mu < 0.0) & np.isinf(program.lower))
-    return x, np.where(missing, 0.0, mu), steps, len(seen)
+    return solved._replace(x=x, mu=np.where(missing, 0.0, mu)), len(seen)
 
 
 def _contradiction(program: Program, names: Sequence[str]) -> InfeasibleError:

@@ -1,17 +1,18 @@
-"""Programs with linear limits, solved by the primal active-set method to round-off.
+"""Programs with linear limits, solved by OSQP, and on to round-off by the active-set method.
 
     min ½‖A x + b‖² + costᵀx  with  lower ≤ G x ≤ upper
 
-(Nocedal, Wright, Numerical Optimization, 2nd ed., algorithm 16.3, in null-space form.) It works on
-A, not on AᵀA, so that digits are lost with cond(A) only. A start that violates a limit by no more
-than round-off is good enough.
+The primal active-set method (Nocedal, Wright, Numerical Optimization, 2nd ed., algorithm 16.3, in
+null-space form) works on A, not on AᵀA, so that digits are lost with cond(A) only. A start that
+violates a limit by no more than a solver's tolerance is good enough. A step of a search, whose
+start is feasible, goes by it alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,31 +76,75 @@ class Program:
         return replace(self, G=self.G[rows], lower=self.lower[rows], upper=self.upper[rows])
 
 
-def solve_program(
-    program: Program, start: Floats | None = None
-) -> tuple[Floats, Floats, int] | None:
-    """x, multipliers mu (rows of G,) and the number of steps; None where limits contradict.
+class Solved(NamedTuple):
+    """x (n,), multipliers mu (rows of G,), OSQP's iterations and how it ended, in its words."""
+
+    x: Floats
+    mu: Floats
+    iterations: int = 0
+    status: str = ""
+
+
+def solve_program(program: Program, start: Floats | None = None) -> Solved | None:
+    """The optimum; None where limits contradict.
 
     Multipliers are positive at an upper limit, and Aᵀ(A x + b) + cost + Gᵀmu = 0. The ``start``
-    (n,) is feasible; without one a feasible point is sought. Moving onto the limits shifts x by
-    the violation of the start at first, by round-off in the end. Raises UsageError for data that is
-    not a number, or limits that are not ordered.
+    (n,) is feasible; without one OSQP solves, and where it does not a feasible point is sought.
+    Moving onto the limits shifts x by the violation of the start at first, by round-off in the end.
+    Raises UsageError for data that is not a number, or limits that are not ordered.
     """
     if not all(np.isfinite(part).all() for part in (program.A, program.b, program.G, program.cost)):
         raise UsageError("the program's data is not finite")
     if not np.all(program.lower <= program.upper):
         raise UsageError("the program's limits are not ordered, or not numbers")
-    x = feasible_point(program) if start is None else start
+    x, iterations, status = start, 0, "solved"
+    if x is None and program.cost.size:
+        x, iterations, status = by_osqp(program)
+    x = feasible_point(program) if x is None else x
     if x is None:
         return None
-    side, steps = _first_guess(program, x), 0
+    side = _first_guess(program, x)
     for _ in range(PASSES):
-        x, mu, more = _descend(program, x, side)
+        x, mu = _descend(program, x, side)
         shift = _onto_limits(program, x, side)
-        x, steps = x + shift, steps + more
+        x = x + shift
         if np.linalg.norm(shift) <= SIGN:
             break
-    return x, mu, steps
+    return Solved(x, mu, iterations, status)
+
+
+SETTINGS = {  # of OSQP, whose tolerances are 1e-3 and whose polishing may worsen the answer
+    "verbose": False,
+    "eps_abs": 1e-9,
+    "eps_rel": 1e-9,
+    "eps_prim_inf": 1e-9,
+    "eps_dual_inf": 1e-9,
+    "max_iter": 20000,
+    "polishing": False,
+    "adaptive_rho": 1,
+    "adaptive_rho_interval": 50,  # in iterations, not in seconds: the same answer on every machine
+}
+
+
+def by_osqp(program: Program) -> tuple[Floats | None, int, str]:
+    """OSQP's x (n,), None unless it says solved (x is 2143289344.0 then); iterations and status.
+
+    Raises KeyboardInterrupt, which it swallows.
+    """
+    import osqp
+    from scipy.sparse import csc_matrix
+
+    solver = osqp.OSQP(algebra="builtin")  # without a name it looks for others on the disk
+    P = csc_matrix(np.triu(program.A.T @ program.A))  # it ignores a lower triangle
+    c, G = program.A.T @ program.b + program.cost, csc_matrix(program.G)
+    solver.setup(P, c, G, program.lower, program.upper, **SETTINGS)
+    found = solver.solve(raise_error=False)
+    status = osqp.SolverStatus(found.info.status_val)
+    if status == osqp.SolverStatus.OSQP_SIGINT:
+        raise KeyboardInterrupt
+    solved, words = status == osqp.SolverStatus.OSQP_SOLVED, status.name.removeprefix("OSQP_")
+    x = np.array(found.x) if solved else None
+    return x, int(found.info.iter), words.lower().replace("_", " ")
 
 
 def _first_guess(program: Program, x: Floats) -> NDArray[np.int_]:
@@ -117,8 +162,8 @@ def _first_guess(program: Program, x: Floats) -> NDArray[np.int_]:
     return side
 
 
-def _descend(program: Program, x: Floats, side: NDArray[np.int_]) -> tuple[Floats, Floats, int]:
-    """Algorithm 16.3 from a working set, which it changes: x, mu and the number of steps.
+def _descend(program: Program, x: Floats, side: NDArray[np.int_]) -> tuple[Floats, Floats]:
+    """Algorithm 16.3 from a working set, which it changes: x and mu.
 
     If its steps run out, the last point is returned and residuals decide. A limit that x violates
     stops the first step that makes it worse.
@@ -138,7 +183,7 @@ def _descend(program: Program, x: Floats, side: NDArray[np.int_]) -> tuple[Float
             break
         # Bland's rule cannot cycle; the largest is faster
         side[np.argmax(wrong > SIGN) if step > most // 2 else np.argmax(wrong)] = 0
-    return x, mu, step + 1
+    return x, mu
 
 
 def _null_space(rows: Floats) -> Floats:

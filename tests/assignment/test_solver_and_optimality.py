@@ -1,6 +1,8 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import osqp
 import pytest
 from assignment_problems import goal, random_problem
 
@@ -32,8 +34,8 @@ def residuals(x, mu, nu=0.0):
 def test_the_optimum_by_hand_has_no_residual():
     # at the bound 0.1 the slope is −0.075, balanced by the bound's multiplier
     assert max(residuals(0.1, 0.075)) <= 1e-15
-    x, mu, _ = solve_program(SMALL)
-    np.testing.assert_allclose([*x, *mu], [0.1, 0.075, 0.0], rtol=1e-14)
+    x, mu, *_ = solve_program(SMALL)
+    np.testing.assert_allclose([*x, *mu], [0.1, 0.075, 0.0], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +73,7 @@ def test_a_disturbed_optimum_is_told_by_its_residuals(seed):
     program = Program(
         A * width / size, error / size, np.eye(n), np.zeros(n), np.ones(n), np.zeros(n)
     )
-    x, mu, _ = solve_program(program, np.zeros(n))
+    x, mu, *_ = solve_program(program, np.zeros(n))
     assert max(judge(program, x, mu)) <= 1e-12
     inside = np.where(x > 0.5, -1.0, 1.0)
     assert max(judge(program, x + 1e-2 * inside, mu)) > 1e-8
@@ -101,5 +103,45 @@ def test_an_equality_said_twice_does_no_harm():
 def test_a_start_that_misses_limits_a_little_ends_at_round_off(offset):
     rows, n = np.random.default_rng(3).normal(size=(5, 3)), 3
     program = Program(rows, 4.0 * rows.sum(axis=1), np.eye(n), -np.ones(n), np.ones(n), np.zeros(n))
-    x, mu, _ = solve_program(program, -np.ones(n) + offset)
+    x, mu, *_ = solve_program(program, -np.ones(n) + offset)
     assert max(judge(program, x, mu)) <= 1e-12
+
+
+# ---- OSQP
+
+
+class Ended(osqp.OSQP):
+    """An OSQP that does not say solved, and whose x is no number then."""
+
+    status = osqp.SolverStatus.OSQP_MAX_ITER_REACHED
+
+    def solve(self, **how):
+        assert how == {"raise_error": False}
+        n = super().solve(**how).x.size
+        info = SimpleNamespace(status_val=int(self.status), iter=25)
+        return SimpleNamespace(info=info, x=np.full(n, 2143289344.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_osqp_the_active_set_finds_the_same_optimum(seed, monkeypatch):
+    problem = random_problem(seed, n_y=3)
+    expected = solve_assignment(*problem.arguments)
+    assert (expected.status, expected.iterations > 0) == ("solved", True)
+    monkeypatch.setattr(osqp, "OSQP", Ended)
+    found = solve_assignment(*problem.arguments)
+    assert (found.status, found.iterations) == ("max iter reached", 25)
+    width = problem.upper - problem.lower
+    assert np.max(np.abs(found.y - expected.y) / width) <= 1e-9
+
+
+def test_an_interrupt_that_osqp_swallowed_is_raised_again(monkeypatch):
+    monkeypatch.setattr(osqp, "OSQP", Ended)
+    monkeypatch.setattr(Ended, "status", osqp.SolverStatus.OSQP_SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        solve_assignment(*random_problem(0).arguments)
+
+
+def test_solving_prints_nothing(capfd):
+    for seed in range(30):
+        solve_assignment(*random_problem(seed).arguments)
+    assert capfd.readouterr() == ("", "")

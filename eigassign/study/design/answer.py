@@ -156,7 +156,7 @@ def _require_near(scene: Scene, l0: Floats) -> None:
 def solver_row(assignment: Assignment) -> SolverRow:
     """The solver's status and residuals, as plain numbers."""
     return SolverRow(
-        "solved",
+        assignment.status,
         assignment.iterations,
         assignment.primal_residual,
         assignment.dual_residual,
