@@ -23,7 +23,7 @@ from eigassign.pipeline.studies import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case
-from eigassign.study.pictures import drawing
+from eigassign.study import pictures as drawing
 from eigassign.study.results import ModePictures
 
 if TYPE_CHECKING:

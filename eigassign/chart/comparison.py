@@ -37,7 +37,7 @@ from eigassign.chart.results import (
 from eigassign.errors import EigassignError
 from eigassign.facts import time_in_words
 from eigassign.mechanism.assembly.build import refined
-from eigassign.study.build import build_model
+from eigassign.study.built_case import build_model
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

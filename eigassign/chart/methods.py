@@ -21,7 +21,7 @@ from eigassign.modal.exact.dense import condense
 from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.study.pictures.drawing import spread_samples
+from eigassign.study.pictures import spread_samples
 
 Floats = NDArray[np.float64]
 

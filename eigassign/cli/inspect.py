@@ -169,7 +169,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
     from eigassign.facts import capital
     from eigassign.output.console import print_tables
     from eigassign.output.tables import modes_table
-    from eigassign.study.checks.accuracy import rounding_line
+    from eigassign.study.checks import rounding_line
 
     found = modes_table(
         answer.frequencies_hz,

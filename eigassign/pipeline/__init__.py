@@ -2,12 +2,11 @@
 
 Reading order:
 
-    stages      the stages of a run, announced and timed; its folder, and the log in it
-    expansions  both expansions of a plan, from the cache or computed; as files for other programs
-    run         the paper's flowchart: case, model, expansion, assignment, verification
-    queries     check a case, draw it; its frequencies at one point
-    urdf        a robot from URDF as the content of a case
-    studies     measured frequencies to parameters; time against accuracy of every method
+    stages   the stages of a run, its folder and log; expansions from the cache or computed
+    run      the paper's flowchart: case, model, expansion, assignment, verification
+    queries  check a case, draw it; its frequencies at one point
+    urdf     a robot from URDF as the content of a case
+    studies  measured frequencies to parameters; time against accuracy of every method
 """
 
 from eigassign.faces import face
@@ -15,10 +14,9 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "expansions": "affordable_order expand_plan expansion_key",
         "queries": "check draw modes",
         "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
-        "stages": "Stages silent",
+        "stages": "Stages affordable_order expand_plan expansion_key silent",
         "studies": "chart_case update_case",
     },
 )

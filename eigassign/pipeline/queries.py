@@ -30,12 +30,18 @@ from eigassign.output.figures import mechanism
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.reports import page as report
 from eigassign.pipeline.stages import new_run_folder
+from eigassign.study import pictures as drawing
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks.accuracy import digits_lines, judged_mesh, mesh_lines, truncation_lines
-from eigassign.study.checks.weight import GIVEN, study_weight
+from eigassign.study.checks import (
+    GIVEN,
+    digits_lines,
+    judged_mesh,
+    mesh_lines,
+    study_weight,
+    truncation_lines,
+)
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
-from eigassign.study.pictures import drawing
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import WeightRow
 from eigassign.study.updating.measured import read_measurements

@@ -26,28 +26,28 @@ from eigassign.output import tables
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
-from eigassign.pipeline.expansions import coefficient_files, expand_plan
-from eigassign.pipeline.stages import Stages, new_run_folder, silent
+from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks.accuracy import study_accuracy, truncation_notes, weight_at
+from eigassign.study.checks import study_accuracy, truncation_notes, weight_at
 from eigassign.study.collect import collect_results
-from eigassign.study.comparison import (
-    TRAJECTORY,
-    Validation,
-    reach_warnings,
-    study_modes,
-    validate_expansions,
-)
 from eigassign.study.design.account import VerifiedAssignment
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.conclusions import proof
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
-from eigassign.study.meaning.overall import Studies, study_meaning
-from eigassign.study.pictures.drawing import motions
+from eigassign.study.meaning import Studies, study_meaning
+from eigassign.study.pictures import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import Motion, RunResults, TargetStudy
-from eigassign.study.scene import Expansions, Scene
+from eigassign.study.scene import (
+    TRAJECTORY,
+    Expansions,
+    Scene,
+    Validation,
+    reach_warnings,
+    study_modes,
+    validate_expansions,
+)
 
 if TYPE_CHECKING:
     from eigassign.output.figures.graph import FigurePlan
@@ -318,7 +318,7 @@ def expand_case(
 
 
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
-    """Compare both expansions of a case with exact, where `eigassign.study.comparison` says."""
+    """Compare both expansions of a case with exact, where `eigassign.study.scene` says."""
     stages = Stages(options.progress)
     case = load_case(path, options.allow_outside)
     with case.located():

@@ -1,4 +1,4 @@
-"""The stages of a run, announced and timed; its folder, and the log in it.
+"""The stages of a run, its folder and the log in it; expansions of a plan, and their files.
 
 A stage that lasts says every few seconds how far it is, in a line of progress that begins with two
 spaces: how many of its pieces are done where they are counted, else for how long it has been going.
@@ -8,23 +8,36 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import comb
 from pathlib import Path
 from threading import Event, Thread
-from time import perf_counter
+from time import perf_counter, process_time
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import folder_name, printable
-from eigassign.output.documents import to_json
+from eigassign.modal.arguments import MOST_TERMS
+from eigassign.modal.expansion import Expansion, NearestExpansion, expand
+from eigassign.modal.model import Model
+from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
+from eigassign.output.documents import dumps, to_json
 from eigassign.output.result_files import sample_files
+from eigassign.output.store.cache import Cache, content_key, hdf5
 from eigassign.output.store.run_folder import run_folder
+from eigassign.study.planning import Plan
 from eigassign.study.results import RunResults
+from eigassign.study.scene import Expansions, Scene
 
 
 def silent(_line: str) -> None:
@@ -151,3 +164,142 @@ def log_text(results: RunResults) -> str:
         *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
     ]
     return "".join(f"{printable(line)}\n" for line in lines)
+
+
+Array = NDArray[Any]
+_log = logging.getLogger(__name__)
+
+
+def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansions, list[str]]:
+    """Both expansions of a plan, and notes on how they came about.
+
+    The linearised one is what the optimum rests on and is always of the plan's order; the full one
+    is there to compare with, and of a lower order where its set would be too large.
+    """
+    full_order = affordable_order(model, plan.order)
+    points = [plan, *(replace(plan, q0=np.array(q)) for q in plan.more_q)]
+    made = [_expansions(model, at, full_order, cache) for at in points]
+    fulls, linears = (
+        NearestExpansion(parts) for parts in zip(*(both for both, _ in made), strict=True)
+    )
+    expansions = Expansions(fulls, linears, plan.order, full_order)
+    (full, linear), known = made[0]
+    notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
+    if full_order < plan.order:
+        notes.append(
+            f"the full expansion, only there to compare with, stops at order {full_order}: order "
+            f"{plan.order} in so many variables has over {MOST_TERMS} coefficients"
+        )
+    if known:
+        notes.append("the expansion coefficients come from the cache")
+    return expansions, notes
+
+
+def _size_note(expansions: Expansions) -> str:
+    full, linear = expansions.full.space, expansions.linear.space
+    return (
+        f"order {expansions.order} in {full.n_variables} variables: {len(linear)} coefficients "
+        f"partially linearised, {len(full)} in full"
+    )
+
+
+def affordable_order(model: Model, order: int) -> int:
+    """The highest order up to ``order`` whose full set has at most `MOST_TERMS` members; ≥ 1."""
+    n = int(model.pencil.active.sum())
+    fitting = [p for p in range(1, order + 1) if comb(n + p, p) <= MOST_TERMS]
+    return fitting[-1] if fitting else 1
+
+
+def _expansions(
+    model: Model, plan: Plan, full_order: int, cache: Cache | None
+) -> tuple[tuple[Expansion, Expansion], bool]:
+    """The two expansions about one point, and True where they come from the cache."""
+    if cache is None:
+        return _made(model, plan, full_order), False
+    entry = expansion_key(model, plan, full_order)
+    if (stored := cache.load(entry)) is not None:
+        try:
+            return _made(model, plan, full_order, stored), True
+        except UsageError as error:
+            _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
+    start = process_time()
+    fresh = _made(model, plan, full_order)
+    if process_time() - start >= cache.least_s:
+        cache.store(entry, expansion_arrays(*fresh))
+    return fresh, False
+
+
+def _made(
+    model: Model, plan: Plan, full_order: int, stored: Mapping[str, Array] | None = None
+) -> tuple[Expansion, Expansion]:
+    """The full and the linearised expansion, of what is ``stored`` where that is given."""
+    full, linear = (
+        expand(
+            *(model.pencil, plan.q0, plan.y0, plan.modes, order, linear_in_y),
+            known=None if stored is None else stored_series(stored, k),
+        )
+        for k, (order, linear_in_y) in enumerate([(full_order, False), (plan.order, True)])
+    )
+    return full, linear
+
+
+def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
+    """SHA-256 over all that the numbers of both expansions follow from.
+
+    The pencil's arrays, the point, the modes, the sets, and the versions of this algorithm and of
+    all that does its arithmetic: where any of them differs, so may the last bit.
+    """
+    pencil = replace(model.pencil, rails=None, limits=None)  # which refuse, and change no number
+    point = (plan.q0, plan.y0, tuple(plan.modes), full_order, plan.order)
+    versions = (__version__, np.__version__, scipy.__version__)
+    return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
+
+
+def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
+    """coefficients.json and coefficients.h5 of a scene's expansions.
+
+    Names are those of the Python face. For ``linearised`` and, unless ``linear_only``, ``full``:
+    ``indices`` (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
+    λ = Σ_γ λ_γ (x − x0)^γ in rad²/s², x = (q, y) in SI units; of modes that are expanded together
+    ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
+    """
+    expansions = scene.expansions
+    tables = {}
+    each = zip(expansions.linears.parts, expansions.fulls.parts, strict=True)
+    for k, (linear, full) in enumerate(each, 1):
+        where = f"_at_point_{k}" if k > 1 else ""
+        tables[f"linearised{where}"] = _table(linear)
+        if not linear_only:
+            tables[f"full{where}"] = _table(full)
+    names = [*scene.model.q_names, *scene.model.y_names]
+    point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
+    document = {
+        "case": {"title": scene.file.title, "sha256": scene.file.sha256},
+        "x_names": names,
+        **point,
+        **tables,
+    }
+    flat = {f"{part}_{name}": a for part, table in tables.items() for name, a in table.items()}
+    meta = {"case": scene.file.title, "sha256": scene.file.sha256, "x_names": ", ".join(names)}
+    return {
+        "coefficients.json": (dumps(document) + "\n").encode(),
+        "coefficients.h5": hdf5({**point, **flat}, meta),
+    }
+
+
+def _table(expansion: Expansion) -> dict[str, Array]:
+    """The arrays of an expansion, by the names of the Python face."""
+    modes = {
+        "modes": np.array(expansion.modes),
+        "order": np.array(expansion.order),
+        "q0": expansion.q0,
+        "y0": expansion.y0,
+    }
+    if all(len(cluster.modes) == 1 for cluster in expansion.clusters):
+        return {**modes, "indices": expansion.indices, "coefficients": expansion.coefficients}
+    series: dict[str, Array] = {}
+    for k, cluster in enumerate(expansion.clusters):
+        series[f"cluster_{k}_modes"] = np.array(cluster.modes)
+        series[f"cluster_{k}_coefficients"] = cluster.coefficients
+    local = {"local_indices": expansion.space.indices, "directions": expansion.directions}
+    return {**modes, **local, **series}

@@ -19,7 +19,7 @@ from eigassign.output.reports.update import update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options, prepare
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks.accuracy import truncation_notes
+from eigassign.study.checks import truncation_notes
 from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 

@@ -2,13 +2,11 @@
 
 Reading order:
 
-    build       from a case file in which every number is given to its model and trajectories
     results     what a run found, as plain numbers and names: all that the output is given to show
     planning    expansion point, order and modes; what is left to auto, and where it is judged
-    built_case  a validated case with what is built from it, all left to auto for its links settled
-    scene       model, trajectory and expansions of a case in one object
+    built_case  validated cases, models and trajectories; what is left to auto for links, settled
+    scene       model, trajectory and expansions of a case in one object, against exact solves
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
-    comparison  how good expansions are, against exact solves
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
     pictures    what is drawn of a mechanism, as plain lines and numbers
@@ -22,14 +20,8 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "checks.slow_motion": "gap_along",
-        "build": "build_model",
-        "built_case": "BuiltCase load_case settle_model",
-        "comparison": (
-            "BETWEEN DESIGN_BOX TRAJECTORY compare "
-            "reach_warnings study_expansions study_modes unseen_points "
-            "validate_expansions"
-        ),
+        "checks": "gap_along",
+        "built_case": "BuiltCase build_model load_case settle_model",
         "design.answer": "Answer find_answer",
         "design.clearance": "check_band",
         "design.followed": "followers named_design named_pose require_one_shape solve_design",
@@ -38,9 +30,8 @@ __all__, __getattr__, __dir__ = face(
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.search.variants": "Task variant_of",
         "design.verdict": "Facts Verdict verdict",
-        "pictures.drawing": "AMPLITUDE draw_modes draw_poses rest_pose",
-        "meaning.overall": "Studies study_meaning",
-        "meaning.reach": "proved_ranges unreachable",
+        "pictures": "AMPLITUDE draw_modes draw_poses rest_pose",
+        "meaning": "Studies proved_ranges study_meaning unreachable",
         "planning": (
             "Plan at_corners automatic_elements central_sample corners joint_map "
             "farthest plan_expansion scattered "
@@ -53,7 +44,10 @@ __all__, __getattr__, __dir__ = face(
             "ModeRow RangeRow RunResults SensitivityRow SolverRow TargetAlong "
             "TargetStudy TrajectoryRow ValidationRow"
         ),
-        "scene": "Scene",
+        "scene": (
+            "BETWEEN DESIGN_BOX Scene TRAJECTORY compare reach_warnings "
+            "study_expansions study_modes unseen_points validate_expansions"
+        ),
         "updating.fit": "UpdateResults solve_update update_problem",
         "updating.measured": "read_measurements",
     },

@@ -13,9 +13,7 @@ from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.checks.accuracy import Accuracy
-from eigassign.study.checks.slow_motion import MotionStudy, study_motion
-from eigassign.study.comparison import ModeStudies, reach_warnings
+from eigassign.study.checks import Accuracy, MotionStudy, study_motion
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
 from eigassign.study.design.answer import solver_row
 from eigassign.study.design.judgement import (
@@ -27,7 +25,7 @@ from eigassign.study.design.judgement import (
 )
 from eigassign.study.design.lists import cost, design_rows
 from eigassign.study.given import given
-from eigassign.study.pictures.drawing import draw_poses, rest_pose
+from eigassign.study.pictures import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
     AssignmentRow,
@@ -44,7 +42,7 @@ from eigassign.study.results import (
     counted_of,
     over_all,
 )
-from eigassign.study.scene import Scene
+from eigassign.study.scene import ModeStudies, Scene, reach_warnings
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13  # of the weight, or of the largest load: what a level direction leaves of it

@@ -84,7 +84,7 @@ def plan_expansion(
 
 
 def _require_affordable(file: CaseFile, model: Model, order: int, given: bool) -> None:
-    """The linearised series is made of any order; the full one, see `pipeline.expansions`."""
+    """The linearised series is made of any order; the full one, see `pipeline.stages`."""
     try:
         local_space(model.pencil, order, True, None).space.require_affordable()
     except UsageError as error:

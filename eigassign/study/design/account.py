@@ -15,9 +15,15 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
-from eigassign.study.checks.accuracy import Accuracy, finer, model_errors, raised_by
-from eigassign.study.checks.slow_motion import MotionStudy, motion_doubt
-from eigassign.study.checks.weight import weight_doubt
+from eigassign.study.checks import (
+    Accuracy,
+    MotionStudy,
+    finer,
+    model_errors,
+    motion_doubt,
+    raised_by,
+    weight_doubt,
+)
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, lowest_room
 from eigassign.study.design.conclusions import Conflict, aim_row, extreme

@@ -34,7 +34,7 @@ from eigassign.errors import LostModeError, MissingMassError, TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
-from eigassign.study.checks.accuracy import judged_poses
+from eigassign.study.checks import judged_poses
 from eigassign.study.design.followed import Follower, follow_all, unfollowed
 from eigassign.study.results import ClearanceRow
 

@@ -34,7 +34,7 @@ from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.errors import EigassignError
-from eigassign.study.checks.accuracy import raised_by
+from eigassign.study.checks import raised_by
 from eigassign.study.design.clearance import WITHIN, check_band, lowest_room
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, can_be_met

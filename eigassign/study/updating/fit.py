@@ -29,8 +29,7 @@ from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
 from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.checks.accuracy import WEIGHT_POSES, judged_poses
-from eigassign.study.checks.weight import study_weight
+from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.search.variants import spread_designs
 from eigassign.study.results import CaseRow, Origin
