@@ -17,7 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
-    "h5py": {"mechanism", "output"},
+    "h5py": {"output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja
     "rich": {"output"},

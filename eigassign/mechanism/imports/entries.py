@@ -1,4 +1,4 @@
-"""What readers of matrices share; Matrix Market, NumPy's .npy and .npz, tables, MATLAB's .mat.
+"""What readers of matrices share; NumPy's .npy and .npz, MATLAB's .mat.
 
 A reader gives a `Matrix`, whose rows may be labelled: 100 × the number of a node + the freedom,
 1 to 6 for u_x, u_y, u_z, θ_x, θ_y, θ_z. It raises UnfitError for what is readable but not wanted,
@@ -23,7 +23,6 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from math import isqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -141,9 +140,7 @@ def wholes(found: Cells) -> Ints:
     return np.where(np.char.strip(found) == b"", b"0", found).astype(np.int64)
 
 
-_NUMPY, _ZIP, _MARKET = b"\x93NUMPY", b"PK\x03\x04", b"%%matrixmarket"
-_BLANKS = bytes.maketrans(b",;", b"  ")
-_WIDEST = 26 * isqrt(ENTRIES)  # bytes of a line of as many numbers as rows can have
+_NUMPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
 _INDICES = {"indices", "indptr", "row", "col", "offsets"}
 
 
@@ -178,62 +175,6 @@ def _sparse(data: bytes, archive: Any) -> Matrix:
     return Matrix(matrix)
 
 
-def read_table(data: bytes) -> Contents | None:
-    """A full matrix in text, a row a line; None of what is no square of numbers."""
-    first = data[:_WIDEST].partition(b"\n")[0].translate(_BLANKS).split()
-    if not first or not all(map(_WORD.fullmatch, first)):
-        return None
-    if len(first) != sum(not line.isspace() for line in io.BytesIO(data)):
-        return None
-    lines = iter(partial(io.BytesIO(data.translate(_BLANKS)).readline, _WIDEST), b"")
-    return Contents({"": lambda: Matrix(np.loadtxt(lines, ndmin=2))})
-
-
-def read_matrix_market(data: bytes) -> Contents | None:
-    """The one matrix of a Matrix Market file; None of other files."""
-    known = data[:20].lower().startswith(_MARKET)
-    return Contents({"": lambda: Matrix(_matrix_market(data))}) if known else None
-
-
-_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?"
-_WORD = re.compile(_NUMBER)
-# What SciPy's reader, which runs past the end of a number that breaks off, is shown of a file
-_BANNER = re.compile(
-    rb"%%MatrixMarket[ \t]+matrix[ \t]+(coordinate|array)"
-    rb"[ \t]+(real|double|integer|complex|pattern)"
-    rb"[ \t]+(general|symmetric|skew-symmetric|hermitian)[ \t]*\r?\n"
-    rb"(?:[ \t]*(?:%[^\n]*)?\n)*[ \t]*(\d{1,9})[ \t]+(\d{1,9})(?:[ \t]+(\d{1,15}))?[ \t]*\r?\n",
-    re.IGNORECASE,
-)
-_LINES = {
-    layout: re.compile(rb"^(?!%s[ \t]*\r?$|%%|[ \t]*\r?$)" % line, re.MULTILINE)
-    for layout, line in (
-        (b"array", rb"[ \t]*" + _NUMBER),
-        (b"coordinate", rb"[ \t]*\d{1,9}[ \t]+\d{1,9}[ \t]+" + _NUMBER),
-    )
-}
-
-
-def _matrix_market(data: bytes) -> Any:
-    from scipy.io import mmread
-
-    banner = _BANNER.match(data)
-    if banner is None:
-        raise ValueError("no Matrix Market file")
-    layout, field, symmetry = (word.lower() for word in banner.groups()[:3])
-    rows, columns, given = (int(number or 0) for number in banner.groups()[3:])
-    if field == b"pattern":
-        raise UnfitError("is a pattern: it has places but no values")
-    if field == b"complex":
-        raise UnfitError(COMPLEX)
-    if symmetry == b"skew-symmetric":
-        raise UnfitError("is skew-symmetric, expected a symmetric matrix")
-    require_few(rows, rows * columns if layout == b"array" else given)
-    if (wrong := _LINES[layout].search(data + b"\n", banner.end(), len(data))) is not None:
-        raise ValueError(f"Line {data.count(10, 0, wrong.start()) + 1}")
-    return mmread(io.BytesIO(data + b"\n"), spmatrix=False)
-
-
 _CHILD = str(Path(__file__).with_name("matlab_child.py"))
 _START = 300e6  # bytes of addresses: 140 MB after all imports
 _ENTRY = 32  # bytes, beside twice the file: 2·10⁷ entries took 680 MB in all, 190 of it the file
@@ -241,22 +182,12 @@ _SECONDS = 5.0  # of the processor: it starts in 0.3 s, and 150 MB, packed, took
 _PACE = 2e7  # bytes of the file that have a second more
 
 
-def _is_oldest(data: bytes) -> bool:
-    """Version 4 begins with its kind, 0000 to 4052, rows, columns, 0 or 1, and length of a name."""
-    if len(data) < 20:
-        return False
-    for order in "<>":
-        kind, rows, columns, imaginary, name = np.frombuffer(data, f"{order}u4", 5).tolist()
-        known = kind < 5000 and kind % 10 in (0, 1, 2) and kind // 10 % 10 < 6
-        if known and rows > 0 and columns > 0 and imaginary in (0, 1) and 1 < name < 65:
-            return data[19 + name : 20 + name] == b"\0"
-    return False
-
-
 def read_matlab(data: bytes) -> Contents | None:
     """Its variables that are matrices of numbers; None of other files."""
-    if not data.startswith(b"MATLAB ") and not _is_oldest(data):
+    if not data.startswith(b"MATLAB "):
         return None
+    if data.startswith(b"MATLAB 7.3"):
+        raise UnfitError("is of MATLAB's version 7.3, which is not read: save it with '-v7'")
     sent, at, matrices = _sent(data), 0, dict[str, Callable[[], Matrix]]()
     while at < len(sent):
         end = sent.index(b"\n", at) + 1

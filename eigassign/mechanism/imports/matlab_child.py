@@ -1,4 +1,4 @@
-"""MATLAB's .mat files read by SciPy and h5py, in a process of its own: damaged ones crash them.
+"""MATLAB's .mat files read by SciPy, in a process of its own: damaged ones crash it.
 
     python -P matlab_child.py MEMORY SECONDS ROOM < K.mat
 
@@ -37,8 +37,7 @@ def main(memory: int, seconds: int, room: int) -> None:
     out = sys.stdout.buffer
     try:
         data = sys.stdin.buffer.read()
-        read = _of_hdf5 if data.startswith(b"MATLAB 7.3") else _of_scipy
-        for name, shape, arrays in read(data):
+        for name, shape, arrays in _matrices(data):
             if (room := room - sum(array.nbytes for array in arrays)) < 0:
                 raise MemoryError
             parts = [(array.dtype.str, array.size) for array in arrays]
@@ -49,8 +48,8 @@ def main(memory: int, seconds: int, room: int) -> None:
         raise SystemExit(TOO_MUCH) from None
 
 
-def _of_scipy(data: bytes) -> Found:
-    """Versions 4 to 7, without objects, cells, structures and text."""
+def _matrices(data: bytes) -> Found:
+    """Those of versions 5 to 7, without objects, cells, structures and text."""
     from scipy.io import loadmat, whosmat
 
     stream: Any = io.BytesIO(data)
@@ -62,30 +61,6 @@ def _of_scipy(data: bytes) -> Found:
                 yield name, A.shape, [A.data, A.indices, A.indptr]
             else:
                 yield name, A.shape, [A.T.reshape(-1)]
-
-
-def _of_hdf5(data: bytes) -> Found:
-    """Version 7.3; text is stored as whole numbers and passed over.
-
-    So are links, and what lies in other files.
-    """
-    import h5py
-
-    def member(group: Any, name: str) -> Any:
-        if isinstance(group.get(name, getlink=True), h5py.HardLink):
-            found = group[name]
-            if isinstance(found, h5py.Group) or not (found.external or found.is_virtual):
-                return found
-        return None
-
-    with h5py.File(io.BytesIO(data)) as file:
-        for name in file:
-            found = member(file, name)
-            if isinstance(found, h5py.Group) and "MATLAB_sparse" in found.attrs:
-                arrays = [member(found, key)[()] for key in ("data", "ir", "jc")]
-                yield name, (arrays[2].size - 1,) * 2, arrays
-            elif isinstance(found, h5py.Dataset) and found.dtype.kind == "f" and found.ndim == 2:
-                yield name, found.shape[::-1], [found[()].reshape(-1)]
 
 
 if __name__ == "__main__":

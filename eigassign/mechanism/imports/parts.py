@@ -26,7 +26,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes, seen_from
-from eigassign.mechanism.imports import entries, op4, programs
+from eigassign.mechanism.imports import entries, programs
 from eigassign.mechanism.imports.entries import (
     COMPLEX,
     ENTRIES,
@@ -44,22 +44,18 @@ from eigassign.mechanism.imports.entries import (
 
 T = TypeVar("T")
 _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
-    entries.read_matrix_market,
+    programs.read_matrix_market,
     entries.read_numpy,
     entries.read_matlab,
-    op4.read_binary,
-    op4.read_text,
+    programs.read_op4_binary,
+    programs.read_op4_text,
     programs.read_bulk,
     programs.read_substructure,
     programs.read_nodes,
     programs.read_entries,
     programs.read_labels,
-    entries.read_table,
 )
-_KNOWN = (
-    "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy, nor a "
-    "square table of numbers"
-)
+_KNOWN = "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy"
 
 
 def read_contents(file: Path, key: str) -> Contents | None:
@@ -145,10 +141,8 @@ def guarded(read: Callable[[], T], file: Path, key: str) -> T:
         raise MechanismError(key, f"cannot read {file.name}: too large for this memory") from error
     except MechanismError:
         raise
-    except Exception as error:  # parsers of others raise anything, and quote the file
-        line = re.match(r"Line \d+", str(error))
-        place = f" ({line.group()})" if line else ""
-        message = f"cannot read {file.name}{place}: it is damaged, or no file of {_KNOWN}"
+    except Exception:  # parsers of others raise anything, and quote the file
+        message = f"cannot read {file.name}: it is damaged, or no file of {_KNOWN}"
         raise MechanismError(key, message) from None
 
 

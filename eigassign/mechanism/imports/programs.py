@@ -1,4 +1,10 @@
-"""Nastran's punched matrices and grid points; lists of Abaqus, CalculiX and Ansys.
+"""Matrices, freedoms of rows and nodes of Nastran, Abaqus, CalculiX and Ansys.
+
+Nastran's OUTPUT4 holds matrices column by column, as text or as Fortran's binary records. A column
+is its number, its first row and its number of words, then the values. Where the first row is 0 it
+consists of strings, each behind one word, 65536 × (its words + 1) + its row, or, where the number
+of rows is negative (bigmat), behind two: its words + 1, its row. A column behind the last one ends
+the matrix. Its punched matrices:
 
     DMIG     KAAX     0     6     2     0           8        name, 0, form, type, …, columns
     DMIG*    KAAX              1               1             a column: node, component
@@ -10,6 +16,7 @@ Each kind is told by its first lines:
 
     1,1, 2,3, 1.5e+05   *MATRIX GENERATE of Abaqus: node, freedom, node, freedom, value
     1 6  1.5e+05        .sti and .mas of CalculiX, COORDINATE of Abaqus: row, column, value
+    %%MatrixMarket      coordinates behind a header, of Ansys: row, column, value
     12.3                .dof of CalculiX: node.freedom of each row
     7  12  ROTX         .mapping of Ansys: row, node, freedom
     *MATRIX,TYPE=MASS   substructures: the lower triangle row by row, behind nodes and freedoms
@@ -21,7 +28,9 @@ from __future__ import annotations
 import io
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +44,133 @@ from eigassign.mechanism.imports.entries import (
     Matrix,
     UnfitError,
 )
+
+# --- OUTPUT4 of Nastran
+
+_HEAD = re.compile(
+    rb"^ *(\d{1,9}) +(-?\d{1,9}) +(\d+) *([1-4]) *([A-Za-z]\w{0,31}) +"
+    rb"(?:1P,)?(\d{1,2})[ED](\d{1,2})\.\d+[ \t]*\r?\n",
+    re.MULTILINE,
+)
+_BIG = 65536  # what the length of a string is multiplied by
+_LINE = 80  # characters of a line of whole numbers, of which there are three at most
+_MARK = 24  # bytes of the first binary record: four whole numbers and a name
+
+
+def read_op4_text(data: bytes) -> Contents | None:
+    """The matrices of a file of text; None of other files."""
+    if not _HEAD.match(data):
+        return None
+    heads = list(_HEAD.finditer(data))
+    ends = [*(head.start() for head in heads[1:]), len(data)]
+    pairs = zip(heads, ends, strict=True)
+    return Contents(
+        {h.group(5).decode().upper(): partial(_of_text, h, data[h.end() : end]) for h, end in pairs}
+    )
+
+
+def _of_text(head: re.Match[bytes], body: bytes) -> Matrix:
+    """Lines of whole numbers announce strings, lines with points hold their values."""
+    n, rows, kind, most, width = (int(head.group(k)) for k in (1, 2, 4, 6, 7))
+    _require_fit(n, rows, kind)
+    strings, lines = list[list[int]](), list[bytes]()
+    for line in body.split(b"\n"):
+        if b"." in line:
+            lines.append(line)
+            strings[-1][3] += -(-len(line.rstrip()) // width)
+        elif numbers := [int(word) for word in line[:_LINE].split()]:
+            match numbers:
+                case [column, _, _] if column > n:
+                    break
+                case [column, first, words]:
+                    strings += [[column, first, words, 0]] if first else []
+                case [words, first]:
+                    strings.append([column, first, words - 1, 0])
+                case [word]:
+                    strings.append([column, word % _BIG, word // _BIG - 1, 0])
+    else:
+        raise ValueError("no column behind the last one")
+    if any(words not in (count, count * kind) for *_, words, count in strings):
+        raise ValueError("other values than announced")
+    strings = [[column, first, count] for column, first, _, count in strings]
+    return _of_strings(n, strings, entries.reals(entries.cells(lines, width, most)))
+
+
+def _require_fit(columns: int, rows: int, kind: int) -> None:
+    """Raise UnfitError unless the matrix is real, square and not too large."""
+    if kind > 2:
+        raise UnfitError(entries.COMPLEX)
+    if columns != abs(rows):
+        raise UnfitError(f"is not a square matrix: {(abs(rows), columns)}")
+    entries.require_few(columns, 0)
+
+
+def _of_strings(n: int, strings: Sequence[Sequence[int]], values: Floats) -> Matrix:
+    """The matrix of strings, (column, first row, number of values) each, and all their values."""
+    column, first, count = np.array(strings, dtype=np.int64).reshape(-1, 3).T
+    inside = np.arange(len(values)) - np.repeat(np.cumsum(count) - count, count)
+    rows, columns = np.repeat(first - 1, count) + inside, np.repeat(column - 1, count)
+    return Matrix(entries.assembled(n, rows, columns, values, half=True))
+
+
+# --- Binary
+
+
+def read_op4_binary(data: bytes) -> Contents | None:
+    """The matrices of a binary file of either order of bytes; None of other files."""
+    marks = (data[:4], data[4 + _MARK : 8 + _MARK])
+    orders = {"<": _MARK.to_bytes(4, "little"), ">": _MARK.to_bytes(4, "big")}
+    if (order := next((o for o, mark in orders.items() if marks == (mark, mark)), None)) is None:
+        return None
+    records, at = list[bytes](), 0
+    whole = np.dtype(f"{order}i4")
+    while at < len(data):
+        size = int(np.frombuffer(data, whole, 1, at)[0])
+        if size < 12 or np.frombuffer(data, whole, 1, at + 4 + size)[0] != size:
+            raise ValueError("a record without its end")
+        records.append(data[at + 4 : at + 4 + size])
+        at += size + 8
+    matrices, k = {}, 0
+    while k < len(records):
+        n, rows, _, kind = np.frombuffer(records[k], whole, 4).tolist()
+        name = records[k][16:_MARK].decode("ascii", "replace").strip().upper()
+        start = k = k + 1
+        while np.frombuffer(records[k], whole, 1)[0] <= n:
+            k += 1
+        matrices[name] = partial(_of_records, n, rows, kind, records[start:k], whole)
+        k += 1
+    return Contents(matrices)
+
+
+def _of_records(
+    n: int, rows: int, kind: int, records: Sequence[bytes], whole: np.dtype[np.int32]
+) -> Matrix:
+    _require_fit(n, rows, kind)
+    strings, parts = list[tuple[int, int, int]](), list[bytes]()
+    for record in records:
+        column, first, words = np.frombuffer(record, whole, 3).tolist()
+        at, end = 12, 12 + 4 * words
+        if not 12 <= end <= len(record):
+            raise ValueError("other words than announced")
+        while at < end:
+            if first and at == 12:
+                row, size = first, words
+            elif rows < 0:
+                size, row = (np.frombuffer(record, whole, 2, at) - [1, 0]).tolist()
+                at += 8
+            else:
+                size, row = divmod(int(np.frombuffer(record, whole, 1, at)[0]) - _BIG, _BIG)
+                at += 4
+            if size <= 0 or size % kind or at + 4 * size > end:
+                raise ValueError("a string beyond its column")
+            strings.append((column, row, size // kind))
+            parts.append(record[at : at + 4 * size])
+            at += 4 * size
+    values = np.frombuffer(b"".join(parts), f"{whole.str[0]}f{4 * kind}")
+    return _of_strings(n, strings, values.astype(np.float64))
+
+
+# --- Punched matrices and grid points of Nastran
 
 _LONGER = rb"[^\n]*\n?(?:(?:[*+,]|[ \t]+\S)[^\n]*\n?)*"  # a card goes on in lines without a name
 CARD = re.compile(rb"^([A-Z]\w*)" + _LONGER, re.MULTILINE | re.IGNORECASE)
@@ -109,6 +245,11 @@ _NEXT = rb"[ \t]*[, \t][ \t]*"
 _ENTRY = re.compile(
     _COMMENTS + rb"[ \t]*-?\d+((?:" + _NEXT + rb"-?\d+){1,3})" + _NEXT + _NUMBER + rb"\s"
 )
+_BANNER = re.compile(
+    rb"%%MatrixMarket\s+matrix\s+coordinate\s+(?:real|double|integer)\s+(general|symmetric)\s*?\n"
+    rb"(?:[ \t]*(?:%[^\n]*)?\n)*[ \t]*(\d{1,9})[ \t]+(\d{1,9})[ \t]+(\d{1,15})\s*?\n",
+    re.IGNORECASE,
+)
 _DOFS = re.compile(rb"\A(?:[ \t]*\d+\.\d{1,2}[ \t]*\r?\n)+\Z")
 _FREEDOMS = (b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ")
 _MAPPED = re.compile(rb"^[ \t]*(\d+)[ \t]+(\d+)[ \t]+(U[XYZ]|ROT[XYZ])[ \t]*\r?$", re.MULTILINE)
@@ -125,20 +266,42 @@ def read_entries(data: bytes) -> Contents | None:
     places = 1 + len(entry.group(1).replace(b",", b" ").split()) if entry else 0
 
     def matrix() -> Matrix:
-        kinds = [*((f"i{k}", np.int64) for k in range(places)), ("value", np.float64)]
-        # of lines that are too long a piece, which has too many columns or too few
-        lines = iter(partial(io.BytesIO(data.replace(b",", b" ")).readline, _LONGEST), b"")
-        read = np.loadtxt(lines, dtype=kinds, comments="*", ndmin=1)
-        at = [read[f"i{k}"] for k in range(places)]
+        *at, values = _listed(data, places)
         if places == 4:
-            return entries.labelled(
-                at[0] * LABEL + at[1], at[2] * LABEL + at[3], read["value"], True
-            )
+            return entries.labelled(at[0] * LABEL + at[1], at[2] * LABEL + at[3], values, True)
         n = int(max(at[0].max(), at[1].max()))
-        A = entries.assembled(n, at[0] - 1, at[1] - 1, read["value"], True)
-        return Matrix(A, grows=True)
+        return Matrix(entries.assembled(n, at[0] - 1, at[1] - 1, values, True), grows=True)
 
     return Contents({"": matrix}) if places in (2, 4) else None
+
+
+def _listed(data: bytes, places: int) -> list[Any]:
+    """The columns of lines of so many whole numbers and a value."""
+    kinds = [*((f"i{k}", np.int64) for k in range(places)), ("value", np.float64)]
+    # of lines that are too long a piece, which has too many columns or too few
+    lines = iter(partial(io.BytesIO(data.replace(b",", b" ")).readline, _LONGEST), b"")
+    read = np.loadtxt(lines, dtype=kinds, comments=["*", "%"], ndmin=1)
+    return [read[name] for name, _ in kinds]
+
+
+def read_matrix_market(data: bytes) -> Contents | None:
+    """The one matrix of a Matrix Market file; None of other files."""
+    if not data[:20].lower().startswith(b"%%matrixmarket"):
+        return None
+
+    def matrix() -> Matrix:
+        banner = _BANNER.match(data)
+        if banner is None:
+            raise UnfitError("is no matrix of real numbers by coordinates, general or symmetric")
+        n, columns, given = (int(word) for word in banner.groups()[1:])
+        entries.require_few(n, given)
+        row, column, values = _listed(data[banner.end() :], 2)
+        if n != columns or len(values) != given:
+            raise ValueError("other entries than announced")
+        half = banner.group(1).lower() == b"symmetric"
+        return Matrix(entries.assembled(n, row - 1, column - 1, values, half))
+
+    return Contents({"": matrix})
 
 
 def read_substructure(data: bytes) -> Contents | None:

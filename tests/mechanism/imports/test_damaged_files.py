@@ -17,15 +17,9 @@ from damage import damaged
 from fuzz_worker import SECONDS, Worker
 from imported_parts import arm, exported, part
 from scipy import io, sparse
-from writers import matlab, matlab73
 
 K, M = exported("planar")
 CRASHES = ((177, 2), (145, 8))  # a byte of version 5, and a bit of it: SciPy 1.17
-
-
-def oldest(folder: Path) -> tuple[str, str]:
-    matlab(folder / "p.mat", {"K": K, "M": M}, "4")
-    return "p.mat:K", "p.mat:M"
 
 
 def plain(folder: Path) -> tuple[str, str]:
@@ -35,16 +29,6 @@ def plain(folder: Path) -> tuple[str, str]:
 
 def packed(folder: Path) -> tuple[str, str]:
     io.savemat(folder / "p.mat", {"K": K, "M": sparse.csc_array(M)}, do_compression=True)
-    return "p.mat:K", "p.mat:M"
-
-
-def in_hdf5(folder: Path) -> tuple[str, str]:
-    matlab73(folder / "p.mat", {"K": K, "M": M})
-    return "p.mat:K", "p.mat:M"
-
-
-def in_pieces(folder: Path) -> tuple[str, str]:
-    matlab73(folder / "p.mat", {"K": K, "M": M}, "compression shuffle")
     return "p.mat:K", "p.mat:M"
 
 
@@ -65,7 +49,7 @@ def npy(folder: Path) -> tuple[str, str]:
     return "p.npy", "M.npy"
 
 
-WRITERS = (oldest, plain, packed, in_hdf5, in_pieces, npz, npz_sparse, npy)
+WRITERS = (plain, packed, npz, npz_sparse, npy)
 SLOW = pytest.mark.slow
 EACH = [pytest.param(4), pytest.param(200, marks=SLOW)]
 

@@ -1,14 +1,11 @@
 """A part is the same whichever program wrote it: to the last digit of each format."""
 
 import contextlib
-import re
 import tracemalloc
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported, read_matrix
@@ -25,7 +22,6 @@ from writers import (
     grids,
     mapping,
     matlab,
-    matlab73,
     op4_binary,
     op4_text,
     substructure,
@@ -111,12 +107,6 @@ def of_matlab(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tre
     return {**files, "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
 
 
-def of_matlab73(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    matlab73(folder / "part.mat", {"K": K, "M": M})
-    texts(folder, p_dof=dofs(labels), nodes_csv=CSV)
-    return {"file": "part.mat", "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
-
-
 def of_numpy(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
     """As ``np.savez`` has them, with another matrix whose name begins like that of the mass."""
     np.savez(folder / "part.npz", K=K, M=M, modes=np.ones((3, 3)))
@@ -124,18 +114,9 @@ def of_numpy(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree
     return {"file": "part.npz", "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
 
 
-def of_tables(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    """Full, as spreadsheets write them, and with blanks."""
-    np.savetxt(folder / "K.csv", K, delimiter=",")
-    np.savetxt(folder / "M.txt", M)
-    texts(folder, p_dof=dofs(labels), nodes_csv=CSV)
-    files = {"stiffness": "K.csv", "mass": "M.txt"}
-    return {**files, "nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
-
-
 WRITERS: tuple[Writer, ...] = (
     of_dmig, of_op4, of_op4_binary, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
-    of_matlab73, of_numpy, of_tables,
+    of_numpy,
 )  # fmt: skip
 
 
@@ -229,45 +210,11 @@ def test_lists_of_entries(tmp_path: Path, K: np.ndarray, write: Any) -> None:
     same(tmp_path / "K.mtx", K, write(K))
 
 
-@pytest.mark.parametrize("version", ["4", "5", "full"])
+@pytest.mark.parametrize("version", ["5", "full"])
 @pytest.mark.parametrize("packed", [True, False])
 def test_matlab(tmp_path: Path, K: np.ndarray, version: str, packed: bool) -> None:
     matlab(tmp_path / "K.mat", {"anything": K}, version, packed)
     np.testing.assert_array_equal(read_matrix(tmp_path / "K.mat", "key").toarray(), K)
-
-
-@pytest.mark.parametrize(
-    "layout",
-    ["sparse", "plain", "compression", "compression shuffle", "shuffle fletcher32 compression"],
-)
-def test_matlab_in_hdf5(tmp_path: Path, K: np.ndarray, layout: str) -> None:
-    A = K.copy()
-    A[3, 4] += 1.0  # which tells rows from columns
-    matlab73(tmp_path / "K.mat", {"anything": A}, layout)
-    np.testing.assert_array_equal(read_matrix(tmp_path / "K.mat", "key").toarray(), A)
-
-
-def test_hdf5_of_others_takes_no_more_than_the_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An array that is too large, and a piece of one that unpacks to a thousand times its size."""
-    file = tmp_path / "K.mat"
-    with h5py.File(file, "w", userblock_size=512) as written:
-        made = written.create_dataset("K", (9, 9), "f8", chunks=(9, 9), compression="gzip")
-        made.attrs["MATLAB_class"] = np.bytes_("double")
-        made.id.write_direct_chunk((0, 0), zlib.compress(bytes(200_000_000)))
-        written["elsewhere"] = h5py.SoftLink("/K")
-    with open(file, "r+b") as stream:
-        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    monkeypatch.setenv("EIGASSIGN_LIMITS", "1e-3")
-    tracemalloc.start()
-    with pytest.raises(MechanismError, match=r"cannot read K\.mat"):
-        read_matrix(file, "key")
-    assert tracemalloc.get_traced_memory()[1] < 5_000_000
-    tracemalloc.stop()
-    matlab73(file, {"K": np.ones((300, 300))}, "compression")
-    with pytest.raises(MechanismError, match=re.escape("90000 entries: more than 2e+04")):
-        read_matrix(file, "key")
 
 
 def test_a_matrix_is_told_by_its_content_and_not_by_its_ending(
@@ -331,9 +278,6 @@ def survives(folder: Path, write: Writer, count: int, seed: int) -> None:
         file.write_bytes(whole)
 
 
-OF_MATLAB = (of_matlab, of_matlab73)  # each is read by a process: see test_damaged_files.py
-
-
 @pytest.mark.parametrize("write", WRITERS)
 def test_damaged_files_are_read_or_refused(tmp_path: Path, write: Writer) -> None:
-    survives(tmp_path, write, 5 if write in OF_MATLAB else 40, 1)
+    survives(tmp_path, write, 5 if write is of_matlab else 40, 1)

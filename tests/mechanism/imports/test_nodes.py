@@ -363,7 +363,7 @@ def test_an_asymmetry_is_told_by_its_own_rows(tmp_path: Path) -> None:
         ("-5 1 1.0\n", "cannot read"),
         ("1 1 one\n", "cannot read"),
         ("1,1, 1,1\n", "cannot read"),
-        ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "cannot read"),
+        ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "save it with '-v7'"),
         ("MATLAB 5.0 MAT-file" + 109 * " ", "cannot read"),
         ("hello\n", "cannot read"),
         ("", "cannot read"),

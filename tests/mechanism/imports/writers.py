@@ -3,7 +3,6 @@
 import struct
 from pathlib import Path
 
-import h5py
 import numpy as np
 from scipy import io, sparse
 
@@ -149,23 +148,4 @@ def substructure(matrices: dict[str, np.ndarray], labels: Labels) -> str:
 
 def matlab(file: Path, matrices: dict[str, np.ndarray], version: str, packed: bool = True) -> None:
     held = {name: sparse.csc_array(A) if version != "full" else A for name, A in matrices.items()}
-    io.savemat(file, held, format="4" if version == "4" else "5", do_compression=packed)
-
-
-def matlab73(file: Path, matrices: dict[str, np.ndarray], layout: str = "sparse") -> None:
-    """HDF5 behind MATLAB's header: "sparse", "plain", or in chunks, packed by the named filters."""
-    with h5py.File(file, "w", userblock_size=512) as written:
-        for name, A in matrices.items():
-            if layout == "sparse":
-                A = sparse.csc_array(A)
-                made = written.create_group(name)
-                made.attrs["MATLAB_sparse"] = np.uint64(A.shape[0])
-                made["data"], made["ir"] = A.data, A.indices.astype(np.uint64)
-                made["jc"] = A.indptr.astype(np.uint64)
-            else:
-                how = {} if layout == "plain" else dict.fromkeys(layout.split(), True)
-                how |= {"chunks": (5, 11)} if how else {}
-                made = written.create_dataset(name, data=A.T, **how)
-            made.attrs["MATLAB_class"] = np.bytes_("double")
-    with open(file, "r+b") as stream:
-        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    io.savemat(file, held, do_compression=packed)
