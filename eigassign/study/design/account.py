@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +32,7 @@ from eigassign.study.design.conclusions import Conflict, aim_row, extreme
 from eigassign.study.design.followed import followers
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes
 from eigassign.study.design.lists import KEEP, cost
-from eigassign.study.design.search.optimum import Found, Outcome
+from eigassign.study.design.search.optimum import Found
 from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
     AssignmentRow,
@@ -51,6 +53,7 @@ Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
 CROSSED = 0.9  # of a gap, missed where both modes go through each other
+CUT = (End.SECONDS, End.STEPS, End.INTERRUPTED)  # ways that a search is ended before it is done
 UNTRUSTED = "the error of the expansion is above validation.max_error"
 
 
@@ -81,10 +84,15 @@ def assignment_row(
     deviated = tuple(_deviated(answer.robust, targets, limits, largest))
     met = all(one.satisfied for one in targets) and all(row.satisfied for row in limits)
     conflict = None if met and not deviated else _decided(scene, answer)
-    optimality = _optimality(answer, conflict, own.bound)
     conflicting = () if conflict is None else conflict.names
-    doubts, beyond = _doubts(scene, own, accuracy, motion, of_model, largest, conflicting)
-    ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
+    optimality = _optimality(answer, conflict, own.bound)
+    coarse, undecided = _of_mesh(scene, own, of_model, largest)
+    names, far = tuple(f"{name} is" for name in undecided), own.meaning.unreachable
+    beyond = [why for why in far if not why.startswith(names)]
+    doubts = list(_doubts(scene, own, accuracy, motion, largest))
+    if not beyond and (far or undecided.keys() & conflicting):
+        doubts += undecided.values()
+    first_order = found is None or (found.best.stationarity <= OPTIMAL and found.ended is None)
     said = verdict(
         Facts(
             targets=targets,
@@ -93,17 +101,17 @@ def assignment_row(
             deviated=deviated,
             robust=answer.robust is not None,
             doubts=doubts,
-            unproved=tuple(_unproved(scene, own, of_model, largest)),
+            unproved=[*coarse, *_unproved(scene, own, largest)],
             unreachable=beyond,
             conflict=_in_words(scene, answer, conflict, optimality.kind == "proved"),
             of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
-            unfinished="" if found is None or found.best.end not in ended else found.best.end.value,
+            unfinished=found.best.end.value if found is not None and found.best.end in CUT else "",
             max_error=keys.max_error,
             aim="" if aim is None else aim.words,
-            is_optimal=found is None or aim is None or _is_first_order(found),
+            is_optimal=aim is None or first_order,
         )
     )
-    row = AssignmentRow(
+    return AssignmentRow(
         method=keys.method,
         objective=keys.named_objective,
         objective_initial=merits[0][1],
@@ -117,25 +125,27 @@ def assignment_row(
         max_error_given=keys.max_error is not None,
         model_error=raised if np.isfinite(raised) else None,
         conflict=conflicting,
-        catalogue=_catalogue(scene, found),
         limits=limits,
         shortcoming=said.shortcoming,
         aim=aim,
         robust=answer.robust,
+        **({} if found is None else _searched(scene, found)),
     )
-    if found is None:
-        return row
+
+
+def _searched(scene: Scene, found: Found) -> dict[str, Any]:
+    """The fields that a search has."""
     optima = (LocalOptimum(one.y, one.objective, one.seen.violation) for one in found.optima)
-    return replace(
-        row,
-        steps=found.best.steps,
-        starts=found.starts,
-        local_optima=tuple(optima),
-        exact_solves=found.exact_solves,
-        ended=found.best.end.value,
-        finished=found.best.end in (End.OPTIMAL, End.STALLED),
-        clearances=found.clearances,
-    )
+    return {
+        "steps": found.best.steps,
+        "starts": found.starts,
+        "local_optima": tuple(optima),
+        "exact_solves": found.exact_solves,
+        "ended": found.best.end.value,
+        "finished": found.best.end in (End.OPTIMAL, End.STALLED),
+        "clearances": found.clearances,
+        "catalogue": _catalogue(scene, found),
+    }
 
 
 def _decided(scene: Scene, answer: Answer) -> Conflict | None:
@@ -144,10 +154,9 @@ def _decided(scene: Scene, answer: Answer) -> Conflict | None:
     Where all is listed each is decided by going through the lists.
     """
     open_ = {one.name for one in scene.limits if not one.is_decided}
-    if answer.found is not None and _is_settled(answer.found):
-        open_ = set()
+    settled = answer.found is not None and _is_settled(answer.found)
     found = answer.conflict
-    return None if found is None or open_.intersection(found.names) else found
+    return None if found is None or (not settled and open_.intersection(found.names)) else found
 
 
 def _doubts(
@@ -155,43 +164,59 @@ def _doubts(
     own: VerifiedAssignment,
     accuracy: Accuracy,
     motion: MotionStudy | None,
-    of_model: Mapping[int, float],
     largest: float,
-    conflicting: Sequence[str],
-) -> tuple[list[str], list[str]]:
-    """Why numbers cannot be vouched for, and which targets are out of reach for all that."""
+) -> Iterator[str]:
+    """Say why numbers cannot be vouched for."""
     judged, accepted = judged_modes(scene.file, own.targets), scene.file.validation.max_error
     # the exact optimum rests on exact frequencies, the one shot on its prediction
     trusted = all(target.approximation_error <= accepted for target in own.targets)
-    doubts = [] if trusted or own.answer.found is not None else [UNTRUSTED]
-    doubts += weight_doubt(scene.file, accuracy.weight.row, judged, largest)
-    doubts += motion_doubt(motion, judged, largest)
-    undecided = dict(_undecided(scene, own.targets, own.solved.exact, of_model, largest))
-    names, far = tuple(f"{name} is" for name in undecided), own.meaning.unreachable
-    beyond = [why for why in far if not why.startswith(names)]
-    if not beyond and (far or undecided.keys() & conflicting):
-        doubts += undecided.values()
-    return doubts, beyond
+    if not trusted and own.answer.found is None:
+        yield UNTRUSTED
+    yield from weight_doubt(scene.file, accuracy.weight.row, judged, largest)
+    yield from motion_doubt(motion, judged, largest)
 
 
-def _unproved(
-    scene: Scene, own: VerifiedAssignment, of_model: Mapping[int, float], largest: float
-) -> Iterator[str]:
+def _of_mesh(
+    scene: Scene, own: VerifiedAssignment, of_model: Mapping[int, float], accepted: float
+) -> tuple[list[str], dict[str, str]]:
+    """Which target may be missed most, by as much as mesh and reduced links raise its modes.
+
+    And which are missed by less than that, by name: a finer mesh may meet them. Bands are checked
+    for themselves, and what nothing raises is what it seems to be. Deviations of a robust design
+    may have used up whatever room it has.
+    """
+    exact, at_stake, undecided = own.solved.exact, [(accepted, "")], dict[str, str]()
+    for target in own.targets:
+        too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
+        if not too_high > 0.0 or not target.asked.terms:
+            continue
+        how = f"mesh and reduced links raise the frequencies {raised_by(too_high)}"
+        help_, asked = capital(finer(scene.model)), target.asked
+        if target.satisfied:
+            stake = asked.stake(exact, too_high) if own.answer.robust is None else too_high
+            if np.isfinite(too_high):
+                how += f", so that it may be missed by {100 * stake:.3g} %"
+            how += f"; accepted are {100 * accepted:.3g} %"
+            at_stake.append((stake, f"{target.label}: {how}. {help_}"))
+            continue
+        lower = exact.hz / (1.0 + too_high), exact.followed / (1.0 + too_high), exact.numbers
+        least = float(asked.least_errors(Solved(*lower), exact).max())
+        if least <= (accepted if asked.is_goal else MET):
+            missed = f"missed by {100 * target.error.exact.max_relative:.3g} %"
+            undecided[target.label] = f"{target.label}: {missed}, and {how}. {help_}"
+    words = max(at_stake, key=itemgetter(0))[1]
+    return [words] if words else [], undecided
+
+
+def _unproved(scene: Scene, own: VerifiedAssignment, largest: float) -> Iterator[str]:
     """Say what cannot be said to be met though it seems so."""
-    answer, found, targets = own.answer, own.answer.found, own.targets
+    answer, found = own.answer, own.answer.found
     designs = [answer.y] if found is None else found.task.designs(answer.y)
-    robust = answer.robust is not None
-    yield from _too_coarse(scene, targets, own.solved.exact, of_model, largest, robust)
-    yield from _missed_between(scene, designs, targets, largest)
+    yield from _missed_between(scene, designs, own.targets, largest)
     for y in designs:
         yield from (f"{each}: {finer(scene.model)}" for each in _too_stiff(scene, y))
     if found is not None and (bands := "; ".join(_why_unproved(scene, found))):
         yield f"not clear, as far as is checked: {bands}"
-
-
-def _is_first_order(found: Found) -> bool:
-    """True where no small change is better; of listed values where all were gone through."""
-    return found.best.stationarity <= OPTIMAL and found.ended is None
 
 
 def _deviated(
@@ -290,62 +315,6 @@ def _in_words(scene: Scene, answer: Answer, contradiction: Conflict | None, prov
     return f"no design within the bounds {meets} {listed}{together}{deviating}"
 
 
-def _too_coarse(
-    scene: Scene,
-    targets: Sequence[TargetStudy],
-    exact: Solved,
-    of_model: Mapping[int, float],
-    accepted: float,
-    robust: bool,
-) -> Iterator[str]:
-    """Say which target may be missed most by as much as mesh and reduced links raise its modes.
-
-    Bands are checked for themselves, and what nothing raises is what it seems to be. Deviations of
-    a robust design may have used up whatever room it has.
-    """
-    worst, label, raised = 0.0, "", 0.0
-    for target in targets:
-        too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
-        if too_high > 0.0 and target.asked.terms:
-            stake = too_high if robust else target.asked.stake(exact, too_high)
-            worst, label, raised = max((worst, label, raised), (stake, target.label, too_high))
-    if worst <= accepted:
-        return
-    missed = f", so that it may be missed by {100 * worst:.3g} %" if np.isfinite(raised) else ""
-    yield (
-        f"{label}: mesh and reduced links raise the frequencies "
-        f"{raised_by(raised)}{missed}; accepted are {100 * accepted:.3g} %. "
-        f"{capital(finer(scene.model))}"
-    )
-
-
-def _undecided(
-    scene: Scene,
-    targets: Sequence[TargetStudy],
-    exact: Solved,
-    of_model: Mapping[int, float],
-    accepted: float,
-) -> Iterator[tuple[str, str]]:
-    """Yield the targets that are missed by less than mesh and reduced links may raise their modes.
-
-    Each with the words for it: a finer mesh may meet them.
-    """
-    for target in targets:
-        too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
-        if target.satisfied or not too_high > 0.0 or not target.asked.terms:
-            continue
-        own = exact.hz / (1.0 + too_high), exact.followed / (1.0 + too_high), exact.numbers
-        least = float(target.asked.least_errors(Solved(*own), exact).max())
-        if least > (accepted if target.asked.is_goal else MET):
-            continue
-        missed = target.error.exact.max_relative
-        yield (
-            target.label,
-            f"{target.label}: missed by {100 * missed:.3g} %, and mesh and reduced links raise the "
-            f"frequencies {raised_by(too_high)}. {capital(finer(scene.model))}",
-        )
-
-
 def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:
     """Say which bands are not clear, and what the model leaves open where they are clear in it."""
     y = found.best.y
@@ -369,33 +338,28 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def _catalogue(scene: Scene, found: Found | None) -> CatalogueRow | None:
-    """The best combinations of the catalogues."""
+def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
+    """The best combinations of the catalogues, with what each is worth."""
     own, best = scene.file.design.catalogues, list[CombinationRow]()
-    if not own or found is None:
+    if not own:
         return None
     for one in found.outcomes[:KEEP]:
-        rows = zip(own, one.choice.rows, strict=True)
-        choices = {catalogue.name: catalogue.choices[k] for catalogue, k in rows}
-        best.append(_combination(scene, one, choices))
+        rows, y = zip(own, one.choice.rows, strict=True), one.best.y
+        curves = one.searched.variant.requirements.curves(one.best.seen)
+        errors = (float(each.outside(hz, hz).max()) for each, hz, _ in curves if each.is_goal)
+        best.append(
+            CombinationRow(
+                choices={catalogue.name: catalogue.choices[k] for catalogue, k in rows},
+                design=y,
+                objective=one.best.objective,
+                violation=one.best.seen.violation,
+                error=max(errors, default=None),
+                mass=scene.model.mass(y),
+                price=cost(scene, y),
+            )
+        )
     gap = 0.0 if _is_settled(found) else None
     return CatalogueRow(found.choices - found.untried, gap, tuple(best))
-
-
-def _combination(scene: Scene, one: Outcome, choices: Mapping[str, str]) -> CombinationRow:
-    """One combination with what it is worth."""
-    best, asked = one.best, one.searched.variant.requirements
-    curves = ((each, hz) for each, hz, _ in asked.curves(best.seen) if each.is_goal)
-    errors = [float(each.outside(hz, hz).max()) for each, hz in curves]
-    return CombinationRow(
-        choices=choices,
-        design=best.y,
-        objective=best.objective,
-        violation=best.seen.violation,
-        error=max(errors, default=None),
-        mass=scene.model.mass(best.y),
-        price=cost(scene, best.y),
-    )
 
 
 def _merits(
