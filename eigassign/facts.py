@@ -129,6 +129,11 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def verdict_word(word: str) -> str:
+    """The word of a verdict as people read it, wherever it stands: ``Do not use``."""
+    return capital(word.replace("_", " "))
+
+
 def number(value: float) -> str:
     """Four significant digits: ``0.2287``, and 15430 rather than 1.543e+04; no sign on a zero."""
     return f"{float(f'{value:.4g}') + 0.0:.7g}"

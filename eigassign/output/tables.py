@@ -21,8 +21,8 @@ from eigassign.facts import (
     percent,
     positive_percent,
     seconds,
+    verdict_word,
 )
-from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import (
     MET,
     Comparison,

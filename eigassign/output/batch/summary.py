@@ -17,11 +17,10 @@ from typing import Annotated, Any, Literal, get_args
 from eigassign._version import __version__
 from eigassign.case.units import QuantityError, read_quantity
 from eigassign.errors import StorageError
-from eigassign.facts import Fact, Seconds, Share
+from eigassign.facts import Fact, Seconds, Share, verdict_word
 from eigassign.files import name_of, printable
 from eigassign.output.store.atomic import replace_synced
 from eigassign.output.tables import Table, facts_table
-from eigassign.study.design.verdict import verdict_word
 from eigassign.study.results import RunResults
 
 Status = Literal["ok", "tolerance", "failed", "error"]

@@ -30,10 +30,9 @@ from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, lowest_room
 from eigassign.study.design.conclusions import Conflict, aim_row, extreme
 from eigassign.study.design.followed import followers
-from eigassign.study.design.judgement import SolvedDesigns, judged_modes
+from eigassign.study.design.judgement import Facts, SolvedDesigns, judged_modes, verdict
 from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found
-from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
     AssignmentRow,
     CatalogueRow,

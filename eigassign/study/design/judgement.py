@@ -1,4 +1,18 @@
-"""What a design does to the targets: the distance to each, as it says itself; modes that meet."""
+"""What a design does to the targets, and the verdict: one word and its reason.
+
+In this order, the first that holds:
+
+    infeasible     limits that need no frequency contradict
+    do_not_use     numbers of the answer cannot be vouched for
+    unreachable    a target is out of reach whatever the design
+    infeasible     limits contradict, some of them on frequencies
+    do_not_use     every target seems to be met, and that cannot be vouched for
+    reached        every target is met and every limit kept, to the accuracy that is accepted; what
+                   is to be light, high or wide is first-order optimal besides
+    do_not_use     limits are not met
+    improved       better than the initial design
+    do_not_use     no better than that
+"""
 
 from __future__ import annotations
 
@@ -13,6 +27,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import StaticTarget
+from eigassign.facts import verdict_word
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.solver import modes
@@ -22,6 +37,7 @@ from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
     FollowedRow,
+    LimitRow,
     ModeRow,
     TargetAlong,
     TargetStudy,
@@ -196,3 +212,135 @@ def crossing_warnings(
                 f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design. If they "
                 "cross, each number goes on with the motion of the other: name a mode by its shape"
             )
+
+
+# --- The verdict
+
+IMPROVED = 0.01  # of the merit of the start
+GAINED = 1e-9  # of what is to be light, high or wide: less is round-off
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the verdict rests on.
+
+    ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
+    why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
+    so; ``unreachable`` which targets are out of reach; ``deviated`` what is met and is not within
+    the tolerances, of a ``robust`` design; ``conflict`` which limits contradict, and
+    ``of_frequencies`` whether some of these are on frequencies; ``unfinished`` how a search was
+    ended before it was done. ``max_error`` is the largest error accepted where the case says it.
+    ``aim`` says what an objective that is no error has come to, and ``is_optimal`` whether that is
+    first-order optimal.
+    """
+
+    targets: Sequence[TargetStudy]
+    merits: tuple[tuple[float, float], tuple[float, float]]
+    limits: Sequence[LimitRow] = ()
+    doubts: Sequence[str] = ()
+    unproved: Sequence[str] = ()
+    unreachable: Sequence[str] = ()
+    deviated: Sequence[str] = ()
+    robust: bool = False
+    conflict: str = ""
+    of_frequencies: bool = True
+    unfinished: str = ""
+    max_error: float | None = None
+    aim: str = ""
+    is_optimal: bool = True
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The word, why in a sentence, and why this is no answer to build on; None if it is."""
+
+    word: str
+    reason: str
+    shortcoming: str | None
+
+
+def verdict(facts: Facts) -> Verdict:
+    """The verdict of these facts."""
+    word, reason = _word(facts)
+    if facts.unfinished:
+        reason = f"{reason}; unfinished: {facts.unfinished}"
+    return Verdict(word, reason, _shortcoming(facts, word, reason))
+
+
+def _word(facts: Facts) -> tuple[str, str]:
+    missed = [target for target in facts.targets if not target.satisfied]
+    broken = [row.stated for row in facts.limits if not row.satisfied]
+    broken += facts.deviated
+    if facts.conflict and not facts.of_frequencies:
+        return "infeasible", _beside(facts.conflict, broken)
+    if facts.doubts:
+        return "do_not_use", "; ".join(facts.doubts)
+    missed.sort(key=lambda one: (one.asked.is_goal, -one.error.exact.max_relative))
+    worst = next(iter(missed), None)  # limits decide before what is wanted
+    far = [*([] if worst is None else [_far(worst)]), *broken]
+    if facts.unreachable:
+        return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
+    if facts.conflict:
+        return "infeasible", _beside(facts.conflict, far)
+    if not far:
+        if facts.unproved:
+            return "do_not_use", "; ".join(facts.unproved)
+        if facts.is_optimal:
+            checked = ", also for all deviations within the tolerances that were checked"
+            return "reached", (facts.aim or "every target is met") + checked * facts.robust
+        far = [f"{facts.aim}; a better design may be near (not first-order optimal)"]
+    (before_violation, before), (violation, after) = facts.merits
+    gain = IMPROVED * before
+    if facts.aim:  # all limits are kept: whatever is gained is one
+        gain = GAINED * abs(before)
+    if violation > MET:
+        limits = broken if broken and (worst is None or worst.asked.is_goal) else far
+        return "do_not_use", f"no design was found that meets all limits: {_all(limits)}"
+    if before_violation > MET or after < before - gain:
+        though = "" if worst is None else _though(worst)
+        return "improved", f"better than the initial design; {_all(far)}{though}"
+    return "do_not_use", f"no better than the initial design: {_all(far)}"
+
+
+def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
+    if word not in ("reached", "improved"):
+        return f"{verdict_word(word).lower()}: {reason}"
+    wanted = [target for target in facts.targets if target.asked.is_goal] or facts.targets
+    error = max((target.error.exact.max_relative for target in wanted), default=0.0)
+    if facts.max_error is None or error <= facts.max_error:
+        return None
+    limit = f"{100 * facts.max_error:g} % of assignment.max_error"
+    return f"worst error {100 * error:.3g} %, above the {limit}"
+
+
+def _beside(conflict: str, far: Sequence[str]) -> str:
+    return f"{conflict} ({_all(far)})" if far else conflict
+
+
+def _all(far: Sequence[str]) -> str:
+    return "; ".join(far)
+
+
+def _far(target: TargetStudy) -> str:
+    """Where the target ends, and how far off: ``mode 1 at 48 Hz: 45.11 Hz, 6.02 % off at worst``.
+
+    A band has no frequency of its own.
+    """
+    asked, worst = target.asked, f"{100 * target.error.exact.max_relative:.3g} %"
+    said = f"{worst} off at worst" if asked.is_goal else f"violated by {worst} at worst"
+    if not asked.terms:
+        return f"{target.label}: {said}"
+    k = int(asked.outside(target.exact_hz, target.exact_hz).argmax())
+    return f"{target.label}: {target.exact_hz[k]:.4g} Hz, {said}"
+
+
+def _though(target: TargetStudy) -> str:
+    """Say that the largest error has grown, where the mean one is what has fallen."""
+    before, after = target.error.initial, target.error.exact
+    if not target.asked.is_goal or after.max_relative <= before.max_relative:
+        return ""
+    fell = "" if after.rms_relative >= before.rms_relative else (
+        f", while the rms error fell from {100 * before.rms_relative:.3g} to "
+        f"{100 * after.rms_relative:.3g} %"
+    )  # fmt: skip
+    return f" (before: {100 * before.max_relative:.3g} %){fell}"
