@@ -36,6 +36,7 @@ from eigassign.study.results import (
 
 Floats = NDArray[np.float64]
 SAGGING = 6  # nodes in the table; results.json has all
+TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 _RANGES = "label lowest_hz highest_hz error"
 STAGES = {  # of a run, as they are named in results.json
     "model": "assembly of K and M",

@@ -29,7 +29,7 @@ from eigassign.output.batch.summary import (
     write_junit,
 )
 from eigassign.output.pages import TEMPLATES, inside, page_of
-from eigassign.output.reports.verdict import TONES
+from eigassign.output.tables import TONES
 from eigassign.output.store.atomic import replace_synced
 
 _MANY = 100  # values of a key: more are a sample's, which need not be told apart

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.facts import about, capital, number, percent
-from eigassign.output.tables import headline, violated
+from eigassign.output.tables import TONES, headline, violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
 MOST = 8  # findings on the first screen
-TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 
 
 @dataclass(frozen=True)
