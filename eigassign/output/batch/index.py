@@ -29,8 +29,8 @@ from eigassign.output.batch.summary import (
     write_junit,
 )
 from eigassign.output.pages import TEMPLATES, inside, page_of
-from eigassign.output.tables import TONES
 from eigassign.output.store.atomic import replace_synced
+from eigassign.output.tables import TONES
 
 _MANY = 100  # values of a key: more are a sample's, which need not be told apart
 _MESSAGE = 400  # characters of it: a page of a thousand rows stays below 2 MB

@@ -2,8 +2,7 @@
 
 In reading order; each imports from those above it only:
 
-    verdict   the first screen of a report
-    page      report.html, and what a run or modes leave in a folder
+    page      report.html from its first screen on, and what a run or modes leave in a folder
     notebook  figures and tables of a case or result in a notebook
     update    the tables and the folder of an update
     chart     the tables and the folder of a chart
