@@ -19,8 +19,8 @@ import click
 
 from eigassign.case import json_schema
 from eigassign.case.units import DIMENSIONS
-from eigassign.cli import cli
-from eigassign.output import NUMBERS, results_schema
+from eigassign.cli import cli, results_schema
+from eigassign.output import NUMBERS
 
 FOLDER = Path(__file__).parents[1] / "eigassign" / "docs" / "reference"
 SCHEMA = json_schema()

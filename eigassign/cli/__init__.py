@@ -29,6 +29,7 @@ from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
 from eigassign.cli.inspect import check, modes, schema
+from eigassign.cli.inspect import results_schema as results_schema
 from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
 from eigassign.cli.start import docs, init

@@ -203,7 +203,17 @@ def schema(of: str) -> int:
 
         print_json(json_schema(), indent=2)
     else:
-        from eigassign.output.schema import results_schema
-
         print_json(results_schema(of), indent=2)
     return 0
+
+
+def results_schema(left_by: str) -> dict[str, Any]:
+    """JSON Schema (2020-12) of the file that a run, an update, a batch or a chart leaves."""
+    from eigassign.chart.results import Chart
+    from eigassign.output.batch.summary import SummaryDocument
+    from eigassign.output.documents import schema_of
+    from eigassign.study.results import RunResults
+    from eigassign.study.updating.fit import UpdateResults
+
+    rows = (RunResults, UpdateResults, SummaryDocument, Chart)
+    return schema_of(dict(zip(LEFT_BY, rows, strict=True))[left_by])

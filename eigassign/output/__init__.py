@@ -3,7 +3,7 @@
 In reading order; each imports from those above it only:
 
     store         files and folders that are written whole or not at all: runs, the cache
-    documents     rows as JSON: results.json
+    documents     rows as JSON, and the schema of that: results.json
     result_files  the CSV files of a run
     tables        the tables of a run as text
     console       results on stdout, progress on stderr
@@ -11,7 +11,6 @@ In reading order; each imports from those above it only:
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
     batch         what a batch leaves: summaries, junit.xml, index.html
-    schema        JSON Schemas of the files of results
 """
 
 from eigassign.faces import face
@@ -31,9 +30,8 @@ __all__, __getattr__, __dir__ = face(
         "figures.screen": "screen_figure",
         "reports.chart": "chart_tables write_chart",
         "reports.page": "page verdict_of write_modes write_run",
-        "documents": "results_document to_json",
+        "documents": "NUMBERS results_document to_json",
         "result_files": "sample_files",
-        "schema": "FILES NUMBERS results_schema",
         "store.cache": "Cache content_key default_directory",
         "store.run_folder": "run_folder",
         "store.run_record": "is_untouched",

@@ -11,11 +11,12 @@ import pytest
 from synthetic_results import as_limit, make_results, studied
 
 import eigassign as ea
-from eigassign.cli import main
-from eigassign.output import FILES, CaseOutcome, results_schema, to_json, write_files
+from eigassign.cli import main, results_schema
+from eigassign.output import CaseOutcome, to_json, write_files
 from eigassign.study import ErrorRow, RunResults
 
 CASES = Path(__file__).parents[2] / "cases"
+FILES = ("run", "update", "batch", "chart")
 TYPES = {
     "string": str, "boolean": bool, "integer": int, "number": (int, float), "array": list,
     "object": dict, "null": type(None),
