@@ -181,7 +181,7 @@ def _nearest(
     names = {one.name for one in (*others, *scene.limits) if one in others or one.constraint}
     task = Task(alone, (there, *beside, *bands), (Margin(),) * len(bands))
     belows = Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]
-    every, (lower, upper) = Choices(task, belows, y, names), scene.bounds
+    every, (lower, upper) = Choices(task, belows, names), scene.bounds
     if every.count > COMBINED * len(belows):
         return None
     found = []

@@ -343,8 +343,8 @@ def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
     if not own:
         return None
     for one in found.outcomes[:KEEP]:
-        rows, y = zip(own, one.choice.rows, strict=True), one.best.y
-        curves = one.searched.variant.requirements.curves(one.best.seen)
+        rows, y = zip(own, one.rows, strict=True), one.best.y
+        curves = one.variant.requirements.curves(one.best.seen)
         errors = (float(each.outside(hz, hz).max()) for each, hz, _ in curves if each.is_goal)
         best.append(
             CombinationRow(

@@ -211,7 +211,7 @@ def _choice_notes(found: Found) -> Iterator[str]:
         )
         yield f"of {found.choices} choices of {' and '.join(filter(None, of))}: {said}"
     for one in found.outcomes[:SAID] if found.task.bands and len(found.outcomes) > 1 else ():
-        numbers = zip(found.task.bands, one.choice.below, strict=True)
+        numbers = zip(found.task.bands, one.below, strict=True)
         choice = ", ".join(f"{band.label} with {k} below it" for band, k in numbers)
         best = one.best
         value = -best.objective if found.variant.problem.is_one_sided else best.objective

@@ -277,10 +277,14 @@ def solve_design(
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Solved:
     """Solve ``count`` or all shown modes, and those followed; raises LostModeError too."""
-    alone = unfollowed(scene.exact(y, count, progress))
+    return with_followed(scene, own, y, scene.exact(y, count, progress))
+
+
+def with_followed(scene: Scene, own: Sequence[Follower], y: Floats, hz: Floats) -> Solved:
+    """Frequencies (n_t, n_modes) of a design (n_y,) with those of the modes that are followed."""
     if not own:
-        return alone
-    return replace(follow_all(scene.model, scene.path, own, y, 1).solved, hz=alone.hz)
+        return unfollowed(hz)
+    return replace(follow_all(scene.model, scene.path, own, y, 1).solved, hz=hz)
 
 
 def unfollowed(hz: Floats) -> Solved:

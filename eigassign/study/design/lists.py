@@ -62,16 +62,11 @@ def with_rows(listed: Sequence[ListedValues], rows: Ints, y: Floats) -> Floats:
     return designs
 
 
-def every_combination(allowed: Sequence[Ints], at_once: int) -> Iterator[Ints]:
-    """Yield all combinations (n, n_lists), so many at a time; the last list varies first."""
-    if not allowed:  # there is one, of nothing
-        yield np.zeros((1, 0), dtype=np.intp)
-        return
-    sizes = tuple(map(len, allowed))
-    for start in range(0, prod(sizes), at_once):
-        places = np.arange(start, min(start + at_once, prod(sizes)))
-        each = zip(allowed, np.unravel_index(places, sizes), strict=True)
-        yield np.stack([np.asarray(rows)[at] for rows, at in each], axis=1)
+def every_combination(allowed: Sequence[Ints]) -> Ints:
+    """All combinations (n, n_lists); the last list varies first. There is one of no lists."""
+    each = np.meshgrid(*allowed, indexing="ij")
+    shape = prod(map(len, allowed)), len(allowed)
+    return np.stack(each, axis=-1).reshape(shape) if allowed else np.zeros(shape, dtype=np.intp)
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from math import prod
 from time import monotonic
 
@@ -34,9 +33,9 @@ from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import EigassignError
+from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import check_band, wanting
-from eigassign.study.design.lists import KEEP, Rows, catalogues, every_combination, with_rows
+from eigassign.study.design.lists import KEEP, catalogues, every_combination, with_rows
 from eigassign.study.design.search.response import reduced_models
 from eigassign.study.design.search.starts import (
     SOLVES,
@@ -59,9 +58,7 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-# Choices that are gone through: 81 000 take 3 s beside their solves. Of more, those about the best.
-MOST = 200_000
-ROUNDS = 5  # times that those about a better one are gone through
+MOST = 200_000  # choices that are gone through: 81 000 take 3 s beside their solves
 TRIES = 100  # choices that are estimated before the best of them is searched
 TOGETHER = 64  # choices that are bounded together
 PROMISING = 4  # of designs all over the bounds: those that a choice with bands is searched from
@@ -71,42 +68,11 @@ BOUNDED, TRIED, DONE, EXCLUDED = 0, 100, 101, 102  # what is known of a choice; 
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A row of every list, and k of every band; None of one that is left out."""
-
-    rows: Rows
-    below: Counts
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A choice that was searched: its optima, the best first, and its bands as they were checked.
-
-    ``missed`` is what the best misses, of bands between the samples too.
-    """
-
-    choice: Choice
-    searched: Searched
-    missed: float
-    clearances: tuple[ClearanceRow, ...] = ()
-
-    @property
-    def best(self) -> Optimum:
-        """The best design found."""
-        return self.searched.optima[0]
-
-    @property
-    def worth(self) -> tuple[float, float]:
-        """What is missed, and F."""
-        return self.missed, self.best.objective
-
-
-@dataclass(frozen=True)
 class Found:
     """The best design, what it was chosen among, and how much work that was."""
 
     task: Task
-    outcomes: tuple[Outcome, ...]  # of the choices that were searched, the best first
+    outcomes: tuple[Searched, ...]  # of the choices that were searched, the best first
     choices: int  # of all lists and bands
     untried: int  # of these, neither excluded nor searched
     initial: tuple[float, float]  # violation and objective of the initial design
@@ -118,12 +84,12 @@ class Found:
     @property
     def variant(self) -> PosedProblem:
         """The problem of the best choice."""
-        return self.outcomes[0].searched.variant
+        return self.outcomes[0].variant
 
     @property
     def optima(self) -> tuple[Optimum, ...]:
         """Its distinct local optima, the best first."""
-        return self.outcomes[0].searched.optima
+        return self.outcomes[0].optima
 
     @property
     def best(self) -> Optimum:
@@ -138,12 +104,12 @@ class Found:
     @property
     def tally(self) -> Tally | None:
         """Of the starts of the best choice."""
-        return self.outcomes[0].searched.tally
+        return self.outcomes[0].tally
 
     @property
     def lost(self) -> tuple[str, ...]:
         """Designs passed over because a followed mode is lost there."""
-        return tuple(dict.fromkeys(line for one in self.outcomes for line in one.searched.lost))
+        return tuple(dict.fromkeys(line for one in self.outcomes for line in one.lost))
 
     @property
     def are_listed(self) -> bool:
@@ -158,8 +124,7 @@ class Found:
     def replaced(self, best: Optimum) -> Found:
         """The same with another best design."""
         first, *others = self.outcomes
-        searched = replace(first.searched, optima=(best, *self.optima[1:]))
-        return replace(self, outcomes=(replace(first, searched=searched), *others))
+        return replace(self, outcomes=(first.with_best(best), *others))
 
     def initial_solved(self, count: int) -> Solved | None:
         """The initial design as the search has solved it; None without so many modes."""
@@ -210,7 +175,7 @@ class Choices:
     """
 
     def __init__(
-        self, task: Task, belows: Sequence[Counts], about: Floats, names: Collection[str] | None
+        self, task: Task, belows: Sequence[Counts], names: Collection[str] | None = None
     ) -> None:
         self.task, self.names, self.listed = task, names, catalogues(task.scene.file)
         self.belows = belows
@@ -219,8 +184,13 @@ class Choices:
         self.is_discrete = bool(columns) and not np.delete(upper > lower, columns).any()
         allowed = [own.distinct for own in self.listed]
         self.count = prod(map(len, allowed)) * len(belows)
-        self.is_whole = self.count <= MOST
-        rows = next(every_combination(allowed, MOST)) if self.is_whole else self._near(about)
+        if self.count > MOST:
+            message = (
+                f"leaves {self.count} choices of its lists and of modes below bands, and {MOST} "
+                "are gone through at most: shorten the lists"
+            )
+            raise CaseError((task.scene.file.problem("design", message),))
+        rows = every_combination(allowed)
         self.bases: dict[int, PosedProblem] = {}
         self.rows = np.tile(rows, (len(belows), 1))
         self.of = np.repeat(range(len(belows)), len(rows))
@@ -236,19 +206,6 @@ class Choices:
         outlook = self.base(0).outlook
         self.levels = 0 if outlook is None else outlook.levels
 
-    def _near(self, about: Floats) -> Ints:
-        """The combinations that differ from the nearest to a design in two lists at most."""
-        centre = np.array([own.nearest(about) for own in self.listed])
-        found = [centre]
-        for pair in combinations(range(len(self.listed)), min(2, len(self.listed))):
-            some = [own.distinct if k in pair else centre[[k]] for k, own in enumerate(self.listed)]
-            found += [*next(every_combination(some, MOST))]
-        return np.unique(found, axis=0)
-
-    def choice(self, k: int) -> Choice:
-        """The rows and the numbers of one."""
-        return Choice(tuple(self.rows[k].tolist()), self.belows[self.of[k]])
-
     def base(self, k: int) -> PosedProblem:
         """The problem of some numbers below the bands, whatever the rows."""
         if k not in self.bases:
@@ -261,10 +218,7 @@ class Choices:
         return self._only(variant_of(task, self.belows[self.of[k]], self.soft, held))
 
     def _only(self, variant: PosedProblem) -> PosedProblem:
-        if self.names is None:
-            return variant
-        some = variant.with_limits(self.names)
-        return replace(some, problem=replace(some.problem, cost=None))
+        return variant if self.names is None else variant.with_limits(self.names)
 
     @property
     def bounds_left(self) -> NDArray[np.bool_]:
@@ -280,10 +234,7 @@ class Choices:
         return own[np.lexsort((value, np.where(met, 0.0, missed), late))]
 
     def left(self, most: int) -> Iterator[PosedProblem | None]:
-        """Yield the problems that bounds do not exclude, the best first; None for more than most.
-
-        So, too, where there are so many that not all are looked at.
-        """
+        """Yield problems that bounds do not exclude, the best first; None for more than most."""
         open_, met = np.ones(len(self.of), dtype=bool), 0
         while open_.any():
             order = self.ahead(open_)
@@ -294,11 +245,10 @@ class Choices:
                 self.learn(k, order)
                 continue
             if (met := met + 1) > most:
+                yield None
                 break
             open_[k] = False
             yield self.posed(k, self.task)
-        if met > most or not self.is_whole:
-            yield None
 
     def learn(self, first: int, order: Ints) -> None:
         """Look at the next level of one choice, and of some that are alike in this order."""
@@ -328,13 +278,13 @@ class _Search:
     ) -> None:
         self.task, self.starts = task, starts
         self.deadline, self.progress = deadline, progress
-        models = None if followed_modes(task.scene.file) else reduced_models(task.scene)
-        self.levels = coarse_to_fine(task, models)
+        self.models = None if followed_modes(task.scene.file) else reduced_models(task.scene)
+        self.levels = coarse_to_fine(task, self.models)
         few = self.levels[0]
         self.designs = Designs.all_over(few.scene, few.wanted, SPREAD) if few.bands else None
         belows: Sequence[Counts] = [()] if self.designs is None else self.designs.choices
-        self.every = Choices(task, belows, starts[0], None)
-        self.outcomes: list[Outcome] = []
+        self.every = Choices(task, belows)
+        self.outcomes: list[Searched] = []
         self.failed: EigassignError | None = None
         self.ended: End | None = None
         self.made = self.tried = self.spent = 0
@@ -342,34 +292,29 @@ class _Search:
         self.keep = KEEP if self.every.is_discrete else 1
 
     @property
-    def ranked(self) -> list[Outcome]:
+    def ranked(self) -> list[Searched]:
         """Those that were searched, the best first."""
-        return best_first(self.outcomes, lambda one: one.worth)
+        return best_first(self.outcomes, lambda one: (one.missed, one.best.objective))
 
     def found(self) -> Found:
         """The best of all choices."""
-        for _ in range(ROUNDS):
-            self.run()
-            better = self.about_the_best()
-            if better is None or self.ended:
-                break
-            self.every = better
+        self.run()
         if not self.outcomes and self.failed is not None:
             raise self.failed
         scene, every = self.task.scene, self.every
         best, *others = self.ranked
         if self.ended is not None:
-            optima = replace(best.best, end=self.ended), *best.searched.optima[1:]
-            best = replace(best, searched=replace(best.searched, optima=optima))
-        glances = (one for level in self.levels for one in level.glances.values())
+            best = best.with_best(replace(best.best, end=self.ended))
+        solved = [one for level in self.levels for one in level.glances.values()]
+        beside = sum(one.exact_solves for one in [*solved, self.models] if one is not None)
         return Found(
             task=self.task,
             outcomes=(best, *others),
             choices=every.count,
-            untried=int((every.level < DONE).sum()) + every.count - len(every.of),
-            initial=_initial(scene, best.searched.variant),
+            untried=int((every.level < DONE).sum()),
+            initial=_initial(scene, best.variant),
             starts=self.made,
-            exact_solves=len(scene.path.q) + self.spent + sum(one.exact_solves for one in glances),
+            exact_solves=len(scene.path.q) + self.spent + beside,
             every=every,
             ended=self.ended,
         )
@@ -394,9 +339,8 @@ class _Search:
             self.ended = End.INTERRUPTED
         if not self.outcomes and self.ended is not None:
             self.progress(f"  {self.ended.value}: judging the best that is known")
-            away = np.abs(every.lower + every.upper - 2.0 * self.starts[0])
-            width = np.where((reach := np.ptp(every.lower, axis=0)) > 0.0, reach, np.inf)
-            nearest = int((away / width).sum(axis=1).argmin())
+            near = [own.nearest(self.starts[0]) for own in every.listed]
+            nearest = int(np.equal(every.rows, near).all(axis=1).argmax())
             best = every.ahead(np.isin(range(len(every.of)), [*self.leads]))
             self.search(int(best[0]) if best.size else nearest)
 
@@ -406,7 +350,7 @@ class _Search:
         best = self.ranked[: self.keep]
         open_ = every.level < DONE
         if len(best) == self.keep:
-            missed, value = best[-1].worth
+            missed, value = best[-1].missed, best[-1].best.objective
             least = value - BEFORE * abs(value)
             beyond = every.missed > MET if missed <= MET else every.missed >= missed - MET
             beyond |= (every.value >= least) & (missed <= MET)
@@ -444,36 +388,36 @@ class _Search:
 
     def search(self, k: int) -> None:
         """The optima of a choice from all starts, with its bands clear between the samples too."""
-        every, choice = self.every, self.every.choice(k)
+        every, below = self.every, self.every.belows[self.every.of[k]]
         every.level[k] = DONE
         if len(every.of) > 1:
             self.progress(f"  {len(self.outcomes) + 1} of {len(every.of)} choices searched")
         margins = self.task.margins
         try:
-            searched = self.searched(k, margins, (), not every.is_discrete)
+            found = self.searched(k, margins, (), not every.is_discrete)
         except EigassignError as error:
             self.failed, every.missed[k] = self.failed or error, np.inf
             if len(every.of) == 1:
                 raise
             return
-        missed = searched.optima[0].seen.violation
-        if margins and MET < missed <= 2.0 * MARGIN:  # but for the margin it may be met
+        if margins and MET < found.missed <= 2.0 * MARGIN:  # but for the margin it may be met
             margins = (Margin(),) * len(margins)
-            searched = self.searched(k, margins, [searched.optima[0].y], False)
-            missed = searched.optima[0].seen.violation
-        rows = _clearances(self.task, choice.below, searched.optima[0].y)
+            found = self.searched(k, margins, [found.best.y], False)
+        missed, rows = found.missed, _clearances(self.task, below, found.best.y)
         for drawn in range(DRAWN if missed <= MET and not self.ended else 0):
             if not wanting(rows):
                 break
             margins = _drawn_in(margins, rows, 1.1 if 2 * drawn < DRAWN else 2.0)
-            again = self.searched(k, margins, [searched.optima[0].y], False)
-            if again.optima[0].seen.violation > MET:
+            again = self.searched(k, margins, [found.best.y], False)
+            if again.missed > MET:
                 break
-            searched = again
-            rows = _clearances(self.task, choice.below, searched.optima[0].y)
+            found, rows = again, _clearances(self.task, below, again.best.y)
         missed = missed if missed > MET else wanting(rows)
-        every.missed[k], every.value[k] = missed, searched.optima[0].objective
-        self.outcomes.append(Outcome(choice, searched, missed, rows))
+        every.missed[k], every.value[k] = missed, found.best.objective
+        rows_of_lists = tuple(every.rows[k].tolist())
+        self.outcomes.append(
+            replace(found, rows=rows_of_lists, below=below, missed=missed, clearances=rows)
+        )
 
     def searched(
         self, k: int, margins: tuple[Margin, ...], near: Sequence[Floats], spread: bool
@@ -497,17 +441,6 @@ class _Search:
         self.ended = found.ended or self.ended
         return found
 
-    def about_the_best(self) -> Choices | None:
-        """The choices about the best one, where there are too many for all; None if none is new."""
-        if self.every.is_whole or not self.outcomes:
-            return None
-        more = Choices(self.task, self.every.belows, self.ranked[0].best.y, None)
-        known = {one.choice for one in self.outcomes}
-        for k in range(len(more.of)):
-            if more.choice(k) in known:
-                more.level[k] = DONE
-        return more if (more.level < DONE).sum() else None
-
 
 def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> bool | None:
     """Whether some choice meets the limits ``names`` together; None where that cannot be said.
@@ -521,7 +454,7 @@ def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> boo
         for below in found.every.belows
     ]
     y = found.best.y
-    for variant in Choices(found.task, list(dict.fromkeys(belows)), y, names).left(most):
+    for variant in Choices(found.task, list(dict.fromkeys(belows)), names).left(most):
         if variant is None:
             return None
         lower, upper = variant.problem.lower, variant.problem.upper

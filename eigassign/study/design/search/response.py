@@ -67,27 +67,23 @@ class DesignResponse:
 
         LostModeError where a followed mode is lost.
         """
-        reduced = None
-        if self.models is not None and y.tobytes() not in self.known:
-            before = self.models.exact_solves
-            reduced = self.models.at(y, self.count)
-            self.exact_solves += self.models.exact_solves - before
+        key = y.tobytes()
+        if key in self.known:
+            return self.known[key]
+        q, of_design = self.path.at(y)
+        reduced = None if self.models is None else self.models.at(y, self.count)
         if reduced is not None:
-            q, of_design = self.path.at(y)
             hz, slopes = in_hz(*reduced.slopes(q, y, self.wanted))
             slopes = self.path.in_design(slopes, of_design)
             return Frequencies(hz[:, : self.count], slopes[:, : self.count])
-        key = y.tobytes()
-        if key not in self.known:
-            try:
-                self.known[key] = self._exact(y)
-            except LostModeError as error:
-                self.lost.append(str(error))
-                raise
+        try:
+            self.known[key] = self._exact(y, q, of_design)
+        except LostModeError as error:
+            self.lost.append(str(error))
+            raise
         return self.known[key]
 
-    def _exact(self, y: Floats) -> Frequencies:
-        q, of_design = self.path.at(y)
+    def _exact(self, y: Floats, q: Floats, of_design: Floats) -> Frequencies:
         self.exact_solves += len(q)
         shown = self.initial is not None and np.array_equal(y, self.initial)
         if self.followers:

@@ -7,6 +7,7 @@ lead to is then optimised on all samples, and by exact solves last.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice, zip_longest
 
@@ -31,11 +32,13 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.search.response import ReducedModels
 from eigassign.study.design.search.variants import (
+    Counts,
     PosedProblem,
     Task,
     spread_designs,
     thinned,
 )
+from eigassign.study.results import ClearanceRow
 
 Floats = NDArray[np.float64]
 STARTS = 100  # with `starts: auto`, at most
@@ -51,7 +54,7 @@ SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best 
 
 @dataclass(frozen=True)
 class Searched:
-    """The optima found of one variant, and how much work that was."""
+    """The optima found of one choice, and how much work that was."""
 
     variant: PosedProblem
     optima: tuple[Optimum, ...] = ()  # distinct ones, the best first
@@ -60,6 +63,19 @@ class Searched:
     ended: End | None = None  # by the clock or by Ctrl-C
     exact_solves: int = 0
     lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
+    rows: tuple[int, ...] = ()  # of every list
+    below: Counts = ()  # the numbers of modes below every band, None of one that is left out
+    missed: float = np.inf  # by the best, of bands between the samples too
+    clearances: tuple[ClearanceRow, ...] = ()  # the bands as they were checked
+
+    @property
+    def best(self) -> Optimum:
+        """The best design found."""
+        return self.optima[0]
+
+    def with_best(self, best: Optimum) -> Searched:
+        """The same with another best design."""
+        return replace(self, optima=(best, *self.optima[1:]))
 
 
 def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
@@ -116,6 +132,7 @@ def search_starts(
         responses.append(search.variant.response)
     return replace(
         search,
+        missed=search.best.seen.violation,
         exact_solves=sum(response.exact_solves for response in responses),
         lost=tuple(line for response in responses for line in response.lost),
     )
@@ -134,7 +151,11 @@ def _after(
     try:
         found = minimise(problem, start, 0 if search.ended else steps, deadline)
         ended = search.ended or (found.end if found.end in STOPPED else None)
-        found = found if before is None else continued(before, found)
+        if before is not None:  # what was said there is its prediction
+            said, steps_before = before.seen.residual, before.steps
+            if found.predicted is None and said.shape == found.seen.residual.shape:
+                found = replace(found, predicted=said)
+            found = replace(found, steps=(*steps_before, *found.steps))
         apart = with_end(optima, found, None if ended else problem)
     except KeyboardInterrupt:
         if search.ended:  # pressed again
@@ -170,14 +191,6 @@ def _refined(
     if not search.optima or (inside and best_first([*known, own], lambda each: each)[0] is own):
         search = _after(search, initial, steps, deadline)
     return search
-
-
-def continued(before: Optimum, found: Optimum) -> Optimum:
-    """An optimum with the steps that led to its start; what was said there is its prediction."""
-    said = before.seen.residual
-    if found.predicted is None and said.shape == found.seen.residual.shape:
-        found = replace(found, predicted=said)
-    return replace(found, steps=(*before.steps, *found.steps))
 
 
 # --- Whether more starts would help
@@ -223,17 +236,16 @@ def _in_turn(
     if task.models is not None or task.followers:
         yield from spread
         return
-    fewest = thinned(task, 8) or task
-    asked = posed(fewest)
+    asked = posed(thinned(task, 8) or task)
     ranked: list[tuple[tuple[float, float], Floats]] = []
     for y in spread_designs(bounds, min(SCREENED * box.n, MOST_SCREENED), 1):
         z = box.inside(box.z(y))
-        try:
-            seen = asked.without_slopes(box.y(z))
-            worths = max(seen.violation, MET), asked.problem(box.y(z), seen)
-            ranked.append((worths, z))
-        except EigassignError:
-            ranked.append(((np.inf, np.inf), z))
+        y, worths = box.y(z), (np.inf, np.inf)
+        with suppress(EigassignError):
+            q, model = asked.response.path.at(y)[0], asked.response.model
+            missed, value = asked.worth(y, model.frequencies(q, y, asked.requirements.modes))
+            worths = max(missed, MET), value
+        ranked.append((worths, z))
     apart: list[Floats] = []
     near: list[Floats] = []
     for _, z in sorted(ranked, key=lambda one: one[0]):

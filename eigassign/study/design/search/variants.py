@@ -29,7 +29,7 @@ from eigassign.assignment.requirements.requirement import Frequencies, Requireme
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
-from eigassign.study.design.followed import Follower, follow_all, followers, unfollowed
+from eigassign.study.design.followed import Follower, followers, with_followed
 from eigassign.study.design.lists import catalogues, price_of_one
 from eigassign.study.design.search.response import (
     DesignResponse,
@@ -65,23 +65,19 @@ class PosedProblem:
         kept = (row.name for row in self.problem.constraints)
         return tuple(dict.fromkeys((*self.requirements.limit_names, *kept)))
 
-    def of(self, some: Requirements) -> PosedProblem:
-        """The problem with ``some`` of its requirements, beside limits that every step keeps."""
-        problem = replace(self.problem, appraise=_appraise(self.task, some, self.response))
+    def with_limits(self, names: Collection[str]) -> PosedProblem:
+        """The problem with those limits only that are named, and without prices."""
+        some = self.requirements.with_limits(names)
+        kept = tuple(row for row in self.problem.constraints if row.name in names)
+        appraise = _appraise(self.task, some, self.response)
+        problem = replace(self.problem, appraise=appraise, constraints=kept, cost=None)
         outlook = self.outlook and replace(self.outlook, requirements=some)
         return replace(self, requirements=some, problem=problem, outlook=outlook)
 
-    def with_limits(self, names: Collection[str]) -> PosedProblem:
-        """The problem with those limits only that are named."""
-        kept = tuple(row for row in self.problem.constraints if row.name in names)
-        some = self.of(self.requirements.with_limits(names))
-        return replace(some, problem=replace(some.problem, constraints=kept))
-
-    def without_slopes(self, y: Floats) -> Appraisal:
-        """A design as it is appraised, but with slopes 0: only its frequencies are solved."""
-        q = self.response.path.at(y)[0]
-        hz = self.response.model.frequencies(q, y, self.requirements.modes)
-        return self.requirements.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
+    def worth(self, y: Floats, hz: Floats) -> tuple[float, float]:
+        """What a design of frequencies (n_t, n_modes) misses, and F."""
+        seen = self.requirements.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
+        return seen.violation, self.problem(y, seen)
 
 
 @dataclass(frozen=True)
@@ -268,24 +264,18 @@ class Designs:
         return cls(scene, bands, *(np.array([y for y, _ in found]), [each for _, each in found]))
 
     @cached_property
-    def counts(self) -> tuple[range, ...]:
-        """The numbers of modes below each band, from the fewest to the most of any design."""
-        below = [[band.below(each) for each in self.solved] for band in self.bands]
-        return tuple(
-            range(int(min(k.min() for k in own)), int(max(k.max() for k in own)) + 1)
-            for own in below
-        )
-
-    @cached_property
     def choices(self) -> list[tuple[int, ...]]:
         """Choices of a number for every band, those that designs are nearest to first.
 
-        Of more than `MOST_CHOICES` not all are listed.
+        From the fewest to the most of any design. Of more than `MOST_CHOICES` not all are listed.
         """
-        near = np.array(
-            [[int(np.median(b.below(each))) for b in self.bands] for each in self.solved]
+        each = [[band.below(solved) for solved in self.solved] for band in self.bands]
+        near = np.array([[int(np.median(k)) for k in own] for own in each]).T
+        counts = (
+            range(min(int(k.min()) for k in own), max(int(k.max()) for k in own) + 1)
+            for own in each
         )
-        listed = itertools.islice(itertools.product(*self.counts), MOST_CHOICES)
+        listed = itertools.islice(itertools.product(*counts), MOST_CHOICES)
         return sorted(
             dict.fromkeys((*map(tuple, near.tolist()), *listed)),
             key=lambda choice: int(np.abs(near - choice).sum(axis=1).min()),
@@ -293,45 +283,36 @@ class Designs:
 
     def best_of(self, variant: PosedProblem, most: int) -> list[Floats]:
         """The designs that a variant promises most from."""
-        asked, modes, worths = variant.requirements, variant.requirements.modes, []
+        modes, worths = variant.requirements.modes, []
         for y, each in zip(self.y, self.solved, strict=True):
             lacking = ((0, 0), (0, max(modes - each.hz.shape[1], 0)))
             lowest = np.pad(each.hz, lacking, constant_values=np.inf)
-            lowest = np.hstack([lowest, each.followed])
-            seen = asked.appraise(y, Frequencies(lowest, np.zeros((*lowest.shape, len(y)))))
-            worths.append((seen.violation, variant.problem(y, seen)))
+            worths.append(variant.worth(y, np.hstack([lowest, each.followed])))
         order = best_first(range(len(worths)), lambda k: worths[k])
         return [self.y[k] for k in order[:most]]
 
 
-def all_below(scene: Scene, bands: Sequence[ForbiddenBand], q: Floats, y: Floats) -> Floats:
-    """The lowest frequencies (n, count), all that matter to the bands and have mass.
+def solved_below(
+    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
+) -> Solved:
+    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass.
 
-    At q (n, n_q), of a design y (n_y,).
+    At all samples, with the modes that are followed.
     """
+    q = scene.path.at(y)[0]
     available = scene.model.n_dof - scene.model.n_rigid
     beyond = max((float(band.upper.max()) for band in bands), default=0.0)
     named = (mode for band in bands for mode in band.counted)
     count = min(max((4, *named)), available)
     while True:
         try:
-            found = scene.model.frequencies(q, y, count)
+            hz = scene.model.frequencies(q, y, count)
         except MissingMassError as error:
             count = available = error.most
             continue
-        if count == available or found[:, -1].min() > beyond:
-            return found
+        if count == available or hz[:, -1].min() > beyond:
+            return with_followed(scene, own, y, hz)
         count = min(2 * count, available)
-
-
-def solved_below(
-    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
-) -> Solved:
-    """The same of a design (n_y,) at all samples, with the modes that are followed."""
-    alone = unfollowed(all_below(scene, bands, scene.path.at(y)[0], y))
-    if not own:
-        return alone
-    return replace(follow_all(scene.model, scene.path, own, y, 1).solved, hz=alone.hz)
 
 
 def _bands(wanted: Sequence[Requirement]) -> Iterator[ForbiddenBand]:
@@ -347,12 +328,9 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
         solved = solved_below(task.scene, task.bands, task.followers, one)
         both = zip(task.bands, task.margins, strict=True)
         each.append([band.errors_by_count(solved, margin) for band, margin in both])
-    return [_worst_by_count(own) for own in zip(*each, strict=True)]
-
-
-def _worst_by_count(errors: Sequence[Floats]) -> Floats:
-    """The largest of each number of modes below, of those that all designs know."""
-    return np.asarray(np.max([one[: min(map(len, errors))] for one in errors], axis=0))
+    # of numbers of modes below those that all designs know
+    known = ([e[: min(map(len, own))] for e in own] for own in zip(*each, strict=True))
+    return [np.max(own, axis=0) for own in known]
 
 
 def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:
