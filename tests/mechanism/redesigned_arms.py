@@ -37,23 +37,6 @@ def two_link_lengths(branch: tuple[float, float] = (3.2, 5.2)) -> Case:
     return case_of(tree | {"design": {**lengths(a="upper"), "m": mass, **lengths(b="fore")}})
 
 
-def three_links() -> Case:
-    """A planar arm with one joint more than its path needs."""
-    tree = two_link()
-    mechanism = tree["mechanism"]
-    mechanism["links"]["hand"] = mechanism["links"]["fore"] | {"length": 0.3}
-    joint = {"type": "revolute", "base": "fore.end", "follower": "hand.start"}
-    mechanism["joints"]["wrist"] = joint
-    tree["coordinates"]["q3"] = {"joint": "wrist"}
-    tree["trajectory"] = {
-        "tip": "hand.end",
-        "waypoints": [[0.7, 0.1], [0.6, 0.5], [0.3, 0.6]],
-        "samples": 15,
-        "start": [-0.6, 0.9, 0.4],
-    }
-    return case_of(tree | {"design": lengths(a="upper", b="fore", c="hand")})
-
-
 def shipped(name: str, trajectory: str, design: str) -> Case:
     """A shipped case with another trajectory and design."""
     text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")

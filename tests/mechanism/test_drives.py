@@ -20,12 +20,12 @@ from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 from weight_comparison import pulled
 
 import eigassign as ea
+from eigassign.case import PointTrajectory
 from eigassign.mechanism import (
     NamedTrajectory,
     Trajectories,
-    Trajectory,
+    build_trajectory,
     drive_forces,
-    sampled_motion,
 )
 
 G = 9.81
@@ -212,9 +212,10 @@ def test_loads_are_those_of_each_trajectory_by_itself() -> None:
 
 
 def test_both_sides_of_a_corner_count() -> None:
-    time_s, q = np.array([0.0, 1.0, 2.0, 3.0]), np.array([[0.0], [1.0], [0.0], [-1.0]])
-    motion = sampled_motion(time_s, q, (1.0,))
-    path = Trajectories((NamedTrajectory("a", Trajectory(time_s, q, known=motion)),))
+    keys = {"points": ((0.0,), (1.0,), (-1.0,)), "times": (0.0, 1.0, 3.0), "timing": "linear"}
+    points = PointTrajectory(**keys, samples=4)
+    motion = build_trajectory(points, ["q1"], lambda *_: pytest.fail("points need no chain"))
+    path = Trajectories((NamedTrajectory("a", motion),))
     tree = bar(2, 0.8, 70e9, 2700.0, {"area": 5e-4, "bending_inertia": 2e-12}, "revolute")
     model = pulled(tree, [0.0, -G])
     found = drive_forces(model.case, model.numbers, model.motion)

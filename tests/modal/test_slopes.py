@@ -12,7 +12,6 @@ from redesigned_arms import (
     five_bar_in_joints,
     six_joints,
     slider_crank,
-    three_links,
     two_link_lengths,
 )
 from rungs import derivative, residual
@@ -89,7 +88,7 @@ def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> No
 
 @pytest.mark.parametrize(
     "make",
-    [two_link_lengths, three_links, six_joints, five_bar, slider_crank, five_bar_in_joints],
+    [two_link_lengths, six_joints, five_bar, slider_crank, five_bar_in_joints],
 )
 def test_slopes_where_coordinates_follow_the_design_are_those_of_extrapolated_differences(
     make: Callable[[], Case],

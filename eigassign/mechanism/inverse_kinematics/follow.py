@@ -10,13 +10,7 @@ loops closed, every sample k by itself is an implicit function of y through the 
     T(q_k, y) = p(t_k),    dq_k/dy = −(∂T/∂q)⁻¹ ∂T/∂y
 
 It is continued along the straight line from y0 to y, so that it stays in the branch of the initial
-design, and depends on y alone. Where the tip fixes fewer directions than there are coordinates,
-those that leave it in place at the initial design are kept as they are there: q_k moves in the
-space of rows of ∂T/∂q(q_k(y0), y0) only, with the orthonormal basis V_k,
-
-    q_k = q_k(y0) + V_k ξ_k,    dq_k/dy = −V_k (∂T/∂q V_k)⁻¹ ∂T/∂y ,
-
-which at y0 is the change of least norm, a slide of L counting as 1 rad (see `solver`).
+design, and depends on y alone.
 
 Shapes: n samples, n_q coordinates, n_y design parameters, n_z entries of a state u.
 """
@@ -30,12 +24,13 @@ from functools import cached_property
 import numpy as np
 
 from eigassign.errors import MechanismError, SingularityError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, TipChain, reduced
+from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Reduced, TipChain, reduced
 from eigassign.mechanism.inverse_kinematics.solver import (
     DEAD,
     ROUND_OFF,
     TipProblem,
     Trace,
+    change,
     handedness,
     interpolated,
     levenberg,
@@ -76,10 +71,10 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
 def _bound(ik: TipProblem, course: Course) -> str:
     """A word about tips that have fewer freedoms than the path asks for."""
     wanted = ik.task(course, 0.0).shape[1]
-    if ik.rank >= wanted:
+    if ik.n_q >= wanted:
         return ""
     return (
-        f"; the coordinates move {ik.rank} of the {wanted} components asked for, so the path must "
+        f"; the coordinates move {ik.n_q} of the {wanted} components asked for, so the path must "
         "lie exactly where the tip can go: give points or samples of the coordinates instead"
     )
 
@@ -115,7 +110,6 @@ def other_assembly(ik: TipProblem, course: Course) -> TrajectoryError:
 
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
-_REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
 
 
 @dataclass(frozen=True)
@@ -140,13 +134,12 @@ def follow(
     ``branch`` keeps the relative angle of a joint in [low, high] modulo 2π (rad), or its place (m).
     The first sample is the solution nearest to ``start`` (angles modulo 2π, and within π of it);
     without one, nearest to where the loops were put together, else bent least, with angles in
-    [0, 2π). Chains with more coordinates than the tip fixes take the steps of least norm,
-    dq = J⁺ dp, a slide of L (see `solver`) counting as 1 rad. The tip is on its path to RESIDUAL
-    times L in m, and RESIDUAL in rad; loops stay in the assembly of the model.
+    [0, 2π). The tip is on its path to RESIDUAL times L in m (see `solver`), and RESIDUAL in rad;
+    loops stay in the assembly of the model.
 
     Raises TrajectoryError naming the first sample that is out of reach, outside the branch, or
     behind a stretched, folded or dead configuration; MechanismError if branch or start make no
-    sense.
+    sense, or the tip fixes fewer directions than there are coordinates.
     """
     ik = prepare(chain, course, branch or {}, start)
     candidates = first_solutions(ik, course)
@@ -180,7 +173,7 @@ def _along(ik: TipProblem, course: Course, u0: Floats) -> tuple[Floats, Trace]:
 
     With the trace that they are found from.
     """
-    for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
+    for turn in _TURNS:
         path = trace(ik, course, u0, turn)
         n = int(np.searchsorted(course.s, path.s[-1], side="right"))
         seeds = interpolated(path, course.s[:n])
@@ -267,13 +260,6 @@ def _beyond(
 
 def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
     """Notes on what was chosen where the case leaves a choice."""
-    if ik.rank < ik.n_q:
-        slides = ik.chain.of_kind("slide")[: ik.n_q].any()
-        measure = f" (a slide of {ik.lever:.3g} m counting as 1 rad)" if slides else ""
-        return (
-            f"the tip fixes {ik.rank} of {ik.n_q} coordinates: the solution that moves the joints "
-            f"least from sample to sample is taken{measure}",
-        )
     if len(candidates) == 1 or ik.guessed:
         return ()
     if ik.chain.assembly is not None:
@@ -385,19 +371,9 @@ class PathOfDesign:
             "joints follow the design"
         )
 
-    @cached_property
-    def directions(self) -> Floats | None:
-        """V (n, n_q, rank), in u; None where the tip fixes all coordinates."""
-        ik = self.problem
-        if ik.rank == ik.n_q:
-            return None
-        rows = np.linalg.svd(reduced(ik.evaluate(self.u), ik.n_q).J, full_matrices=False)[2]
-        return np.asarray(np.swapaxes(rows[:, : ik.rank], 1, 2))
-
     def problem_at(self, y: Floats) -> TipProblem:
-        """The problem at a design, in the measure of the first one, and in its directions."""
-        chain = self.problem.chain.redesigned(y)
-        return replace(self.problem, chain=chain, directions=self.directions)
+        """The problem at a design, in the measure of the first one."""
+        return replace(self.problem, chain=self.problem.chain.redesigned(y))
 
     def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""
@@ -423,15 +399,10 @@ class PathOfDesign:
     def _lost(self, y: Floats, u: Floats, strayed: Bools) -> TrajectoryError:
         """Why the first of the samples that ``strayed`` from u (n, n_z) cannot be had at y."""
         k, ik = int(np.argmax(strayed)), self.problem_at(y)
-        why = (
-            "the links come to stand stretched or folded in line, or the loops at a dead point"
-            if ik.rank == ik.n_q
-            else "the motion that leaves the tip in place, kept as in the initial design, has to "
-            "change"
-        )
         message = (
             "can be reached, but not by changing the design steadily from the initial one: near "
-            f"{pose(ik, u[k])} {why}; take narrower bounds"
+            f"{pose(ik, u[k])} the links come to stand stretched or folded in line, or the loops "
+            "at a dead point; take narrower bounds"
         )
         return _beyond(ik, self.course, k, u[k], message)
 
@@ -443,13 +414,17 @@ def behind(values: Floats, loads: Floats) -> Floats:
 
 def _slopes(ik: TipProblem, u: Floats) -> Floats:
     """du/dy (n, n_z, n_y) where the samples are at their points and the loops are closed."""
-    n_y = len(ik.chain.y)
-    motion = ik.motion(ik.evaluate(u, by_design=True), n_y)
+    motion = _by_design(ik, u)
     both = motion.J, motion.following
-    (by_q, by_y), (follow_q, follow_y) = (np.split(of, [of.shape[2] - n_y], 2) for of in both)
-    change = ik.change(replace(motion, J=by_q, following=follow_q), -by_y)
-    change[:, ik.n_q :] += follow_y
-    return change
+    (by_q, by_y), (follow_q, follow_y) = (np.split(of, [ik.n_q], axis=2) for of in both)
+    found = change(replace(motion, J=by_q, following=follow_q), -by_y)
+    found[:, ik.n_q :] += follow_y
+    return found
+
+
+def _by_design(ik: TipProblem, u: Floats) -> Reduced:
+    """The motion by the coordinates and by the design."""
+    return reduced(ik.evaluate(u, by_design=True), ik.n_q + len(ik.chain.y))
 
 
 def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
@@ -459,7 +434,7 @@ def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
     """
     ik, u = followed.problem, followed.u
     n_q, chain = ik.n_q, ik.chain
-    J = ik.motion(ik.evaluate(u, by_design=True), len(chain.y)).J
+    J = _by_design(ik, u).J
     left = J[:, :, n_q:] + J[:, :, :n_q] @ _slopes(ik, u)[:, :n_q]
     # what moves the tip is in m or rad, and may be 0: it counts as L or 1 at least
     size = np.maximum(np.abs(chain.y), min(ik.lever, 1.0))
@@ -469,7 +444,7 @@ def path_of_design(followed: Followed, course: Course) -> PathOfDesign:
         if length > 1e-6 * ik.lever:
             raise MechanismError(
                 f"design.{name}.parameter",
-                f"moves the tip where no coordinate can bring it back: they move {ik.rank} of "
+                f"moves the tip where no coordinate can bring it back: they move {n_q} of "
                 f"{J.shape[1]} components of the path. Give samples of the coordinates instead",
             )
     return PathOfDesign(course, ik, u)

@@ -16,8 +16,7 @@ state, m task components.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -52,8 +51,6 @@ class TipProblem:
     seeds: Floats  # u (n_seeds, n_q + n_p), spread over all the branch allows, loops closed
     scale: Floats  # c (n_q + n_p,) in rad or m
     lever: float  # L in m
-    rank: int  # of J, in general position
-    directions: Floats | None = None  # V (n, n_q, rank), in which alone n states move; None: in all
 
     @property
     def n_q(self) -> int:
@@ -71,21 +68,7 @@ class TipProblem:
 
     def moved(self, u: Floats, task: Floats) -> Floats:
         """W(u) ṗ (n, n_z): how the state moves where the tip moves by ``task`` (n, m)."""
-        return self.change(self.motion(self.evaluate(u)), task[:, :, None])[:, :, 0]
-
-    def motion(self, seen: TipEvaluation, n_more: int = 0) -> Reduced:
-        """`reduced`, with J V (n, m, rank) in place of J by coordinates; ``n_more`` are behind."""
-        found, V = reduced(seen, self.n_q + n_more), self.directions
-        if V is None:
-            return found
-        by_q, more = np.split(found.J, [self.n_q], axis=2)
-        return replace(found, J=np.concatenate([by_q @ V, more], axis=2))
-
-    def change(self, motion: Reduced, task: Floats) -> Floats:
-        """The changes (n, n_z, k) of states that move the tip by tasks (n, m, k), loops closed."""
-        own = least_norm(motion.J, task, self.rank)
-        own = own if self.directions is None else self.directions @ own
-        return np.concatenate([own, motion.following @ own], axis=1)
+        return change(reduced(self.evaluate(u), self.n_q), task[:, :, None])[:, :, 0]
 
     def evaluate(self, u: Floats, by_design: bool = False) -> TipEvaluation:
         """The chain's evaluation with metres and radians in one measure.
@@ -151,119 +134,82 @@ def prepare(
 ) -> TipProblem:
     """The problem for a branch {joint: (low, high)} in rad or m and a guess of the first q.
 
-    Raises MechanismError if the guess does not fit the loops, or there is none for a coordinate
-    that does not move the tip.
+    Raises MechanismError if the guess does not fit the loops, or the tip fixes fewer directions
+    than there are coordinates.
     """
-    if not chain.n_q:
+    n_q = chain.n_q
+    if not n_q:
         raise MechanismError("trajectory.tip", "no coordinate moves this mechanism")
     rows = tuple(chain.joints.index(joint) for joint in branch)
     low, high = np.array([*branch.values()], dtype=np.float64).reshape(-1, 2).T
-    limits = np.column_stack([low, high - low])
-    guess = None if start is None else np.array(start, dtype=np.float64)
-    near = _near(chain, guess)
-    z, J = first_guesses(chain, course, rows, limits, near)
-    lever = _lever(chain, course, J)
-    scale = np.where(chain.of_kind("slide"), lever, 1.0)
-    rows_of_J = np.ones(J.shape[1])
-    rows_of_J[J.shape[1] - len(chain.turned_by) :] = lever
-    J = J * rows_of_J[:, None] * scale[: chain.n_q]
-    _check_idle(J, lever, guess)
+    near = None if start is None else np.array(start, dtype=np.float64)
+    if chain.assembly is not None:  # the guess, or where the loops were put together
+        q = chain.assembly.reference if near is None else near
+        try:
+            near = np.concatenate([q, chain.assembly.passive(q[None])[0]])
+        except SingularityError as error:
+            raise MechanismError("trajectory.start", str(error)) from error
+    z = _spread(chain, course, rows, np.column_stack([low, high - low]), near)
+    if near is not None:
+        z = np.hstack([z, np.broadcast_to(near[n_q:], (len(z), len(near) - n_q))])
+        z = np.vstack([near, z])
+    if chain.assembly is not None:
+        z = _closed(chain, z, course.size)
+    J = reduced(chain.evaluate(z), n_q).J
+    of_point = J.shape[1] - len(chain.turned_by)
+    slides = chain.of_kind("slide")
+    lever = course.size
+    if chain.assembly is None and not slides.any():
+        lever = float(np.linalg.norm(J[:, :of_point], axis=1).max())
+    scale = np.where(slides, lever, 1.0)
+    J[:, of_point:] *= lever
+    J *= scale[:n_q]
     singular_values = np.linalg.svd(J, compute_uv=False)
     rank = int((singular_values > _STRUCTURAL * lever).sum(axis=1).max())
-    first = None if near is None else near / scale
-    guessed = guess is not None
-    return TipProblem(chain, rows, low, high - low, first, guessed, z / scale, scale, lever, rank)
-
-
-def _near(chain: TipChain, guess: Floats | None) -> Floats | None:
-    """The state z near which the first sample is wanted: the guess, else where loops are chosen."""
-    if chain.assembly is None:
-        return guess
-    q = chain.assembly.reference if guess is None else guess
-    try:
-        return np.concatenate([q, chain.assembly.passive(q[None])[0]])
-    except SingularityError as error:
-        raise MechanismError("trajectory.start", str(error)) from error
-
-
-def _lever(chain: TipChain, course: Course, J: Floats) -> float:
-    """L in m; see the module."""
-    d = J.shape[1] - len(chain.turned_by)
-    turning = ~chain.of_kind("slide")[: chain.n_q]
-    if chain.assembly is not None or not turning.all():
-        return course.size
-    return float(np.linalg.norm(J[:, :d], axis=1).max())
-
-
-def _check_idle(J: Floats, lever: float, start: Floats | None) -> None:
-    """Coordinates that do not move the tip stay where ``start`` says; nothing else can know it."""
-    idle = np.flatnonzero(np.abs(J).max(axis=(0, 1)) <= _STRUCTURAL * lever)
-    if start is None and len(idle):
+    if rank < n_q:
+        idle = np.flatnonzero(np.abs(J).max(axis=(0, 1)) <= _STRUCTURAL * lever)
         numbers = ", ".join(str(i + 1) for i in idle)
-        message = f"is needed: the tip does not depend on coordinate {numbers} (counted from 1)"
-        raise MechanismError("trajectory.start", message)
-
-
-# --- first guesses
-
-
-def first_guesses(
-    chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
-) -> tuple[Floats, Floats]:
-    """States z (n_seeds, n_z) with closed loops, and their J (n_seeds, d + r, n_q), not scaled."""
-    q = _spread(chain, course, rows, limits, near)
-    if near is None:
-        return q, reduced(chain.evaluate(q), chain.n_q).J
-    z = np.hstack([q, np.broadcast_to(near[chain.n_q :], (len(q), len(near) - chain.n_q))])
-    z = _closed(chain, np.vstack([near, z]), course.size)
-    return z, reduced(chain.evaluate(z), chain.n_q).J
+        message = f"fixes {rank} of {n_q} coordinates"
+        message += f", and coordinate {numbers} (counted from 1) not at all" * bool(numbers)
+        message += ": ask for its angle or orientation too, or give points or samples of q"
+        raise MechanismError("trajectory.tip", message)
+    first = None if near is None else near / scale
+    guessed = start is not None
+    return TipProblem(chain, rows, low, high - low, first, guessed, z / scale, scale, lever)
 
 
 def _spread(
     chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
 ) -> Floats:
-    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows."""
-    matrix, offset = chain.relative_map
-    n_j = chain.n_q
-    middle = matrix @ (np.zeros(n_j) if near is None else near[:n_j]) + offset
-    low, width = _ranges(chain, course, middle)
-    low[list(rows)], width[list(rows)] = limits.T
-    turns = chain.of_kind("turn")[:n_j]
-    width = np.where(turns, np.minimum(width, 2.0 * np.pi), width)
-    count = min(128, 8 * 2**n_j)
-    return np.asarray((low + width * kronecker(count, n_j) - offset) @ np.linalg.pinv(matrix).T)
+    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows.
 
-
-def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Floats]:
-    """Low end and width (n_q,) of each joint: a turn, or as far as the path and the tip may be."""
-    n_q = chain.n_q
-    low, width = np.zeros(n_q), np.full(n_q, 2.0 * np.pi)
-    far = chain.kinds[:n_q]
-    if set(far) == {"turn"}:
-        return low, width
-    state = np.zeros((1, len(chain.kinds)))
-    seen = chain.evaluate(state)
+    That is a turn, or as far about a place ``near`` as the path and the tip may be.
+    """
+    (matrix, offset), n_q = chain.relative_map, chain.n_q
+    middle = matrix @ (np.zeros(n_q) if near is None else near[:n_q]) + offset
+    seen = chain.evaluate(np.zeros((1, len(chain.kinds))))
     reach = course.size + float(np.linalg.norm(seen.point))
     pitch = np.abs(seen.jacobian[0, : seen.point.shape[1], :n_q]).max(axis=0)
     # a screw's first guesses go as far as 500 rad
-    turns = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, 500.0)
-    half = np.where(chain.of_kind("slide")[:n_q], reach, turns)
-    free = ~chain.of_kind("turn")[:n_q]
-    return np.where(free, middle - half, low), np.where(free, 2.0 * half, width)
+    screws = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, 500.0)
+    half = np.where(chain.of_kind("slide")[:n_q], reach, screws)
+    turns = chain.of_kind("turn")[:n_q]
+    low, width = np.where(turns, 0.0, middle - half), np.where(turns, 2.0 * np.pi, 2.0 * half)
+    low[list(rows)], width[list(rows)] = limits.T
+    width = np.where(turns, np.minimum(width, 2.0 * np.pi), width)
+    count = min(128, 8 * 2**n_q)
+    return np.asarray((low + width * kronecker(count, n_q) - offset) @ np.linalg.pinv(matrix).T)
 
 
 def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
-    """The states whose loops close by moving the passive freedoms alone."""
+    """The states whose loops close by moving the passive freedoms alone, the first for sure."""
     n_q = chain.n_q
-    if len(chain.kinds) == n_q:
-        return z
-    z = z.copy()
     for _ in range(20):
         step = reduced(chain.evaluate(z), n_q).closing
         z[:, n_q:] += np.clip(step, -0.5, 0.5)
     # loops are closed to 1e-9 of the path's size
     good = np.abs(chain.evaluate(z).gap).max(axis=1) <= 1e-9 * max(size, 1.0)
-    good[0] = True  # the pose at which the loops are known to close
+    good[0] = True
     return np.asarray(z[good])
 
 
@@ -319,16 +265,16 @@ class Corrected(NamedTuple):
 def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Corrected:
     """Newton for tip(u) = target with closed loops.
 
-    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
+    A chain that cannot fill the space (n_q < m) settles, more slowly, on the nearest point.
     """
-    for _ in range(8 if ik.rank == target.point.shape[1] + len(ik.chain.turned_by) else 40):
+    for _ in range(8 if ik.n_q == target.point.shape[1] + len(ik.chain.turned_by) else 40):
         seen = ik.evaluate(u)
-        motion = ik.motion(seen)
+        motion = reduced(seen, ik.n_q)
         error = ik.error(seen, target) - motion.drift
         settled = _settled(ik, error, motion, tolerance)
         if settled.all():
             break
-        step = ik.change(motion, error[:, :, None])[:, :, 0]
+        step = change(motion, error[:, :, None])[:, :, 0]
         step[:, ik.n_q :] += motion.closing
         settled |= np.abs(step).max(axis=1) <= tolerance
         if settled.all():
@@ -346,18 +292,18 @@ def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -
     )
 
 
-def least_norm(J: Floats, tasks: Floats, rank: int) -> Floats:
-    """J⁺ e (n, n_q, k) for J (n, m, n_q) and e (n, m, k): least error first, least norm second."""
-    m, n_q = J.shape[1:]
-    Jt = np.swapaxes(J, 1, 2)
-    with suppress(np.linalg.LinAlgError):  # exactly singular somewhere
-        if rank == m == n_q:
-            return np.asarray(np.linalg.solve(J, tasks))
-        if rank == m:
-            return np.asarray(Jt @ np.linalg.solve(J @ Jt, tasks))
-        if rank == n_q:
-            return np.asarray(np.linalg.solve(Jt @ J, Jt @ tasks))
-    return np.asarray(np.linalg.pinv(J, rcond=1e-9) @ tasks)
+def change(motion: Reduced, tasks: Floats) -> Floats:
+    """The changes (n, n_z, k) of states of least error for tasks e (n, m, k), loops kept closed.
+
+    J⁺ e of the coordinates, for J (n, m, n_q) with m ≥ n_q.
+    """
+    J, Jt = motion.J, np.swapaxes(motion.J, 1, 2)
+    try:
+        square = J.shape[1] == J.shape[2]
+        own = np.linalg.solve(*((J, tasks) if square else (Jt @ J, Jt @ tasks)))
+    except np.linalg.LinAlgError:  # exactly singular somewhere
+        own = np.linalg.pinv(J, rcond=1e-9) @ tasks
+    return np.concatenate([own, motion.following @ own], axis=1)
 
 
 def handedness(ik: TipProblem, u: Floats) -> Floats:
@@ -366,7 +312,7 @@ def handedness(ik: TipProblem, u: Floats) -> Floats:
     0 for what is not square.
     """
     seen = ik.evaluate(u)
-    return _signs(ik, seen, ik.motion(seen))
+    return _signs(ik, seen, reduced(seen, ik.n_q))
 
 
 def _signs(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
@@ -445,7 +391,7 @@ def lost(ik: TipProblem, found: Corrected, guess: Floats, most: float, sense: Fl
 
 def singular(ik: TipProblem, found: Corrected) -> Bools:
     """True where the chain is stretched or folded, or its loops at a dead point, (n,)."""
-    regularity = np.linalg.svd(found.motion.J, compute_uv=False)[:, ik.rank - 1] / ik.lever
+    regularity = np.linalg.svd(found.motion.J, compute_uv=False)[:, -1] / ik.lever
     return np.asarray((regularity < _SINGULAR) | (loop_regularity(ik, found.seen) < DEAD))
 
 

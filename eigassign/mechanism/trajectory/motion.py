@@ -6,11 +6,11 @@ columns of the tip that runs write (`tip x [m]`, …) are passed over without a 
 Point to point, q(t) runs between joint coordinates, each segment by the same timing law.
 
     points           q = q_k + s(τ) Δq,           q̇ = s'(τ) Δq/T,   q̈ = s''(τ) Δq/T²
-    sampled          the not-a-knot cubic spline through the samples, from corner to corner
+    sampled          the not-a-knot cubic spline through the samples
     path of a tip    u̇ = W(u) ṗ,   ü = (∂W/∂u · u̇) ṗ + W(u) p̈,   p(t) = path(s(t/T))
 
 u holds the coordinates and the passive freedoms of loops, p the position and the turning of the
-tip; W(u) = J⁺ closes the loops and takes the least motion where there is a choice.
+tip; W(u) = J⁺ closes the loops.
 
 Shapes: n times, m points, n_q coordinates, n_z entries of a state u. SI units, angles in rad.
 """
@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -130,7 +129,6 @@ def shared_times(points: Floats, duration: float) -> Floats:
 
 OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
-SOLUTIONS = 400  # between which the spline is off the path by some 1e-9 of its length
 
 
 class Moving(NamedTuple):
@@ -183,24 +181,16 @@ def point_motion(points: Floats, reached_s: Floats, law: Curve) -> Motion:
     return Motion(Curve(np.append(knots, reached_s[-1]), pieces), knots[1:])
 
 
-def sampled_motion(time_s: Floats, q: Floats, corners_s: Sequence[float] | Floats = ()) -> Motion:
-    """The cubic spline through samples q (n, n_q), one for each part between corners on samples.
-
-    A lone sample is at rest.
-    """
+def sampled_motion(time_s: Floats, q: Floats) -> Motion:
+    """The not-a-knot cubic spline through samples q (n, n_q); a lone sample is at rest."""
     if len(time_s) == 1:
         return Motion(Curve(time_s + np.arange(2.0), q[None].copy()), np.zeros(0))
-    near = BESIDE * float(np.ptp(time_s))
-    cuts = [0, *(np.searchsorted(time_s, np.array(corners_s) - near)), len(time_s) - 1]
-    parts = [
-        through(time_s[a : b + 1], q[a : b + 1], "spline").coefficients for a, b in pairwise(cuts)
-    ]
-    c = np.concatenate(parts, axis=1)
+    c = through(time_s, q, "spline").coefficients.copy()
     # what q rounded to 1e-16 leaves of second differences where the velocity does not change
-    step, size = np.diff(time_s)[:, None], 4e-15 * np.abs(q).max(axis=0)
-    least = size / step.min() ** 2
+    step = np.diff(time_s)[:, None]
+    least = 4e-15 * np.abs(q).max(axis=0) / step.min() ** 2
     c[2:][:, np.maximum(2.0 * np.abs(c[2]), np.abs(2.0 * c[2] + 6.0 * c[3] * step)) <= least] = 0.0
-    return Motion(Curve(time_s, c), np.array(corners_s))
+    return Motion(Curve(time_s, c), np.zeros(0))
 
 
 # --- along a path of the tip
@@ -259,42 +249,27 @@ class TipMotion:
 
     def poses(self, time_s: Floats, y: Floats | None = None) -> Floats:
         """q (n, n_q) alone."""
-        if self.has_choice:
-            return self.moving(time_s, y).q
         ik, u = self._states(self.course_at(time_s), y)
         return behind(ik.coordinates(u), self.loads)
 
     def moving(self, time_s: Floats, y: Floats | None = None) -> Moving:
         """q, q̇ and q̈ at times (n,) and design y (n_y,), the initial one if None.
 
-        Where the tip leaves a choice they are those of the spline, in s, through `SOLUTIONS` poses.
         Raises TrajectoryError where the tip cannot follow its path with that design.
         """
         course, T = self.course_at(time_s), self.duration_s
         tau = np.clip(time_s / T, 0.0, 1.0)
         ds, dds = self.law.value(tau, 1) / T, self.law.value(tau, 2) / T**2
-        if self.has_choice:
-            corners = self.course.corners()
-            s = np.union1d(np.linspace(0.0, 1.0, SOLUTIONS), corners)
-            ik, u = self._states(replace(self.course, s=s, time_s=s), y)
-            q, first, second = sampled_motion(s, ik.coordinates(u), corners).moving(course.s)
-            rate, push = first * ds, second * ds**2 + first * dds
-        else:
-            ik, u = self._states(course, y)
-            first, second = (ik.task(course, course.s, order) for order in (1, 2))
-            task, push = first * ds, second * ds**2 + first * dds
-            u_rate = ik.moved(u, task)
-            # W is analytic: a rate along the imaginary axis gives its derivative exactly
-            turning = ik.moved(u + 1e-20j * u_rate, task).imag * 1e20
-            u_push = turning + ik.moved(u, push)
-            q, rate, push = (ik.coordinates(each) for each in (u, u_rate, u_push))
+        ik, u = self._states(course, y)
+        first, second = (ik.task(course, course.s, order) for order in (1, 2))
+        task, push = first * ds, second * ds**2 + first * dds
+        u_rate = ik.moved(u, task)
+        # W is analytic: a rate along the imaginary axis gives its derivative exactly
+        turning = ik.moved(u + 1e-20j * u_rate, task).imag * 1e20
+        u_push = turning + ik.moved(u, push)
+        q, rate, push = (ik.coordinates(each) for each in (u, u_rate, u_push))
         still = np.zeros_like(self.loads)
         return Moving(behind(q, self.loads), behind(rate, still), behind(push, still))
-
-    @property
-    def has_choice(self) -> bool:
-        """True where the tip fixes fewer directions than there are coordinates."""
-        return self.followed.problem.rank < self.followed.problem.n_q
 
     def _path(self, course: Course) -> PathOfDesign:
         u = at_parameters(self.followed, course)

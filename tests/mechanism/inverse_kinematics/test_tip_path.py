@@ -204,27 +204,6 @@ def test_three_links_place_and_turn_the_tip_as_the_law_of_cosines_says(kind, ang
     np.testing.assert_allclose(q.sum(axis=1), last, atol=1e-8)
 
 
-def test_the_least_motion_does_not_depend_on_the_samples() -> None:
-    arm = serial_arm(0.4, 0.3, 0.2, 0.15, absolute=False)
-    few, many = (follow(arm, course(POINTS, n, "spline")).q for n in (11, 401))
-    np.testing.assert_allclose(few, many[::40], atol=1e-9)
-    # and it is that of dq = J⁺ dp, integrated here by Runge–Kutta steps of 1/400 of the path
-    due, q, h = course(POINTS, 2, "spline"), few[:1], 1.0 / 400
-
-    def slope(q: np.ndarray, s: float) -> np.ndarray:
-        J = arm.evaluate(q).jacobian[0]
-        return (np.linalg.pinv(J) @ due.rates(min(s, 1.0))[0][0])[None]
-
-    for k in range(400):
-        s = k * h
-        k1 = slope(q, s)
-        k2 = slope(q + 0.5 * h * k1, s + 0.5 * h)
-        k3 = slope(q + 0.5 * h * k2, s + 0.5 * h)
-        q = q + h / 6 * (k1 + 2 * k2 + 2 * k3 + slope(q + h * k3, s + h))
-    travelled = np.abs(np.diff(many, axis=0)).sum(axis=0).max()
-    assert np.abs(q[0] - many[-1]).max() < 2e-3 * travelled
-
-
 def test_an_orientation_that_cannot_be_had_is_named_with_what_is_missed() -> None:
     arm = serial_arm(0.5, 0.4, oriented=True)
     due = course([(0.5, 0.2), (0.4, 0.4)], 20, angle=0.3)

@@ -112,12 +112,14 @@ def arm_on(tree: Tree, q: np.ndarray, rng: Random, count: int) -> tuple[Tree, np
 
 
 def mechanism(seed: int, space: str, oriented: bool, closed: bool) -> tuple[Tree, np.ndarray]:
-    """A random mechanism whose tip, on an arm it carries, can be moved every way."""
+    """A random mechanism whose tip, on an arm it carries, can be moved every way in one manner."""
     wanted = {"planar": 2 + oriented, "spatial": 3 + 3 * oriented}[space]
-    tree, q = random_closed(seed, space)[:2] if closed else random_open(seed, space)
-    for attempt in range(20):
-        rng = np.random.default_rng([seed, attempt])
-        longer = arm_on(tree, q, rng, wanted - 1 + attempt // 4)
+    for attempt in range(100):
+        own = seed + 100 * attempt
+        tree, q = random_closed(own, space)[:2] if closed else random_open(own, space)
+        if len(q) > wanted:
+            continue
+        longer = arm_on(tree, q, np.random.default_rng([seed, attempt]), wanted - len(q))
         if regularity(*longer, oriented) > 0.1:
             return longer
     raise AssertionError("no mechanism found")

@@ -5,7 +5,7 @@ import pytest
 from planar_arms import serial_arm
 
 from eigassign.case import PointTrajectory, TipTrajectory
-from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates, sampled_motion
+from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates
 
 LAWS = ("linear", "cubic", "quintic", "trapezoidal")
 
@@ -62,22 +62,6 @@ def test_tips_move_by_path_and_law(seed: int, path: str, timing: str) -> None:
     agree(found, np.union1d(motion.breaks_s, knots))
 
 
-def test_where_the_tip_leaves_a_choice_it_keeps_to_its_path_and_rates_are_those_of_q() -> None:
-    found = along_a_tip(1, "spline", "quintic", 0.5, 0.4, 0.3)
-    t, h = np.linspace(0.1, 1.3, 200), 1e-4
-    motion = found.motion
-    ahead, here, behind = (motion.moving(t + k * h) for k in (1, 0, -1))
-    np.testing.assert_allclose(here.rate, (ahead.q - behind.q) / (2 * h), atol=1e-5)
-    # q̈ is linear between two of the poses: across one a difference errs by h times a jump
-    np.testing.assert_allclose(here.acceleration, (ahead.rate - behind.rate) / (2 * h), atol=0.1)
-    x, y = (
-        np.cumsum([length * part(here.q[:, k]) for k, length in enumerate((0.5, 0.4, 0.3))], 0)[-1]
-        for part in (np.cos, np.sin)
-    )
-    wanted = motion.course_at(t).target(motion.course_at(t).s).point
-    np.testing.assert_allclose(np.stack([x, y], 1), wanted, atol=1e-7)
-
-
 def test_samples_move_by_the_spline_through_them() -> None:
     """A polynomial of third degree is its own spline."""
     t = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 9))
@@ -104,9 +88,8 @@ def test_points_joined_at_constant_velocity_have_no_acceleration(samples: int) -
 
 
 def test_a_corner_on_a_sample_is_seen_from_both_sides() -> None:
-    t = np.linspace(0.0, 1.0, 5)
-    q = np.abs(t - 0.5)[:, None]
-    found = rates(Trajectory(t, q, known=sampled_motion(t, q, (0.5,))))
+    keys = {"points": ((0.5,), (0.0,), (0.5,)), "times": (0.0, 0.5, 1.0), "timing": "linear"}
+    found = rates(build_trajectory(PointTrajectory(**keys, samples=5), ["q1"], no_arm))
     np.testing.assert_array_equal(found.samples, [0, 1, 2, 2, 3, 4])
     np.testing.assert_allclose(found.rate[:, 0], [-1, -1, -1, 1, 1, 1], atol=1e-12)
 

@@ -270,7 +270,7 @@ class Designs:
         From the fewest to the most of any design. Of more than `MOST_CHOICES` not all are listed.
         """
         each = [[band.below(solved) for solved in self.solved] for band in self.bands]
-        near = np.array([[int(np.median(k)) for k in own] for own in each]).T
+        near = np.array([[int(np.median(own[k])) for own in each] for k in range(len(self.y))])
         counts = (
             range(min(int(k.min()) for k in own), max(int(k.max()) for k in own) + 1)
             for own in each
