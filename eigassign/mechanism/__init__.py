@@ -32,9 +32,11 @@ __all__, __getattr__, __dir__ = face(
         "elements.sections": "section_values",
         "elements.craig_bampton": "factorise kept_factor largest_beside",
         "imports.parts": "imported_part matrix_of read_contents",
-        "inverse_kinematics.chain": "TipChain TipEvaluation reduced tip_chain",
+        "inverse_kinematics.chain": (
+            "Course TipChain TipEvaluation planar_attitude reduced spatial_attitude "
+            "tip_chain tip_path"
+        ),
         "inverse_kinematics.follow": "follow",
-        "inverse_kinematics.tip_path": "Course planar_attitude spatial_attitude tip_path",
         "kinematics.forward": "Placement build_link_frames",
         "kinematics.joints": "joint_motion turned",
         "kinematics.loop_closure": "all_moving",

@@ -24,7 +24,15 @@ from functools import cached_property
 import numpy as np
 
 from eigassign.errors import MechanismError, SingularityError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Reduced, TipChain, reduced
+from eigassign.mechanism.inverse_kinematics.chain import (
+    WAYPOINTS,
+    Bools,
+    Course,
+    Floats,
+    Reduced,
+    TipChain,
+    reduced,
+)
 from eigassign.mechanism.inverse_kinematics.solver import (
     DEAD,
     ROUND_OFF,
@@ -41,7 +49,6 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     trace,
 )
-from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 
 def pose(ik: TipProblem, u: Floats) -> str:

@@ -25,13 +25,14 @@ from numpy.typing import ArrayLike
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Bools,
+    Course,
     Floats,
     Reduced,
     TipChain,
     TipEvaluation,
+    TipTarget,
     reduced,
 )
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 from eigassign.mechanism.kinematics.loop_closure import kronecker
 
 _SLACK = 1e-9  # rad: round-off at the end of a branch's range

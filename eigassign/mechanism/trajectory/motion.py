@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
+from eigassign.mechanism.inverse_kinematics.chain import Course, Curve, through
 from eigassign.mechanism.inverse_kinematics.follow import (
     Followed,
     PathOfDesign,
@@ -35,7 +36,6 @@ from eigassign.mechanism.inverse_kinematics.follow import (
     behind,
 )
 from eigassign.mechanism.inverse_kinematics.solver import TipProblem
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, Curve, through
 
 Floats = NDArray[np.float64]
 _KEY = "trajectory.file"

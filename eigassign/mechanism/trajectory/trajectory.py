@@ -30,14 +30,14 @@ from eigassign.case.schema.trajectory import (
     TipTrajectory,
 )
 from eigassign.errors import TrajectoryError, UsageError
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.inverse_kinematics.follow import behind, follow, path_of_design
-from eigassign.mechanism.inverse_kinematics.tip_path import (
+from eigassign.mechanism.inverse_kinematics.chain import (
     Course,
+    TipChain,
     planar_attitude,
     spatial_attitude,
     tip_path,
 )
+from eigassign.mechanism.inverse_kinematics.follow import behind, follow, path_of_design
 from eigassign.mechanism.trajectory.motion import (
     BESIDE,
     Motion,
