@@ -15,13 +15,14 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 from eigassign.case.reader import listed, shown, suggestion
 from eigassign.case.units import (
     DIMENSIONS,
     NUMBER,
+    ONE,
     TWO_TURNS,
     Dimension,
     QuantityError,
@@ -35,8 +36,7 @@ from eigassign.files import TABLE, objection, read_bytes
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
 _POINT = re.compile(r"\d\.\d")
-_MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
-_PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
+MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
 
 
 @dataclass(frozen=True)
@@ -67,14 +67,13 @@ class CsvTable:
         return f"{self.file}:{self.lines[k]}"
 
 
-@dataclass(frozen=True)
-class _Heading:
+class _Heading(NamedTuple):
     """A column in the header; the unit of its numbers, None for words."""
 
     name: str
     index: int
-    unit: Unit | None
-    dimension: Dimension | None
+    unit: Unit | None = None
+    dimension: Dimension | None = None
     bare: bool = False  # the header gives no unit
 
 
@@ -93,33 +92,26 @@ def read_table(
     or has a wrong header, and ``row_error(key, message, row)`` for a row that does not hold what
     the header promises; both name the line.
     """
-    text = _text(file, key)
-    dialect = _dialect(text)
-    rows = _rows(text, dialect, file.name, key)
+    rows = _rows(file, key)
     line, header = next(rows, (1, []))
     if not header:
         raise MechanismError(key, f"{file.name}: is empty; a header and rows are expected")
-    where = f"{file.name}:{line}"
     try:
-        names = [_split(cell, where, key) for cell in header]
-        present = {name for name, _ in names}
-        found = [
-            _found(column, names, where, key)
-            for column in columns
-            if column.name in present or not column.optional
-        ]
-    except MechanismError:
+        names, found = _headings(header, columns)
+    except ValueError as error:
         for row in (header, next(rows, (0, []))[1]):
             words = " ".join(row).replace(",", ".").split()
             if words and 2 * len([*filter(NUMBER.fullmatch, words)]) >= len(words):
-                raise
+                raise MechanismError(key, f"{file.name}:{line}: {error}") from error
         wanted = ", ".join(column.name for column in columns if not column.optional)
-        message = f"{where}: expected a header with {wanted}, and numbers below it"
+        message = f"{file.name}:{line}: expected a header with {wanted}, and numbers below it"
         raise MechanismError(key, message) from None  # what the file says is not for a message
     lines, values = [], list[list[float | str]]([] for _ in found)
     for k, (number, row) in enumerate(rows):
         try:
-            read = _values(row, found, len(header), k, dialect)
+            if k >= MOST:
+                raise ValueError(f"more than {MOST} rows")
+            read = _values(row, found, len(header))
             for column, value in zip(values, read, strict=True):
                 column.append(value)
         except ValueError as error:
@@ -127,7 +119,7 @@ def read_table(
         lines.append(number)
     both = list(zip(found, values, strict=True))
     used = {column.index for column in found}
-    passed_over = [n for i, (n, _) in enumerate(names) if i not in used and n not in known]
+    passed_over = [n for i, n in enumerate(names) if i not in used and n not in known]
     extra = listed(name or "(no name)" for name in passed_over)
     return CsvTable(
         file=file.name,
@@ -145,10 +137,9 @@ def read_words(file: Path, key: str) -> list[tuple[int, list[str]]]:
     Raises MechanismError at ``key`` if the file cannot be read, has no row below its header, or one
     of another length.
     """
-    text = _text(file, key)
-    rows = list(itertools.islice(_rows(text, _dialect(text), file.name, key), _MOST + 2))
-    if not 2 <= len(rows) <= _MOST + 1:
-        many = f"more than {_MOST} rows" if rows[2:] else "a header and rows are expected"
+    rows = list(itertools.islice(_rows(file, key), MOST + 2))
+    if not 2 <= len(rows) <= MOST + 1:
+        many = f"more than {MOST} rows" if rows[2:] else "a header and rows are expected"
         raise MechanismError(key, f"{file.name}: {many}")
     for line, cells in rows:
         if len(cells) != len(rows[0][1]) or not all(cells):
@@ -156,6 +147,36 @@ def read_words(file: Path, key: str) -> list[tuple[int, list[str]]]:
             message = f"{file.name}:{line}: {filled} values for {len(rows[0][1])} columns"
             raise MechanismError(key, message)
     return rows
+
+
+def _rows(file: Path, key: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that says something; decimals take a point.
+
+    The first of these lines has the separator. Decimals may take a comma where it does not
+    separate, and no number of the file has a point.
+    """
+    text = _text(file, key)
+    lines = io.StringIO(text, newline="")
+    told = (line for line in lines if line.strip() and not line.lstrip().startswith("#"))
+    first = next(told, "")
+    hint = _SEPARATOR_LINE.fullmatch(first.strip())
+    between = hint.group(1) if hint else next((c for c in ",;\t" if c in first), ",")
+    comma = between != "," and not _POINT.search(text)
+    lines.seek(0)
+    reader = csv.reader(lines, delimiter=between, skipinitialspace=between != "\t", strict=True)
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells) and not cells[0].startswith("#") and cells[0].lower() != "sep=":
+                yield reader.line_num, [*map(_with_point, cells)] if comma else cells
+    except csv.Error as error:
+        message = f"{file.name}:{reader.line_num}: {error}: between separators stands one number"
+        raise MechanismError(key, f"{message}, or one name; close every quote") from error
+
+
+def _with_point(cell: str) -> str:
+    number = cell.replace(",", ".", 1)
+    return number if NUMBER.fullmatch(number) else cell
 
 
 def _text(file: Path, key: str) -> str:
@@ -173,75 +194,43 @@ def _text(file: Path, key: str) -> str:
     return text
 
 
-@dataclass(frozen=True)
-class _Dialect:
-    """The separator of cells, lines before any cell, and whether decimals take a comma."""
+def _headings(
+    header: Sequence[str], columns: Sequence[CsvColumn]
+) -> tuple[list[str], list[_Heading]]:
+    """The names in a header of `name` or `name [unit]`, and the ``columns`` that are there.
 
-    between: str
-    skipped: int
-    comma: bool
-
-
-def _dialect(text: str) -> _Dialect:
-    """As the first line that says something has it.
-
-    Decimals may take a comma where it does not separate, and no number of the file has a point.
+    Raises ValueError.
     """
-    between, skipped = ",", 0
-    for k, line in enumerate(io.StringIO(text, newline="")):
-        if named := _SEPARATOR_LINE.fullmatch(line.strip()):
-            between, skipped = named.group(1), k + 1
-            break
-        if line.strip() and not line.lstrip().startswith("#"):
-            between = next((c for c in ",;\t" if c in line), ",")
-            break
-    return _Dialect(between, skipped, between != "," and not _POINT.search(text))
+    names, units = list[str](), list[str]()
+    for cell in header:
+        if (match := _HEADER_CELL.fullmatch(cell)) is None:
+            raise ValueError(f"column {shown(cell)} must read `name` or `name [unit]`")
+        names.append(match.group(1))
+        units.append(match.group(2) or "")
+    found = []
+    for column in columns:
+        if column.name not in names and column.optional:
+            continue
+        if names.count(column.name) != 1:
+            raise ValueError(_miscounted(column, names))
+        index = names.index(column.name)
+        unit = _unit(column, units[index]) if column.dimensions else ()
+        found.append(_Heading(column.name, index, *unit))
+    return names, found
 
 
-def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of every line that says something."""
-    lines = itertools.islice(io.StringIO(text, newline=""), dialect.skipped, None)
-    blanks = dialect.between != "\t"
-    reader = csv.reader(lines, delimiter=dialect.between, skipinitialspace=blanks, strict=True)
+def _unit(column: CsvColumn, written: str) -> tuple[Unit, Dimension, bool]:
+    """The unit of a column, its dimension, and whether the header gives no unit."""
+    first = column.dimensions[0]
     try:
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if any(cells) and not cells[0].startswith("#"):
-                yield dialect.skipped + reader.line_num, cells
-    except csv.Error as error:
-        line = dialect.skipped + reader.line_num
-        message = f"{name}:{line}: {error}: between separators stands one number, or one name"
-        raise MechanismError(key, f"{message}; close every quote") from error
-
-
-def _split(cell: str, where: str, key: str) -> tuple[str, str]:
-    """``"q1 [deg]"`` → ``("q1", "deg")``."""
-    match = _HEADER_CELL.fullmatch(cell)
-    if match is None:
-        raise MechanismError(
-            key, f"{where}: column {shown(cell)} must read `name` or `name [unit]`"
-        )
-    return match.group(1), match.group(2) or ""
-
-
-def _found(column: CsvColumn, names: Sequence[tuple[str, str]], where: str, key: str) -> _Heading:
-    """The one column of that name, with its unit."""
-    name, known = column.name, [other for other, _ in names]
-    if known.count(name) != 1:
-        raise MechanismError(key, f"{where}: {_miscounted(column, known)}")
-    index = known.index(name)
-    if not column.dimensions:
-        return _Heading(name, index, None, None)
-    first, written = column.dimensions[0], names[index][1]
-    try:
-        unit = parse_unit(written or first.si, first) if written or first.si else _PLAIN
+        unit = parse_unit(written or first.si, first) if written or first.si else ONE
     except QuantityError as error:
-        raise MechanismError(key, f"{where}: column {name}: {error}") from error
+        raise ValueError(f"column {column.name}: {error}") from error
     for dimension in column.dimensions:
         if unit.exponents == dimension.exponents:
-            return _Heading(name, index, unit, dimension, bare=not written)
+            return unit, dimension, not written
     kinds = " or ".join(map(str, column.dimensions))
-    raise MechanismError(key, f"{where}: column {name}: [{written}] is no unit of {kinds}")
+    raise ValueError(f"column {column.name}: [{written}] is no unit of {kinds}")
 
 
 def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
@@ -258,26 +247,21 @@ def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
     near = next(filter(begins.match, known), None)
     if near is None:
         return f"{message}{suggestion(name, known)}"
-    unit = f" [{column.dimensions[0].si}]" if column.dimensions and column.dimensions[0].si else ""
+    unit = next((f" [{each.si}]" for each in column.dimensions[:1] if each.si), "")
     return f"{message}; if it is {shown(near)}, call it {name + unit}"
 
 
-def _values(
-    row: list[str], columns: Sequence[_Heading], n: int, k: int, dialect: _Dialect
-) -> Iterator[float | str]:
+def _values(row: list[str], columns: Sequence[_Heading], n: int) -> Iterator[float | str]:
     """One row in SI units; raises ValueError with what is wrong with it."""
-    if k >= _MOST:
-        raise ValueError(f"more than {_MOST} rows")
     if len(row) != n:
-        comma = " (decimals take a point)" if len(row) > n and dialect.between == "," else ""
+        comma = " (decimals take a point)" if len(row) > n else ""
         raise ValueError(f"{len(row)} values for {n} columns{comma}")
     for column in columns:
         cell = row[column.index]
         if column.unit is None:
             yield cell
             continue
-        number = cell.replace(",", ".", 1) if dialect.comma else cell
-        value = float(number) if NUMBER.fullmatch(number) else math.nan
+        value = float(cell) if NUMBER.fullmatch(cell) else math.nan
         if not math.isfinite(value):
             mixed = "; decimals take a comma or a point, not both" if "," in cell else ""
             raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number{mixed}")

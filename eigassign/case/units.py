@@ -160,7 +160,7 @@ _PREFIXED: tuple[tuple[str, str, Exponents], ...] = (  # the µ of two: micro si
     ("Hz", "m k M", (0, 0, -1, 0, 1)),
     ("rad", "m", (0, 0, 0, 1, 0)),
 )
-_PLAIN: Exponents = (0, 0, 0, 0, 0)
+ONE = Unit(Fraction(1), (0, 0, 0, 0, 0))
 _KG: Exponents = (1, 0, 0, 0, 0)
 UNITS: dict[str, Unit] = {
     "mg": Unit(Fraction(1, 10**6), _KG),
@@ -175,7 +175,7 @@ UNITS: dict[str, Unit] = {
     "in": Unit(Fraction(254, 10**4), (0, 1, 0, 0, 0)),
     "kgf": Unit(Fraction(980_665, 10**5), (1, 1, -2, 0, 0)),
     "rpm": Unit(Fraction(1, 60), (0, 0, -1, 0, 1)),
-    "%": Unit(Fraction(1, 100), _PLAIN),
+    "%": Unit(Fraction(1, 100), ONE.exponents),
 }
 for _unit, _prefixes, _exponents in _PREFIXED:
     UNITS[_unit] = Unit(Fraction(1), _exponents)
@@ -292,7 +292,7 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
     people read `kg/m s` in two ways. Raises QuantityError.
     """
     over, *under = (part.strip() for part in text.translate(_SUPERSCRIPTS).split("/"))
-    product = Unit(Fraction(1), _PLAIN)
+    product = ONE
     for factor, sign in [*((f, 1) for f in _BETWEEN.split(over)), *((f, -1) for f in under)]:
         match = _FACTOR.fullmatch(factor)
         symbol = match.group(1) if match else factor
