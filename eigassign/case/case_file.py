@@ -230,8 +230,7 @@ class CaseFile:
         ``key_path`` may start below `mechanism`, as the paths of design parameters do.
         """
         path: KeyPath = tuple(int(i) if i else name for i, name in _STEP.findall(key_path))
-        mechanism = self.marks.find(("mechanism",))
-        if mechanism.find(path[:1]) is not mechanism:
+        if path and path[0] in Mechanism.model_fields:
             path = ("mechanism", *path)  # paths of properties start below `mechanism`
         mark = self.marks.find(path)
         return Problem(str(self.path), mark.line, mark.column, dotted(path), message)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import accumulate, islice
 from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import yaml
 
@@ -187,8 +187,6 @@ def read_yaml(data: bytes, file: str) -> Source:
         tree, marks = builder.document(yaml.parse(text, Loader=_LOADER))
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise CaseError((_syntax_problem(error, text, file),)) from None
-    if builder.fatal:
-        raise CaseError(tuple(builder.fatal))
     if not isinstance(tree, dict):
         what = "the file is empty" if tree is None else f"the file holds {shown(tree)}"
         message = f"{what}: expected keys such as title, mechanism, coordinates{unspaced(tree)}"
@@ -260,21 +258,16 @@ class _Builder:
     def __init__(self, file: str) -> None:
         self.file = file
         self.room = raised(ENTRIES)
-        self.fatal: list[Problem] = []  # the data are not what the author meant: stop after reading
         self.problems: list[Problem] = []
 
     def document(self, events: Iterator[Any]) -> tuple[object, Mark]:
         """Root node of the only document; None for an empty file."""
         tree: object = None
         marks = Mark(1, 1)
-        documents = 0
         for event in events:
-            if isinstance(event, yaml.DocumentStartEvent):
-                documents += 1
-                if documents > 1:
-                    self._refuse(event, (), "a second document starts here: one case per file")
-                    return tree, marks
-            elif isinstance(event, yaml.NodeEvent):
+            if isinstance(event, yaml.DocumentStartEvent) and self.room < raised(ENTRIES):
+                self._refuse(event, (), "a second document starts here: one case per file")
+            if isinstance(event, yaml.NodeEvent):
                 tree, marks = self.node(event, events, (), Mark(1, 1))
         return tree, marks
 
@@ -282,23 +275,19 @@ class _Builder:
         """One node, found at ``at``; ``event`` is its first event."""
         self.room -= 1
         if self.room < 0:
-            message = f"more than {raised(ENTRIES):g} entries: put long tables into CSV files"
-            raise CaseError((Problem(self.file, at.line, at.column, "", message),))
+            most = f"more than {raised(ENTRIES):g} entries"
+            self._refuse(event, (), f"{most}: put long tables into CSV files")
         if len(path) > MAX_DEPTH:
-            message = _TOO_DEEP
-            raise CaseError((Problem(self.file, at.line, at.column, "", message),))
+            self._refuse(event, (), _TOO_DEEP)
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
-            self._refuse(
-                event, path, "anchors (&) and aliases (*) are refused: write the value out"
-            )
+            message = "anchors (&) and aliases (*) are refused: write the value out"
+            self._refuse(event, path, message)
         if getattr(event, "tag", None) is not None:
             self._refuse(event, path, "tags (!) are refused: write the plain value")
         if isinstance(event, yaml.MappingStartEvent):
             return self._mapping(events, path, at)
         if isinstance(event, yaml.SequenceStartEvent):
             return self._sequence(events, path, at)
-        if isinstance(event, yaml.AliasEvent):
-            return None, at
         return (event.value if event.style else resolve(event.value)), at
 
     def _sequence(self, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
@@ -346,9 +335,9 @@ class _Builder:
         self.problems.append(Problem(self.file, at.line, at.column, where, message))
         return False
 
-    def _refuse(self, event: Any, path: KeyPath, message: str) -> None:
+    def _refuse(self, event: Any, path: KeyPath, message: str) -> NoReturn:
         mark = _mark(event)
-        self.fatal.append(Problem(self.file, mark.line, mark.column, dotted(path), message))
+        raise CaseError((Problem(self.file, mark.line, mark.column, dotted(path), message),))
 
 
 def _mark(event: Any) -> Mark:
@@ -364,39 +353,34 @@ def read_mapping(given: Mapping[Any, Any], name: str) -> Source:
     Its marks have no lines. Raises CaseError naming everything that no file could hold.
     """
     found: list[Finding] = []
-    tree, marks = _plain(given, (), found)
+    tree = _plain(given, (), found)
     if found:
         raise CaseError(tuple(Problem(name, 0, 0, dotted(path), why) for path, why in found))
-    return Source(name, tree, marks)
+    return Source(name, tree, Mark(0, 0))
 
 
-def _plain(value: Any, path: KeyPath, found: list[Finding]) -> tuple[Any, Mark]:
+def _plain(value: Any, path: KeyPath, found: list[Finding]) -> Any:
     """``value`` as the reader of files would give it; what cannot be in a file is ``found``."""
     if len(path) > MAX_DEPTH:
         found.append((path, _TOO_DEEP))
-        return None, Mark(0, 0)
+        return None
     if hasattr(value, "tolist"):  # an array, or a number out of one
         value = value.tolist()
-    entries: dict[Any, tuple[Any, Mark]] = {}
     if isinstance(value, Mapping):
-        for key, inner in value.items():
-            if isinstance(key, str) and not _UNPRINTABLE.search(key):
-                entries[key] = _plain(inner, (*path, key), found)
-            else:
-                found.append((path, f"keys must be printable text, got {shown(key)}"))
-        tree: Any = {key: inner for key, (inner, _) in entries.items()}
-    elif isinstance(value, (list, tuple)):
-        entries = {k: _plain(v, (*path, k), found) for k, v in enumerate(value)}
-        tree = tuple(inner for inner, _ in entries.values())
-    elif value is None or isinstance(value, (bool, int, float)):
-        tree = value
-    elif isinstance(value, (str, PurePath)) and not _UNPRINTABLE.search(str(value)):
-        tree = str(value)
-    else:
-        tree, what = None, type(value).__name__
-        text = "printable text, a number, a mapping or a sequence"
-        found.append((path, f"expected {text}, got {'other' if what == 'str' else f'a {what}'}"))
-    return tree, Mark(0, 0, {key: mark for key, (_, mark) in entries.items()})
+        wrong = {k for k in value if not isinstance(k, str) or _UNPRINTABLE.search(k)}
+        found += ((path, f"keys must be printable text, got {shown(key)}") for key in wrong)
+        kept = ((key, inner) for key, inner in value.items() if key not in wrong)
+        return {key: _plain(inner, (*path, key), found) for key, inner in kept}
+    if isinstance(value, (list, tuple)):
+        return tuple(_plain(inner, (*path, k), found) for k, inner in enumerate(value))
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if isinstance(value, (str, PurePath)) and not _UNPRINTABLE.search(str(value)):
+        return str(value)
+    what = "other" if isinstance(value, str) else f"a {type(value).__name__}"
+    text = "printable text, a number, a mapping or a sequence"
+    found.append((path, f"expected {text}, got {what}"))
+    return None
 
 
 # --- Looking into a tree: what is missing, or of another kind, is None or empty
