@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property, reduce
-from itertools import islice
+from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any
 
@@ -315,11 +315,6 @@ class CaseFile:
         return dict(zip(found, _units(found.values()), strict=True))
 
     @property
-    def design_paths(self) -> frozenset[str]:
-        """The paths of the properties that the design sets."""
-        return frozenset(self.design.varied)
-
-    @property
     def box(self) -> tuple[tuple[float, float], ...]:
         """Least and largest value of each load, then of each design parameter."""
         of_design = ((p.min, p.max) for p in self.design.parameters.values())
@@ -376,7 +371,7 @@ def _units(quantities: Iterable[Quantity]) -> tuple[str, ...]:
 
 
 NO_VALUES: Mapping[str, object] = FrozenDict()
-MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
+MOST_PROBLEMS = 100  # shown
 
 
 @dataclass(frozen=True)
@@ -392,20 +387,14 @@ class Unchecked:
         """SHA-256 of its bytes."""
         return hashlib.sha256(self.data).hexdigest()
 
-    @cached_property
-    def _without_sweep(self) -> tuple[Mapping[str, Any], str]:
-        """The tree without its `sweep`, and the same as text."""
-        tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
-        return tree, json.dumps(tree)
-
     def content(self) -> str:
         """SHA-256 of what it says, its `sweep` apart, and of every file it names.
 
         Comments, the form of its lines, and places of files count for nothing.
         """
-        tree, said = self._without_sweep
+        tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
         digests = _digests(named_files(tree, self.path.parent), self.path.parent)
-        return hashlib.sha256(" ".join([said, *digests.values()]).encode()).hexdigest()
+        return hashlib.sha256(" ".join([json.dumps(tree), *digests.values()]).encode()).hexdigest()
 
 
 def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
@@ -419,7 +408,7 @@ def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
 
 def parse(data: bytes, path: str | Path, allow_outside: bool = False) -> CaseFile:
     """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
-    return checked(_parsed(data, Path(path)), allow_outside)
+    return checked(Unchecked(Path(path), data, read_yaml(data, str(path))), allow_outside)
 
 
 def read(path: str | Path) -> Unchecked:
@@ -434,17 +423,10 @@ def read(path: str | Path) -> Unchecked:
         if error.errno in (errno.EINVAL, errno.EFBIG):
             raise UsageError(f"{path}: expected a case file: {error.strerror}") from None
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from error
-    return _parsed(data, path)
+    return Unchecked(path, data, read_yaml(data, str(path)))
 
 
 _DEGREES = re.compile(rb"\d\s*(deg\b|\xc2\xb0|\\u00b0)")  # as YAML has them, and JSON
-
-
-def _parsed(data: bytes, path: Path) -> Unchecked:
-    try:
-        return Unchecked(path, data, read_yaml(data, str(path)))
-    except CaseError as error:
-        raise CaseError(_first(error.problems)) from None
 
 
 def from_mapping(
@@ -477,45 +459,19 @@ def checked(
     bad = bad or [*unreadable([each for each in named if not each.spare])]
     unread = {place for place, _ in bad}
     document, found = validated(source.tree, path.parent)
-    found = [*islice(keys_have_values(source.tree), 2 * MOST_PROBLEMS), *found]
+    found = [*islice(keys_have_values(source.tree), MOST_PROBLEMS), *found]
     findings = bad + [finding for finding in found if finding[0] not in unread]
     if document is not None and not findings:
-        findings = [*islice(inconsistent(document), 2 * MOST_PROBLEMS)]
+        findings = [*islice(inconsistent(document), MOST_PROBLEMS)]
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
-        raise CaseError(_first(list(dict.fromkeys(problems))))
+        raise CaseError(tuple(dict.fromkeys(problems))[:MOST_PROBLEMS])
     for place, value in [*followed_designs(document)]:
         document = with_value(document, place, value)
-    case = _case_file(document, source, written, values, named)
-    if impossible := [source.problem(*each) for each in bounds_hold_nothing_impossible(case)]:
-        raise CaseError(_first(impossible))
-    return case
-
-
-def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
-    """The first hundred of them, in the order of the file."""
-    if len(problems) <= MOST_PROBLEMS:
-        return tuple(problems)
-    first = sorted(problems, key=lambda p: (p.line, p.column))[:MOST_PROBLEMS]
-    last = first[-1]
-    more = "… and more problems; mend these first"
-    return (*first, Problem(last.file, last.line, last.column + 1, "", more))
-
-
-def _case_file(
-    document: Document,
-    source: Source,
-    written: Unchecked,
-    values: Mapping[str, object],
-    named: Sequence[NamedFile],
-) -> CaseFile:
-    path = written.path
-    content = {name: getattr(document, name) for name in Document.model_fields}
-    doubts = [*implausible(document)]
-    doubts += unreadable([each for each in named if each.spare])
+    doubts = [*implausible(document), *unreadable([each for each in named if each.spare])]
     warnings = [source.problem(*finding) for finding in doubts]
-    return CaseFile(
-        **content,
+    case = CaseFile(
+        **{name: getattr(document, name) for name in Document.model_fields},
         path=path,
         sha256=written.sha256,
         warnings=tuple(sorted(warnings, key=lambda p: (p.line, p.column, p.path))),
@@ -524,6 +480,9 @@ def _case_file(
         variant=values,
         in_degrees=_in_degrees(source, written.data),
     )
+    if impossible := [source.problem(*each) for each in bounds_hold_nothing_impossible(case)]:
+        raise CaseError(tuple(impossible[:MOST_PROBLEMS]))
+    return case
 
 
 def _in_degrees(source: Source, data: bytes) -> bool:
@@ -556,18 +515,14 @@ def key_objection(tree: Tree, folder: Path, key: str, value: object) -> str | No
 
     ``folder`` is that of the file.
     """
-    path, node = key_path(tree, key), tree
+    path = key_path(tree, key)
     if path[0] == "sweep":
         return "a sweep gives values to other keys than its own"
-    known = 0  # steps of the path that are there
-    for step in path:
-        if (below := value_below(node, step)) is None:
-            break
-        node, known = below, known + 1
-    if known == len(path):
+    there: list[Any] = [*accumulate(path, value_below, initial=tree)]
+    if None not in there:
         return None
-    wrong = []
-    if isinstance(node, Mapping):  # perhaps a key that the file leaves to its default
+    known, wrong = there.index(None) - 1, []
+    if isinstance(there[known], Mapping):  # perhaps a key that the file leaves to its default
         first = path[: known + 1]
         _, findings = validated(with_values(tree, {key: value}), folder)
         about = [(place, why) for place, why in findings if place[: len(first)] == first]

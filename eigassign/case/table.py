@@ -71,7 +71,7 @@ class _Heading(NamedTuple):
     """A column in the header; the unit of its numbers, None for words."""
 
     name: str
-    index: int
+    place: int
     unit: Unit | None = None
     dimension: Dimension | None = None
     bare: bool = False  # the header gives no unit
@@ -118,7 +118,7 @@ def read_table(
             raise row_error(key, f"{file.name}:{number}: {error}", k) from error
         lines.append(number)
     both = list(zip(found, values, strict=True))
-    used = {column.index for column in found}
+    used = {column.place for column in found}
     passed_over = [n for i, n in enumerate(names) if i not in used and n not in known]
     extra = listed(name or "(no name)" for name in passed_over)
     return CsvTable(
@@ -257,7 +257,7 @@ def _values(row: list[str], columns: Sequence[_Heading], n: int) -> Iterator[flo
         comma = " (decimals take a point)" if len(row) > n else ""
         raise ValueError(f"{len(row)} values for {n} columns{comma}")
     for column in columns:
-        cell = row[column.index]
+        cell = row[column.place]
         if column.unit is None:
             yield cell
             continue

@@ -65,7 +65,7 @@ def test_an_alias_bomb_is_refused_before_it_goes_off() -> None:
     levels = "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 40))
     message = message_for(("a0: &a0 [x]\n" + levels).encode())
     assert "anchors (&) and aliases (*) are refused" in message
-    assert len(message.splitlines()) == 101
+    assert len(message.splitlines()) == 1
 
 
 def test_bytes_that_are_not_utf_8_are_told_with_their_place() -> None:
