@@ -34,6 +34,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq, lsq_linear
 
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import End, Optimum, has_way, minimise
@@ -360,57 +361,36 @@ class _Profile:
     def _end(self, j: int, bound: float) -> tuple[float, bool]:
         """The end of the interval towards ``bound``, and whether it is the bound.
 
-        √(χ² − χ²(ŷ)) − 1.96 is nearly linear in y_j: secants from the linear model's end on, kept
-        between the last value inside and the first one outside. Where these meet at a jump, the one
-        outside may be another minimum of χ²: the one inside is followed across.
+        √(χ² − χ²(ŷ)) − 1.96 is nearly linear in y_j. Its zero is sought from the last value that is
+        known to be inside, and behind it, for χ² may jump to another minimum there.
         """
         centre = float(self.fit.y[j])
         room = bound - centre
         if room == 0.0:
             return bound, True
-        near = max(self.allowed, key=lambda found: float(found.y[j] - centre) / room)
-        inside, outside = float(near.y[j] - centre) / room, np.inf
-        last = (inside, self._over(near))
+
+        def share_of(found: Optimum) -> float:
+            return float(found.y[j] - centre) / room
+
+        near = max(self.allowed, key=share_of)
+        inside, known = share_of(near), {share_of(near): self._over(near)}
+
+        def over(share: float, everywhere: bool = False) -> float:
+            if share not in known or everywhere:
+                at, near = centre + share * room, max(self.allowed, key=share_of)
+                found = self._refitted(j, bound if share == 1.0 else at, near, everywhere)
+                known[share] = self._over(found)
+            return known[share]
+
         share = min(1.0, max(self._first(j) / abs(room), 1.1 * inside))
-        for step in range(40):  # three or four suffice but for wild models
-            if inside >= 1.0:
-                return bound, True
-            found = self._refitted(j, bound if share == 1.0 else centre + share * room, near)
-            over = self._over(found)
-            if found is not None and over <= 0.0:
-                near, inside = found, share
-                outside = outside if share < outside else np.inf
-            else:
-                outside = share
-            if abs(over) <= PRECISION * NOTICED and share < 1.0:
-                below = self._below(j, centre + share * room) if self.doubtful else None
-                if below is None:
-                    return centre + share * room, False
-                near, inside, outside, over = below, share, np.inf, self._over(below)
-            if share == last[0]:
-                break
-            slope = (over - last[1]) / (share - last[0])
-            last, share = (share, over), share - over / slope if slope > 0.0 else np.inf
-            if np.isinf(outside):
-                share = min(1.0, max(1.1 * inside, min(share, 4.0 * inside)))
-            elif outside - inside <= PRECISION * outside:
-                share = outside
-            elif step >= 6 or not inside < share < outside:  # secants have not met: by halves
-                share = 0.5 * (inside + outside)
-        return (bound, True) if inside >= 1.0 else (centre + inside * room, False)
-
-    def _below(self, j: int, at: float) -> Optimum | None:
-        """A fit with y_j ``at`` an end that lies below it; None where χ² is no less there.
-
-        From ŷ and from both corners of the bounds: where others are hardly told, fits near the one
-        before may miss it.
-        """
-        for start in (self.fit.y, self.problem.lower, self.problem.upper):
-            found = _held_at(self.problem, j, at, start)
-            if found is not None and self._over(found) < -PRECISION * NOTICED:
-                self._note(found)
-                return found
-        return None
+        while share < 1.0 and over(share) <= 0.0:
+            inside, share = share, min(1.0, 2.0 * share)
+        if inside >= 1.0 or over(share) <= 0.0:
+            return bound, True
+        end = float(brentq(over, inside, share, xtol=PRECISION * share, rtol=PRECISION))
+        # a fit that is allowed behind it is noted, and then the end sought anew
+        over(min((1.0 + 2.0 * PRECISION) * end, 1.0), self.doubtful)
+        return centre + end * room, False
 
     def _over(self, found: Optimum | None) -> float:
         rise = np.inf if found is None else max(found.objective - self.fit.objective, 0.0)
@@ -423,24 +403,25 @@ class _Profile:
         rest = slopes[:, j] - others @ np.linalg.lstsq(others, slopes[:, j], rcond=SINGULAR)[0]
         return NOTICED * float(self.width[j] / max(float(np.linalg.norm(rest)), 1e-300))
 
-    def _refitted(self, j: int, at: float, near: Optimum) -> Optimum | None:
+    def _refitted(self, j: int, at: float, near: Optimum, everywhere: bool) -> Optimum | None:
         """The best fit with y_j ``at`` a value; None where the model has no answer there.
 
         It starts where the linear model sends the others within their bounds; where χ² does not
-        allow what that leads to, on the line from ŷ through ``near``, too.
+        allow what that leads to, on the line from ŷ through ``near``, and ``everywhere`` from ŷ and
+        from both corners of the bounds, too.
         """
-        found = _held_at(self.problem, j, at, self._linear(j, at))
-        if self._over(found) > 0.0:
-            centre = self.fit.y
-            along = near.y - centre
-            line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
-            again = _held_at(self.problem, j, at, line)
-            if again is not None and (found is None or again.objective < found.objective):
-                found = again
-        if found is None:
-            return None
-        self._note(found)
-        return found
+        centre, best = self.fit.y, _held_at(self.problem, j, at, self._linear(j, at))
+        along = near.y - centre
+        line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
+        corners = (centre, self.problem.lower, self.problem.upper)
+        for start in (line, *(corners if everywhere else ())):
+            if self._over(best) > 0.0:
+                found = _held_at(self.problem, j, at, start)
+                if found is not None and (best is None or found.objective < best.objective):
+                    best = found
+        if best is not None:
+            self._note(best)
+        return best
 
     def _note(self, found: Optimum) -> None:
         """Remember a fit that χ² allows, or that is better than any."""
@@ -452,8 +433,6 @@ class _Profile:
 
     def _linear(self, j: int, at: float) -> Floats:
         """The design with y_j ``at`` a value at which χ² of the linear model is least."""
-        from scipy.optimize import lsq_linear
-
         start, width = self.fit.y.copy(), self.width
         slopes = self.fit.seen.slopes
         others = np.flatnonzero((width > 0.0) & (np.arange(len(width)) != j))
