@@ -34,7 +34,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq, lsq_linear
+from scipy.optimize import brentq
 
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import End, Optimum, has_way, minimise
@@ -406,42 +406,21 @@ class _Profile:
     def _refitted(self, j: int, at: float, near: Optimum, everywhere: bool) -> Optimum | None:
         """The best fit with y_j ``at`` a value; None where the model has no answer there.
 
-        It starts where the linear model sends the others within their bounds; where χ² does not
-        allow what that leads to, on the line from ŷ through ``near``, and ``everywhere`` from ŷ and
-        from both corners of the bounds, too.
+        It starts from ŷ; where χ² does not allow what that leads to, on the line from ŷ through
+        ``near``, and ``everywhere`` from both corners of the bounds, too.
         """
-        centre, best = self.fit.y, _held_at(self.problem, j, at, self._linear(j, at))
+        centre, best = self.fit.y, None
         along = near.y - centre
         line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
-        corners = (centre, self.problem.lower, self.problem.upper)
-        for start in (line, *(corners if everywhere else ())):
+        corners = (self.problem.lower, self.problem.upper)
+        for start in (centre, line, *(corners if everywhere else ())):
             if self._over(best) > 0.0:
                 found = _held_at(self.problem, j, at, start)
                 if found is not None and (best is None or found.objective < best.objective):
                     best = found
-        if best is not None:
-            self._note(best)
+        if best is not None and self._over(best) <= 0.0:
+            self.allowed.append(best)
+            # another minimum, not round-off: lower by more than a thousandth of χ²
+            if best.objective < self.best.objective - 1e-3 * max(self.fit.objective, 1.0):
+                self.best = best
         return best
-
-    def _note(self, found: Optimum) -> None:
-        """Remember a fit that χ² allows, or that is better than any."""
-        if self._over(found) <= 0.0:
-            self.allowed.append(found)
-        # another minimum, not round-off: lower by more than a thousandth of χ²
-        if found.objective < self.best.objective - 1e-3 * max(self.fit.objective, 1.0):
-            self.best = found
-
-    def _linear(self, j: int, at: float) -> Floats:
-        """The design with y_j ``at`` a value at which χ² of the linear model is least."""
-        start, width = self.fit.y.copy(), self.width
-        slopes = self.fit.seen.slopes
-        others = np.flatnonzero((width > 0.0) & (np.arange(len(width)) != j))
-        if len(others):
-            wanted = -self.fit.seen.residual - slopes[:, j] * (at - start[j])
-            low = (self.problem.lower - start)[others] / width[others]
-            high = (self.problem.upper - start)[others] / width[others]
-            scaled = slopes[:, others] * width[others]
-            move = lsq_linear(scaled, wanted, (low, high), method="bvls").x
-            start[others] += move * width[others]
-        start[j] = at
-        return np.asarray(start)

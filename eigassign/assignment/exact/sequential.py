@@ -177,8 +177,8 @@ class _Run:
     ) -> ProposedStep | None:
         """The step of the program there, or its correction after a ``spoilt`` one."""
         if spoilt is None:
-            self.region = replace(self.region, S=_curvature(place, self.met, self.multipliers))
-        move, self.region = step_program(self.problem, self.box, place, self.region, spoilt)
+            self.region.S = _curvature(place, self.met, self.multipliers)
+        move = step_program(self.problem, self.box, place, self.region, spoilt)
         if move is not None:
             self.multipliers = move.multipliers
         return move
@@ -206,7 +206,7 @@ class _Run:
                 radius = min(2.0 * radius, LARGEST)
             elif fall < 0.25 * move.promised:
                 radius = max(0.5 * length, SMALLEST)
-        self.region = replace(self.region, radius=radius)
+        self.region.radius = radius
         return reached if taken else None
 
     def _reached(self, place: DesignPoint, move: ProposedStep) -> DesignPoint | None:

@@ -26,9 +26,9 @@ SMALLEST = 1e-10  # trust region, of the bounds
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off
 
 
-@dataclass(frozen=True)
+@dataclass
 class TrustRegion:
-    """The knowledge of the problem that the steps have gathered."""
+    """The knowledge of the problem that the steps gather, and change."""
 
     radius: float
     S: Floats
@@ -51,8 +51,8 @@ def step_program(
     place: DesignPoint,
     region: TrustRegion,
     spoilt: tuple[DesignPoint, ProposedStep] | None = None,
-) -> tuple[ProposedStep | None, TrustRegion]:
-    """The step of the program at a place, None where there is none, and the region it was made in.
+) -> ProposedStep | None:
+    """The step of the program at a place, None where there is none; the region is as it needs.
 
     After a ``spoilt`` step the rows pass through what was found there, not only through here. Where
     steps with more and more rows promise nothing, the region shrinks to where the last ones hold;
@@ -61,19 +61,20 @@ def step_program(
     if spoilt is not None:
         there, move = spoilt
         place = place.shifted(there.values - move.expected.values)
-    program = _Program(problem, box, place, *_convex(place, region.S))
+    program = _Program(problem, box, place, region, *_convex(place, region.S))
     if region.weight == 0.0 and len(place.seen.excess):
-        region = replace(region, weight=program.first_weight())
-    flat: tuple[ProposedStep, TrustRegion] | None = None
+        region.weight = program.first_weight()
+    flat: tuple[ProposedStep, float] | None = None
     while True:
-        best, has_more_rows, region = program.best_step(region)
+        best, has_more_rows = program.best_step()
         before = merit(problem, place.value, place.seen.violation, region.weight)
         if best is None or spoilt is not None or best.promised > FLAT * max(abs(before), TINY**2):
-            return best, region
-        flat = flat or (replace(best, promised=0.0), region)
+            return best
+        flat = flat or (replace(best, promised=0.0), region.radius)
         if not has_more_rows or region.radius < SMALLEST:
-            return flat if flat[0].d.any() else (None, region)
-        region = replace(region, radius=0.1 * region.radius)
+            step, region.radius = flat
+            return step if step.d.any() else None
+        region.radius *= 0.1
 
 
 def _convex(place: DesignPoint, S: Floats) -> tuple[Floats, Floats]:
@@ -89,11 +90,12 @@ def _convex(place: DesignPoint, S: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class _Program:
-    """The program about a place, for any region and rows."""
+    """The program about a place in a region, for any rows."""
 
     problem: DesignProblem
     box: UnitBox
     place: DesignPoint
+    region: TrustRegion
     S: Floats  # convex
     root: Floats  # of the Hessian
 
@@ -110,12 +112,12 @@ class _Program:
         steep += np.abs(place.cost_slopes).max(initial=0.0)
         return float(10.0 * max(steep, 1e-3) / max(np.abs(C).max(initial=0.0), 1e-3))
 
-    def best_step(self, region: TrustRegion) -> tuple[ProposedStep | None, bool, TrustRegion]:
-        """The step that promises most, whether rows were added, and the region with its weight."""
+    def best_step(self) -> tuple[ProposedStep | None, bool]:
+        """The step that promises most, and whether rows were added."""
         problem, place, rows = self.problem, self.place, self.place.first_rows()
         cost_here = problem.price(self.box.y(place.z))
-        solved, region = self.with_weight(region, rows)
-        before = merit(problem, place.value, place.seen.violation, region.weight)
+        solved, weight = self.with_weight(rows), self.region.weight
+        before = merit(problem, place.value, place.seen.violation, weight)
         best, count = None, len(rows)
         for _ in range(12):  # programs, while they miss rows
             if solved is None:
@@ -125,36 +127,35 @@ class _Program:
             curved = before - 0.5 * float(d @ self.S @ d)
             value = problem.measure(expected.values[: place.m]) + cost
             violation = float(np.max(expected.values[place.m :], initial=0.0))
-            promised = curved - merit(problem, value, violation, region.weight)
+            promised = curved - merit(problem, value, violation, weight)
             if best is None or promised > best.promised:
                 best = ProposedStep(d, promised, expected, multipliers)
             v, t = rows.levels(d, self.least)
             value = cost + t
             if place.squared:
                 value = problem.measure(place.lines(d)[: place.m]) + cost + 2.0 * t
-            hoped = curved - merit(problem, value, v, region.weight)
+            hoped = curved - merit(problem, value, v, weight)
             # a step is taken for a tenth of its promise: as little may be lost at missed rows
             if not len(expected.rows) or hoped <= 0.0 or best.promised >= 0.9 * hoped:
                 break
             rows = rows.and_more(expected.rows)
-            solved = self.solved(region, rows)
-        return best, len(rows) > count, region
+            solved = self.solved(rows, weight)
+        return best, len(rows) > count
 
-    def with_weight(
-        self, region: TrustRegion, rows: Rows
-    ) -> tuple[tuple[Floats, Floats] | None, TrustRegion]:
-        """The step that the rows lead to, and the region with a ν that no further rise betters."""
-        solved, heavier = self.solved(region, rows), region
+    def with_weight(self, rows: Rows) -> tuple[Floats, Floats] | None:
+        """The step that the rows lead to, with a ν that no further rise betters."""
+        weight = self.region.weight
+        solved = self.solved(rows, weight)
         for _ in range(6):  # tenfold rises of ν, while v falls
             if solved is None or (v := rows.levels(solved[0], self.least)[0]) <= MET:
                 break
-            heavier = replace(heavier, weight=10.0 * heavier.weight)
-            again = self.solved(heavier, rows)
+            weight *= 10.0
+            again = self.solved(rows, weight)
             if again is not None and rows.levels(again[0], self.least)[0] < 0.99 * v:
-                region, solved = heavier, again
-        return solved, region
+                self.region.weight, solved = weight, again
+        return solved
 
-    def solved(self, region: TrustRegion, rows: Rows) -> tuple[Floats, Floats] | None:
+    def solved(self, rows: Rows, weight: float) -> tuple[Floats, Floats] | None:
         """d (n,) and the multipliers (m + k,) of rows; None where nothing is found."""
         box, place, n = self.box, self.place, self.box.n
         slope, limited = place.cost_slopes, len(place.seen.excess) > 0
@@ -163,7 +164,7 @@ class _Program:
         needs_t = (not place.squared and place.m > 0) or not rows.of_excess.all()
         # rows of one sign may have any unit: t is in that of their size
         unit = max(abs(place.seen.residual).max(), TINY) if np.isinf(self.least) else 1.0
-        cost = np.append(slope, [region.weight if limited else 0.0, unit if needs_t else 0.0])
+        cost = np.append(slope, [weight if limited else 0.0, unit if needs_t else 0.0])
         offset = box.rows @ place.z
         own = np.column_stack([rows.slopes, -1.0 * rows.of_excess, -unit * ~rows.of_excess])
         G = np.vstack([np.pad(box.rows, ((0, 0), (0, 2))), own])
@@ -174,8 +175,8 @@ class _Program:
         scale = max(float(np.abs(cost).max()), float(np.abs(self.root).max(initial=0.0)) ** 2)
         if scale == 0.0:
             return None
-        least = np.maximum(-place.z, -region.radius)
-        most = np.minimum(1.0 - place.z, region.radius)
+        least = np.maximum(-place.z, -self.region.radius)
+        most = np.minimum(1.0 - place.z, self.region.radius)
         scaled = Program(
             A=np.pad(self.root, ((0, 0), (0, 2))) / np.sqrt(scale),
             b=np.zeros(len(self.root)),
