@@ -106,7 +106,8 @@ def solve_program(program: Program, start: Floats | None = None) -> Solved | Non
     side = _first_guess(program, x)
     for _ in range(PASSES):
         x, mu = _descend(program, x, side)
-        shift = _onto_limits(program, x, side)
+        rows, limits = program.G[side != 0], np.where(side > 0, program.upper, program.lower)
+        shift = np.linalg.lstsq(rows, limits[side != 0] - rows @ x, rcond=None)[0]
         x = x + shift
         if np.linalg.norm(shift) <= SIGN:
             break
@@ -177,7 +178,9 @@ def _descend(program: Program, x: Floats, side: NDArray[np.int_]) -> tuple[Float
         if meets:
             side[row] = meets
             continue
-        mu = _multipliers(program, x, side)
+        active = side != 0
+        mu[:] = 0.0
+        mu[active] = np.linalg.lstsq(program.G[active].T, -program.gradient(x), rcond=None)[0]
         wrong = np.where(fixed, 0.0, -mu * side)
         if np.max(wrong, initial=0.0) <= SIGN:
             break
@@ -222,23 +225,6 @@ def _longest(
     if room.size == 0 or room[first] >= 1.0:
         return 1.0, 0, 0
     return float(room[first]), first, 1 if slope[first] > 0.0 else -1
-
-
-def _multipliers(program: Program, x: Floats, side: NDArray[np.int_]) -> Floats:
-    """mu (m,) with Aᵀ(A x + b) + cost + Gᵀ mu = 0 on the working set, 0 elsewhere."""
-    mu = np.zeros(len(side))
-    if side.any():
-        rows = program.G[side != 0]
-        mu[side != 0] = np.linalg.lstsq(rows.T, -program.gradient(x), rcond=None)[0]
-    return mu
-
-
-def _onto_limits(program: Program, x: Floats, side: NDArray[np.int_]) -> Floats:
-    """The shortest shift (n,) of x exactly onto the limits of the working set."""
-    if not side.any():
-        return np.zeros(x.size)
-    rows, limits = program.G[side != 0], np.where(side > 0, program.upper, program.lower)
-    return np.asarray(np.linalg.lstsq(rows, limits[side != 0] - rows @ x, rcond=None)[0])
 
 
 # --- Limits that contradict each other

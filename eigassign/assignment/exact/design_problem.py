@@ -231,23 +231,16 @@ class UnitBox:
 
 
 def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) -> list[T]:
-    """Order by violation, then by F; ``worth`` gives both.
+    """Order by violation in whole numbers of `MET`, then by F; ``worth`` gives both.
 
-    Violations apart by `MET` at most are equal, and so are all up to `MET`. Of equals the first
-    stays first.
+    All violations up to `MET` are equal. Of equals the first stays first.
     """
-    worths = sorted(
-        ((max(v, MET), value, one) for one in found for v, value in [worth(one)]),
-        key=lambda each: each[0],
-    )
-    ordered: list[T] = []
-    while worths:
-        least = worths[0][0]
-        limit = least if least <= MET else least + MET
-        equal = [each for each in worths if each[0] <= limit]
-        ordered += [one for *_, one in sorted(equal, key=lambda each: each[1])]
-        worths = worths[len(equal) :]
-    return ordered
+
+    def rank(one: T) -> tuple[float, float]:
+        violation, value = worth(one)
+        return float(np.ceil(max(violation / MET, 1.0))), value
+
+    return sorted(found, key=rank)
 
 
 def merit(problem: DesignProblem, value: float, violation: float, weight: float) -> float:
