@@ -19,6 +19,7 @@ from eigassign.case.schema.links import (
     SuperelementLink,
 )
 from eigassign.case.schema.mechanism import (
+    RIDING,
     Coordinate,
     JointBase,
     Mechanism,
@@ -265,7 +266,7 @@ def riders_have_a_beam_of_their_own(document: Document) -> Iterator[Finding]:
     riders: dict[str, str] = {}
     for name, joint in document.mechanism.joints.items():
         base = document.mechanism.links.get(joint.base)
-        if not joint.travels or not isinstance(base, BeamLink):
+        if joint.type not in RIDING or not isinstance(base, BeamLink):
             continue
         if base.reduce_to is not None:
             message = f"{name!r} travels along this link, so that it cannot be reduced: "
@@ -303,7 +304,7 @@ def joints_connect_two_links(document: Document) -> Iterator[Finding]:
 
 def _base_problem(mechanism: Mechanism, joint: JointBase) -> str | None:
     base = joint.base
-    if not joint.travels:
+    if joint.type not in RIDING:
         return None if base == "ground" else node_problem(mechanism, base, "ground")
     beams = [name for name, link in mechanism.links.items() if isinstance(link, BeamLink)]
     if base in beams:

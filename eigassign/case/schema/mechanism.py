@@ -59,10 +59,6 @@ class JointBase(Placed):
 
     place = "position"
     freedoms: ClassVar[tuple[str, ...]]  # names of its coordinates: what `component` may be
-    planar: ClassVar[bool] = False  # whether planar mechanisms may have it
-    travels: ClassVar[bool] = False  # whether its base is a beam along which it moves
-    slides: ClassVar[bool] = False  # whether it moves along its axis
-    advances: ClassVar[bool] = False  # whether a full turn moves something on
 
     type: str
     base: str
@@ -74,7 +70,7 @@ class JointBase(Placed):
     @model_validator(mode="before")
     @classmethod
     def _belongs_to_the_space(cls, value: Any, info: ValidationInfo) -> Any:
-        if space_of(info) == "planar" and not cls.planar:
+        if space_of(info) == "planar" and value["type"] not in PLANAR:
             message = f"a {value['type']} joint is spatial; planar mechanisms have {listed(PLANAR)}"
             raise wrong(message, "type")
         return value
@@ -89,7 +85,6 @@ class RevoluteJoint(JointBase):
     """Turns about `axis`: z unless given, always z in a plane."""
 
     freedoms = ("rotation",)
-    planar = True
     type: Literal["revolute"]
     axis: Annotated[
         Direction | None,
@@ -101,8 +96,6 @@ class PrismaticJoint(JointBase):
     """Slides along `axis`: x unless given."""
 
     freedoms = ("translation",)
-    planar = True
-    slides = True
     type: Literal["prismatic"]
     axis: Direction | None = None
 
@@ -111,7 +104,6 @@ class CylindricalJoint(JointBase):
     """Slides along and turns about `axis`: z unless given. Spatial only."""
 
     freedoms = ("translation", "rotation")
-    slides = True
     type: Literal["cylindrical"]
     axis: Direction | None = None
 
@@ -124,8 +116,6 @@ class ScrewJoint(JointBase):
     """
 
     freedoms = ("rotation",)
-    slides = True
-    advances = True
     type: Literal["screw"]
     axis: Direction | None = None
     lead: Lead
@@ -164,7 +154,6 @@ class FixedJoint(JointBase):
     """Clamps `follower` to `base`."""
 
     freedoms = ()
-    planar = True
     type: Literal["fixed"]
 
 
@@ -172,9 +161,6 @@ class CarriageJoint(JointBase):
     """Travels along a flexible beam; the coordinate is the distance from its `start`."""
 
     freedoms = ("translation",)
-    planar = True
-    travels = True
-    slides = True
     type: Literal["carriage"]
 
 
@@ -190,9 +176,6 @@ class NutJoint(JointBase):
     """
 
     freedoms = ("translation",)
-    travels = True
-    slides = True
-    advances = True
     type: Literal["nut"]
     lead: Lead
 
@@ -211,10 +194,10 @@ Joint: TypeAlias = Annotated[
 ]
 JOINTS: dict[str, type[JointBase]] = kinds(Joint)  # type: ignore[assignment]
 FREEDOMS = {kind: model.freedoms for kind, model in JOINTS.items()}
-RIDING = tuple(kind for kind, model in JOINTS.items() if model.travels)
-SLIDING = tuple(kind for kind, model in JOINTS.items() if model.slides)
-ADVANCING = tuple(kind for kind, model in JOINTS.items() if model.advances)
-PLANAR = tuple(kind for kind, model in JOINTS.items() if model.planar)
+RIDING = ("carriage", "nut")  # their base is a beam along which they move
+SLIDING = ("prismatic", "cylindrical", "screw", *RIDING)  # they move along their axis
+ADVANCING = ("screw", "nut")  # a full turn moves something on
+PLANAR = ("revolute", "prismatic", "fixed", "carriage")  # planar mechanisms may have them
 
 
 def freedom_of(kind: str, component: object) -> str:
@@ -308,9 +291,8 @@ class Drive(Part):
 
     Keys:
         stiffness: without it the joint is free
-        inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint
-        motor_inertia: J_m of the motor's data sheet, instead of `inertia`
-        ratio: N of the gear; 1 unless given; of a joint that slides 2π over the lead
+        inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint, in rad/m where
+            it slides
     """
 
     stiffness: (
@@ -327,21 +309,10 @@ class Drive(Part):
         ]
         | None
     ) = None
-    motor_inertia: Annotated[float, quantity("rotary inertia", at_least=0)] | None = None
-    ratio: (
-        Annotated[float, Quantity(above=0, elsewhere="a number, or rad/m where the joint slides")]
-        | None
-    ) = None
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
-        if self.inertia is not None and self.motor_inertia is not None:
-            message = "is reflected through the gear to motor_inertia ratio²: give it or inertia"
-            raise wrong(f"{message}, not both", "motor_inertia")
-        if self.ratio is not None and self.motor_inertia is None:
-            message = "has no effect without motor_inertia: give the motor's inertia J_m"
-            raise wrong(f"{message}; inertia is J_m ratio² already", "ratio")
-        if self.stiffness is None and self.inertia is None and self.motor_inertia is None:
+        if self.stiffness is None and self.inertia is None:
             raise wrong("a drive needs stiffness, inertia or both; else write free or locked")
         return self
 
