@@ -51,8 +51,7 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
     """Write a commented case file that runs as it is.
 
     Without TEMPLATE it is planar_arm. With --urdf the case is the robot of a URDF file, and what
-    URDF does not contain is listed with its lines, to be filled in. Existing files are never
-    overwritten.
+    URDF does not contain is listed, to be filled in. Existing files are never overwritten.
     """
     if template is not None and urdf is not None:
         raise UsageError(f"give a template or --urdf, not both: {template} is another mechanism")
@@ -73,8 +72,8 @@ def init(template: str | None, urdf: Path | None, out: Path | None) -> int:
         from eigassign.pipeline.urdf import urdf_case
 
         texts, after = {}, []
-        texts[case], asked = urdf_case(urdf, str(case))
-        after = ["to fill in:", *asked]
+        texts[case], asked = urdf_case(urdf)
+        after = ["to fill in, since URDF has none:", *asked]
     for path in texts:
         if path.exists() or path.is_symlink():
             raise StorageError(f"{path} exists and is left alone: choose another folder with --out")

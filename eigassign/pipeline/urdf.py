@@ -1,8 +1,8 @@
 """A robot from a URDF file as the content of a case: a tree of links with elastic drives.
 
 Frames are taken over as they are: a link's frame is at the joint to its parent, turned by roll,
-pitch and yaw, R = Rz Ry Rx, and the axis of a joint is in the frame of its child. A link is rigid,
-with the mass, centre and inertia of its ``inertial``, or a beam to the next joint: the user says.
+pitch and yaw, R = Rz Ry Rx, and the axis of a joint is in the frame of its child. Links are rigid,
+with the mass, centre and inertia of their ``inertial``.
 """
 
 from __future__ import annotations
@@ -33,41 +33,31 @@ _LEVEL = 1e-9  # m: a joint this near to another one is at its place
 
 
 def urdf_mapping(
-    path: str | Path,
-    stiffness: Number | Mapping[str, Number | None],
-    beams: Mapping[str, Mapping[str, Any]] | None = None,
-    sections: Mapping[str, Any] | None = None,
-    materials: Mapping[str, Any] | None = None,
+    path: str | Path, stiffness: Number | Mapping[str, Number | None]
 ) -> dict[str, Any]:
     """The keys ``title``, ``mechanism`` and ``coordinates`` of a case, for `load_case`.
 
     ``stiffness`` of the drives of all joints, or by joint (None: free), in N m/rad, N/m where they
-    slide, or text with a unit; a parameter is ``coordinates.<joint>.drive.stiffness``. ``beams``
-    has of every link that is one its ``material``, ``section`` and ``elements``, named in
-    ``materials`` and ``sections`` as in a case; it runs to the one joint that it carries, and its
-    section gives its mass in place of the URDF's. Everything else is rigid; the root of the tree
-    stands on the ground. Raises UsageError for what is no such robot, StorageError for a file that
-    cannot be read.
+    slide, or text with a unit; a parameter is ``coordinates.<joint>.drive.stiffness``. Links are
+    rigid; the root of the tree stands on the ground. Raises UsageError for what is no such robot,
+    StorageError for a file that cannot be read.
     """
-    (title, links, joints), beams = _parsed(Path(path)), dict(beams or {})
-    if unknown := sorted(set(beams) - set(links)):
-        raise UsageError(f"{path}: no link {', '.join(unknown)}; there are {', '.join(links)}")
+    title, links, joints = _parsed(Path(path))
     names = _identifiers(links, path)
     own = _identifiers([joint.name for joint in joints], path)
     written: dict[str, Any] = {}
     for name, inertial in links.items():
-        carried = {own[joint.name]: joint.place for joint in joints if joint.parent == name}
-        nodes = {"start": [0.0, 0.0, 0.0], **{key: at.tolist() for key, at in carried.items()}}
-        written[names[name]] = {"type": "rigid", "nodes": nodes, **_mass(inertial)}
-        if name in beams:
-            if len(carried) != 1 or min(map(np.linalg.norm, carried.values())) < _LEVEL:
-                what = "it has to carry one joint away from its own"
-                raise UsageError(f"{path}: link {name} cannot be a beam: {what}")
-            beam = {"from": "start", "to": next(iter(carried)), **beams[name]}
-            written[names[name]] = {"type": "frame", "nodes": nodes, "beams": {"beam": beam}}
+        nodes = {own[joint.name]: joint.place.tolist() for joint in joints if joint.parent == name}
+        written[names[name]] = {"type": "rigid", "nodes": {"start": [0.0, 0.0, 0.0], **nodes}}
+        if inertial is not None:
+            mass, center, I = inertial  # noqa: E741
+            tensor = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+            written[names[name]] |= {"mass": mass, "center": center.tolist()}
+            written[names[name]]["inertia"] = [float(value) for value in tensor]
     (root,) = set(links) - {joint.child for joint in joints}
     ways: dict[str, Any] = {"ground": {"type": "fixed", "base": "ground"}}
     ways["ground"] |= {"follower": f"{names[root]}.start", "position": [0.0, 0.0, 0.0]}
+    drives: dict[str, Any] = {}
     for joint in joints:
         ways[own[joint.name]] = {
             "type": _MOVING.get(joint.type, "fixed"),
@@ -76,34 +66,17 @@ def urdf_mapping(
             **({"orientation": joint.turn.tolist()} if joint.turn.any() else {}),
             **({"axis": joint.axis.tolist()} if joint.type in _MOVING else {}),
         }
-    drives: dict[str, Any] = {}
-    for joint in joints:
         if joint.type in _MOVING:
             by_joint = stiffness if isinstance(stiffness, Mapping) else {joint.name: stiffness}
             if joint.name not in by_joint:
                 raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
             given = by_joint[joint.name]
             drives[own[joint.name]] = "free" if given is None else {"stiffness": given}
-    named = {"sections": dict(sections or {}), "materials": dict(materials or {})}
     return {
         "title": title,
-        "mechanism": {
-            "space": "spatial",
-            **{key: value for key, value in named.items() if value},
-            "links": written,
-            "joints": ways,
-        },
+        "mechanism": {"space": "spatial", "links": written, "joints": ways},
         "coordinates": {name: {"joint": name, "drive": drive} for name, drive in drives.items()},
     }
-
-
-def _mass(inertial: Inertial | None) -> dict[str, Any]:
-    """The keys of a rigid link for its mass."""
-    if inertial is None:
-        return {}
-    mass, center, I = inertial  # noqa: E741
-    tensor = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
-    return {"mass": mass, "center": center.tolist(), "inertia": [float(value) for value in tensor]}
 
 
 STANDING = {"revolute": "20 kN m/rad", "continuous": "20 kN m/rad", "prismatic": "20 MN/m"}
@@ -117,19 +90,21 @@ OUTLOOK = """
 """
 
 
-def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
-    """The text of a case file ``name`` for the robot, and what is to be filled in, by its line.
+def urdf_case(path: Path) -> tuple[str, list[str]]:
+    """The text of a case file for the robot, and what is to be filled in, which heads the text.
 
-    What URDF does not know has a value that stands for it, and a comment: flexibility of links that
-    carry a joint away from their own, stiffnesses of drives, the trajectory. A joint that moves no
-    mass is locked. Raises as `urdf_mapping`, and UsageError for what would be no case.
+    What URDF does not know has a value that stands for it: flexibility of links that carry a joint
+    away from their own, stiffnesses of drives, the trajectory. A joint that moves no mass is
+    locked. Raises as `urdf_mapping`, and UsageError for what would be no case.
     """
     _, links, joints = _parsed(path)
     moving = {joint.name: joint for joint in joints if joint.type in _MOVING}
     content = urdf_mapping(path, {key: STANDING[joint.type] for key, joint in moving.items()})
     if not moving:
         raise UsageError(f"{path}: no joint moves: a robot of fixed joints has no coordinate")
-    asked, steps = [], []
+    long = {joint.parent for joint in joints if np.linalg.norm(joint.place) > _LEVEL}
+    asked = [f"flexibility of link {link}: rigid stands there" for link in links if link in long]
+    steps = []
     for joint, coordinate in zip(moving.values(), content["coordinates"].values(), strict=True):
         carried = [links[each] for each in _beyond(joint.child, joints=joints)]
         if all(each is None or each[0] == 0.0 == np.abs(each[2]).max() for each in carried):
@@ -137,8 +112,8 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
             asked.append(f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked")
             steps.append((0.0, 0.0))
             continue
-        unknown = f"stiffness of the drive of {joint.name}: URDF has none"
-        asked.append(f"{unknown}; {STANDING[joint.type]} stands there")
+        drive = f"stiffness of the drive of {joint.name}"
+        asked.append(f"{drive}: {STANDING[joint.type]} stands there")
         lower, upper = joint.limits
         start = float(np.clip(0.0, lower, upper))
         step = 0.1 if joint.type == "prismatic" else 0.5
@@ -146,34 +121,21 @@ def urdf_case(path: Path, name: str) -> tuple[str, list[str]]:
         steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
     if not np.any(steps):
         raise UsageError(f"{path}: no joint moves a mass: give its links <inertial>")
+    asked.append("trajectory: poses between which the joints move; small steps stand there")
     points = [[round(at, 6) for at in pose] for pose in zip(*steps, strict=True)]
     content["trajectory"] = {"points": points, "duration": "2 s"}
-    first = f"# From {path.name}: masses, places and axes. What URDF does not know: # fill in\n"
-    lines = (first + to_yaml(content)).splitlines()
-    below = lines.index("coordinates:")
-    rigid = [n for n in range(lines.index("  links:"), below) if "type: rigid" in lines[n]]
-    long = {joint.parent for joint in joints if np.linalg.norm(joint.place) > _LEVEL}
-    wanted = [
-        (n, f"flexibility of link {link}: URDF has none; rigid stands there")
-        for n, link in zip(rigid, links, strict=True)
-        if link in long
-    ]
-    places = [n for n in range(below, len(lines)) if re.search(r"\bdrive: [{l]", lines[n])]
-    places.append(next(n for n, line in enumerate(lines) if line.startswith("trajectory:")))
-    asked.append("trajectory: poses between which the joints move; small steps stand there")
-    wanted += zip(places, asked, strict=True)
-    for n, _ in wanted:
-        lines[n] += "  # fill in"
+    first = [f"# From {path.name}: masses, places and axes. To be filled in, as URDF has none:"]
+    head = "\n".join([*first, *(f"# - {each}" for each in asked)])
     coordinate, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
     unit = STANDING[joint.type].partition(" ")[2]
     outlook = OUTLOOK.format(joint=coordinate, low=f"5 {unit}", high=f"50 {unit}")
-    text = "\n".join(lines) + "\n" + outlook
+    text = f"{head}\n{to_yaml(content)}\n{outlook}"
     try:
         parse(text.encode(), path.with_suffix(".yaml"))
     except CaseError as error:
         problem = error.problems[0]
         raise UsageError(f"{path}: gives no case: {problem.path}: {problem.message}") from error
-    return text, [f"{name}:{n + 1}: {note}" for n, note in wanted]
+    return text, asked
 
 
 class _Joint(NamedTuple):

@@ -5,7 +5,6 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -100,28 +99,6 @@ def test_frequencies_are_those_of_the_rigid_robot_on_its_drives(crane: Path) -> 
     np.testing.assert_allclose(hz, np.sqrt(lam) / (2.0 * math.pi), rtol=1e-8)  # of differences
 
 
-def test_a_beam_that_hardly_bends_is_the_rigid_link(crane: Path) -> None:
-    """Of the upper arm, without mass of its own, to the joint that it carries."""
-    weightless = ROBOT.replace('<mass value="5"/>', '<mass value="0"/>').replace(
-        'ixx="0.02" ixy="0" ixz="0" iyy="0.12" iyz="0" izz="0.11"',
-        'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"',
-    )
-    crane.write_text(weightless, encoding="utf-8")
-    rigid = ea.load_case(ea.urdf_mapping(crane, STIFFNESS)).model().frequencies(POSE, [], 3)
-    stiff: dict[str, Any] = {
-        "beams": {"upper-arm": {"material": "light", "section": "rod", "elements": 2}},
-        "sections": {"rod": {"shape": "circle", "diameter": "40 mm"}},
-    }
-    made = ea.urdf_mapping(
-        crane, STIFFNESS, **stiff,
-        materials={"light": {"youngs_modulus": 2e17, "density": 1e-6, "poissons_ratio": 0.3}},
-    )  # fmt: skip
-    bending = ea.load_case(made).model().frequencies(POSE, [], 3)
-    np.testing.assert_allclose(bending, rigid, rtol=1e-4)
-    made["mechanism"]["materials"]["light"]["youngs_modulus"] = 2e9
-    assert (ea.load_case(made).model().frequencies(POSE, [], 3)[0] < 0.95 * rigid[0]).any()
-
-
 def test_a_stiffness_is_a_parameter_and_the_case_can_be_kept(crane: Path, tmp_path: Path) -> None:
     content = ea.urdf_mapping(crane, {"yaw": None, "pitch": "9 kN m/rad", "lift": 3e5})
     wanted = {"parameter": "coordinates.pitch.drive.stiffness", "min": 5e3, "max": 2e4}
@@ -165,10 +142,6 @@ def test_what_is_no_such_robot_is_refused(crane: Path, old: str, new: str, said:
 def test_wrong_arguments_are_refused(crane: Path) -> None:
     with pytest.raises(UsageError, match="no stiffness is given for joint pitch"):
         ea.urdf_mapping(crane, {"yaw": 1.0})
-    with pytest.raises(UsageError, match="no link arm; there are base_link, column"):
-        ea.urdf_mapping(crane, 1e4, beams={"arm": {}})
-    with pytest.raises(UsageError, match="tool cannot be a beam"):
-        ea.urdf_mapping(crane, 1e4, beams={"tool": {}})
     with pytest.raises(StorageError, match="cannot be read"):
         ea.urdf_mapping(crane.with_name("none.urdf"), 1e4)
     with pytest.raises(CaseError, match=r"case: coordinates\.yaw\.drive\.stiffness"):
@@ -195,13 +168,12 @@ def test_init_writes_a_case_that_runs_and_lists_what_is_to_be_filled_in(
     monkeypatch.chdir(crane.parent)
     assert main(["init", "--urdf", "crane.urdf"]) == 0
     out = capsys.readouterr().out.splitlines()
-    asked = [line for line in out if line.startswith("crane.yaml:")]
+    asked = out[out.index("to fill in, since URDF has none:") + 1 :]
     lines = (crane.parent / "crane.yaml").read_text(encoding="utf-8").splitlines()
-    marked = [n for n, line in enumerate(lines, 1) if line.endswith("# fill in") and n > 1]
-    assert [int(line.split(":")[1]) for line in asked] == marked
+    assert lines[1 : 1 + len(asked)] == [f"# - {each}" for each in asked]
     assert len(asked) == 8
-    assert "flexibility of link column: URDF has none; rigid stands there" in asked[1]
-    assert "stiffness of the drive of lift: URDF has none; 20 MN/m stands there" in asked[6]
+    assert "flexibility of link column: rigid stands there" in asked
+    assert "stiffness of the drive of lift: 20 MN/m stands there" in asked
     case = ea.load_case(crane.parent / "crane.yaml")
     drives = {"yaw": "20 kN m/rad", "pitch": "20 kN m/rad", "lift": "20 MN/m"}
     same = ea.load_case(ea.urdf_mapping(crane, drives))
