@@ -46,10 +46,9 @@ from eigassign.case.rules.files import (
     not_allowed,
     unreadable,
 )
-from eigassign.case.rules.plausibility import implausible
+from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, implausible
 from eigassign.case.rules.properties import (
     below,
-    bounds_hold_nothing_impossible,
     followed_designs,
     known_property,
     property_at,

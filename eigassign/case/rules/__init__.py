@@ -8,5 +8,5 @@ In reading order, each importing only from those above it:
     mechanism     rules: links and what stands on their nodes; joints, coordinates, loops
     files         files that the case names: whether they can be read; choices listed in one
     consistency   rules of the whole case: trajectory, design, targets, method; the table of all
-    plausibility  warnings: what is allowed but looks like a slip
+    plausibility  bounds of nothing that exists; warnings: what is allowed but looks like a slip
 """

@@ -8,7 +8,7 @@ one: write it, and name it in the table at the end.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 from eigassign.case.reader import Finding, KeyPath, Tree, items, listed, unknown
 from eigassign.case.rules import mechanism, properties
@@ -320,17 +320,12 @@ def inconsistent(document: Document) -> Iterator[Finding]:
 # --- Before the form is looked at
 
 
-def keys_have_values(node: object, path: KeyPath = ()) -> Iterator[Finding]:
-    """No key and no entry of a list below ``path`` is left empty."""
-    if node is None:
-        comma = bool(path) and str(path[-1])[:1].isdigit()
-        hint = " (decimals take a point, not a comma)" if comma else ""
-        yield path, f"has no value: give one, or leave the key out{hint}"
-    for key, inner in node.items() if isinstance(node, Mapping) else ():
-        yield from keys_have_values(inner, (*path, key))
-    for k, inner in enumerate(node) if isinstance(node, tuple) else ():
-        if not isinstance(inner, (int, float)):
-            yield from keys_have_values(inner, (*path, k))
+def keys_have_values(tree: Tree) -> Iterator[Finding]:
+    """No key and no entry of a list is left empty."""
+    for path, node in properties.walk(tree):
+        if node is None:
+            hint = " (decimals take a point, not a comma)" if str(path[-1])[:1].isdigit() else ""
+            yield path, f"has no value: give one, or leave the key out{hint}"
 
 
 _MOST = 1000  # entries of a group

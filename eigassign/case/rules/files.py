@@ -9,33 +9,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from functools import reduce
 from pathlib import Path
 from typing import NamedTuple
 
-from eigassign.case.reader import (
-    Finding,
-    KeyPath,
-    Tree,
-    at,
-)
+from eigassign.case.reader import Finding, KeyPath, Tree, at
+from eigassign.case.rules.properties import walk
 from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
 _SPARE = ("measurements", "sweep")
-_MATRIX = ("stiffness", "mass")  # keys that may name a matrix in a file
 _VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62})", re.DOTALL)
-_SUPERELEMENT = ("mechanism", "links", "*superelement")
-_PLACES: tuple[tuple[KeyPath, int], ...] = (  # where files are named, and how large they may be
-    (("trajectory", "file"), TABLE),
-    (("trajectory", "*", "file"), TABLE),
-    (("targets", "*", "*", "file"), TABLE),
-    (("targets", "*", "keep_out", "of", "file"), TABLE),
-    (("measurements", "file"), TABLE),
-    (("sweep", "file"), TABLE),
-    *(((*_SUPERELEMENT, key), MATRIX) for key in (*_MATRIX, "file", "nodes_file")),
-    ((*_SUPERELEMENT, "nodes_file", "*"), MATRIX),
-    (("mechanism", "links", "*solid", "mesh"), MESH),
-)
 
 
 class NamedFile(NamedTuple):
@@ -55,32 +39,28 @@ class NamedFile(NamedTuple):
 def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     """Files that the case names; relative paths start in ``folder``."""
     found = []
-    for place, limit in _PLACES:
-        for path, name in _at(tree, place):
-            if isinstance(name, str):
-                file, variable = os.path.abspath(folder / name), ""
-                if path[-1] in _MATRIX:
-                    file, variable = split_variable(file)
-                found.append(NamedFile(path, file, limit, path[0] in _SPARE, variable))
+    for path, name in walk(tree):
+        if isinstance(name, str) and (limit := _limit(tree, path)):
+            file, variable = os.path.abspath(folder / name), ""
+            if path[-1] in ("stiffness", "mass"):
+                file, variable = split_variable(file)
+            found.append(NamedFile(path, file, limit, path[0] in _SPARE, variable))
     return found
 
 
-def _at(node: object, place: KeyPath, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object]]:
-    """Key path and content of what stands at a ``place``: * is any key or entry, *solid any solid.
-
-    Of a trajectory with a tip, `file` is a key too many.
-    """
-    if not place:
-        yield path, node
-        return
-    known: dict[str | int, object] = dict(node) if isinstance(node, Mapping) else {}
-    known |= dict(enumerate(node)) if isinstance(node, tuple) else {}
-    star, _, kind = str(place[0]).partition("*")
-    for key, inner in known.items():
-        if (key == place[0] and "tip" not in known) or (
-            not star and (not kind or at(inner, "type") == kind)
-        ):
-            yield from _at(inner, place[1:], (*path, key))
+def _limit(tree: Tree, path: KeyPath) -> float:
+    """How large a file named there may be; 0 where none is. Of tip paths a `file` is too much."""
+    match path:
+        case ("mechanism", "links", str(link), key, *_):
+            keys = {"superelement": ("stiffness", "mass", "file", "nodes_file"), "solid": ("mesh",)}
+            kind = str(at(tree, "mechanism", "links", link, "type"))
+            return (MESH if key == "mesh" else MATRIX) * (key in keys.get(kind, ()))
+        case ("trajectory", *inner, "file"):
+            motion = reduce(lambda node, key: node[key], inner, tree["trajectory"])
+            return TABLE * ("tip" not in motion)
+        case ("targets" | "measurements" | "sweep", *_, "file"):
+            return TABLE
+    return 0
 
 
 def split_variable(name: str) -> tuple[str, str]:

@@ -1,17 +1,19 @@
-"""Warnings: values that are allowed but look like a slip: wrong exponent, forgotten unit, misprint.
+"""Bounds within which no mechanism exists; and warnings: what is allowed but looks like a slip.
 
-The warnings judge a valid document. Each limit is wide enough that real mechanisms stay inside;
-the reasons stand beside the limits. `WARNINGS` is the table of all.
+Both judge a valid document. Each limit of a warning (wrong exponent, forgotten unit, misprint) is
+wide enough that real mechanisms stay inside; the reasons stand beside the limits. `WARNINGS` is the
+table of all.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 from eigassign.case.reader import Finding, KeyPath, listed
 from eigassign.case.rules.mechanism import beams
-from eigassign.case.rules.properties import coordinate_lists, property_at, value_at
+from eigassign.case.rules.properties import ANY, coordinate_lists, limits, property_at, value_at
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, SolidLink, Taper
@@ -24,6 +26,7 @@ from eigassign.case.units import TWO_TURNS
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
 FREQUENCY = (1e-3, 1e6)  # Hz
+_ROUND_OFF = 1e-9  # of the terms of a limit
 LARGEST_ERROR = 0.5  # a tolerance of 2 was meant as 2 %
 SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
 # The same ratio of a wire; a link of 30 bare "mm" with a depth of 10 mm is 3000.
@@ -61,6 +64,65 @@ _MEANT = {
 }
 
 
+def bounds_hold_nothing_impossible(case: Any) -> Iterator[Finding]:
+    """Mechanisms exist at the bounds of the design, and with each of its choices and trajectories.
+
+    A robust one may go further by its tolerances. Limits are linear, so that the least room of each
+    entry, or of those that are chosen together, decides.
+    """
+    n, ranges, columns = len(case.loads), [*_ranges(case)], [*case.design.parameters.values()]
+
+    def least(k: int, factor: float, value: float) -> float:
+        tolerance = columns[k - n].tolerance if case.assignment.robust and k >= n else None
+        deviation = tolerance.deviation(value) if tolerance else 0.0
+        kind = case.design_quantities[k - n] if tolerance else ANY
+        if 0 in (kind.at_least, kind.above) and factor > 0.0:  # as masses are never below 0
+            deviation = min(deviation, max(value, 0.0))
+        return factor * value - abs(factor) * deviation
+
+    for limit in limits(case):
+        terms, blamed = [limit.offset], dict[int, KeyPath]()
+        for entries, rows in ranges:
+            if own := [k for k in entries if k in limit.factors]:
+                at = [entries.index(k) for k in own]
+                room = [
+                    sum(least(k, limit.factors[k], row[i]) for k, i in zip(own, at, strict=True))
+                    for _, row in rows
+                ]
+                terms.append(min(room))
+                blamed |= dict.fromkeys(own, rows[room.index(min(room))][0])
+        slack = _ROUND_OFF * sum(map(abs, terms))
+        if sum(terms) < -slack or (limit.strict and sum(terms) <= 0.0):
+            first = next((k for k in limit.factors if k < n), next(iter(limit.factors)))
+            place = blamed[first]
+            if first < n:
+                yield (*place, [*case.loads.values()][first].path), f"with this {limit.words}"
+                continue
+            with_more = " with its tolerance" if case.assignment.robust else ""
+            bound = "at this bound" if place[-1] in ("min", "max") else "with one of these"
+            yield place, f"{bound}{with_more} {limit.words}; narrow the bounds"
+
+
+def _ranges(case: Any) -> Iterator[tuple[Sequence[int], list[tuple[KeyPath, Sequence[float]]]]]:
+    """Entries that take their values together, and these, each with its place in the file."""
+    n, listed_only = len(case.loads), set[int]()
+    values = [*zip(*(load.along for load in case.loads.values()), strict=True)]
+    paths = [(*path, "set") for path, *_ in named_trajectories(case.trajectory)]
+    yield range(n), [*zip(paths, values, strict=False)]
+    for each in case.design.catalogues:
+        listed_only |= set(each.columns)
+        key = "choices" if isinstance(case.design.entries[each.name], Choices) else "values"
+        where = [("design", each.name, key)] * len(each.rows)
+        yield [n + k for k in each.columns], [*zip(where, each.rows, strict=True)]
+    for k, (name, column) in enumerate(case.design.parameters.items()):
+        if k not in listed_only:
+            ends = (("min", column.min), ("max", column.max))
+            yield [n + k], [(("design", name, key), (value,)) for key, value in ends]
+
+
+# --- Warnings
+
+
 def implausible(document: Document) -> Iterator[Finding]:
     """Everything in a valid document that is probably not meant."""
     for warning in WARNINGS:
@@ -96,6 +158,15 @@ def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
         for key in ("waypoints", "angle", "orientation") * isinstance(motion, TipTrajectory):
             for value in _flat(getattr(motion, key)):
                 yield (*place, key), "trajectory", key, value
+    joints, turning = document.mechanism.joints, []
+    for k, c in enumerate(document.coordinates.values()):
+        kind = joints[c.joint].type
+        if kind != "screw" and freedom_of(kind, c.component) != "translation":
+            turning.append(k)
+    for place, row in coordinate_lists(document):  # screws turn many times
+        angles = [abs(row[k]) for k in turning]
+        place = place[:-1] if isinstance(place[-1], int) else place
+        yield place, "trajectory", "angle", max(angles, default=0.0)
     for place, path, value in _varied(document):
         group, _, key, *_ = path.split(".")
         yield place, group, key, value
@@ -125,22 +196,6 @@ def _flat(value: object) -> Iterator[float]:
             yield from _flat(inner)
     elif isinstance(value, float):
         yield value
-
-
-def poses_are_in_radians(document: Document) -> Iterator[Finding]:
-    """No angle of a pose is larger than two turns, screws apart, which turn many times."""
-    joints, turning = document.mechanism.joints, []
-    for k, c in enumerate(document.coordinates.values()):
-        kind = joints[c.joint].type
-        if kind != "screw" and freedom_of(kind, c.component) != "translation":
-            turning.append(k)
-    found: dict[KeyPath, str] = {}
-    for path, row in coordinate_lists(document):
-        worst = max((abs(row[k]) for k in turning), default=0.0)
-        if worst > TWO_TURNS:
-            place = path[:-1] if isinstance(path[-1], int) else path
-            found.setdefault(place, _outside(worst, *_TURNS, "rad"))
-    yield from found.items()
 
 
 # --- Sections, links and bodies
@@ -269,7 +324,6 @@ def starts_outside(document: Document) -> Iterator[Finding]:
 
 WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     numbers_have_the_size_of_machines,
-    poses_are_in_radians,
     bare_sections_can_exist,
     materials_and_sections_are_used,
     beams_without_shear_are_slender,

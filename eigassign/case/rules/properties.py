@@ -455,7 +455,7 @@ def parameters_agree_with_the_file(document: Document) -> Iterator[Finding]:
                 )
 
 
-# --- What a design, or a trajectory with it, could break
+# --- What properties that vary may be
 
 
 class Limit(NamedTuple):
@@ -495,62 +495,3 @@ def limits(case: Any) -> Iterator[Limit]:
             if {small, large} & set(case.varied):
                 words = f"section {name!r} {own.beyond}: {own.small} {own}"
                 yield limit({small: -own.factor, large: 1.0}, 0.0, not own.may_meet, words)
-
-
-def bounds_hold_nothing_impossible(case: Any) -> Iterator[Finding]:
-    """Mechanisms exist at the bounds of the design, and with each of its choices and trajectories.
-
-    A robust one may go further by its tolerances. Limits are linear, so that the least room of each
-    entry, or of those that are chosen together, decides.
-    """
-    n, ranges, columns = len(case.loads), [*_ranges(case)], [*case.design.parameters.values()]
-
-    def least(k: int, factor: float, value: float) -> float:
-        tolerance = columns[k - n].tolerance if case.assignment.robust and k >= n else None
-        deviation = tolerance.deviation(value) if tolerance else 0.0
-        kind = case.design_quantities[k - n] if tolerance else ANY
-        if 0 in (kind.at_least, kind.above) and factor > 0.0:  # as masses are never below 0
-            deviation = min(deviation, max(value, 0.0))
-        return factor * value - abs(factor) * deviation
-
-    for limit in limits(case):
-        terms, blamed = [limit.offset], dict[int, KeyPath]()
-        for entries, rows in ranges:
-            if own := [k for k in entries if k in limit.factors]:
-                at = [entries.index(k) for k in own]
-                room = [
-                    sum(least(k, limit.factors[k], row[i]) for k, i in zip(own, at, strict=True))
-                    for _, row in rows
-                ]
-                terms.append(min(room))
-                blamed |= dict.fromkeys(own, rows[room.index(min(room))][0])
-        slack = _ROUND_OFF * sum(map(abs, terms))
-        if sum(terms) < -slack or (limit.strict and sum(terms) <= 0.0):
-            first = next((k for k in limit.factors if k < n), next(iter(limit.factors)))
-            place = blamed[first]
-            if first < n:
-                yield (*place, [*case.loads.values()][first].path), f"with this {limit.words}"
-                continue
-            with_more = " with its tolerance" if case.assignment.robust else ""
-            bound = "at this bound" if place[-1] in ("min", "max") else "with one of these"
-            yield place, f"{bound}{with_more} {limit.words}; narrow the bounds"
-
-
-_ROUND_OFF = 1e-9  # of the terms of a limit
-
-
-def _ranges(case: Any) -> Iterator[tuple[Sequence[int], list[tuple[KeyPath, Sequence[float]]]]]:
-    """Entries that take their values together, and these, each with its place in the file."""
-    n, listed_only = len(case.loads), set[int]()
-    values = [*zip(*(load.along for load in case.loads.values()), strict=True)]
-    paths = [(*path, "set") for path, *_ in named_trajectories(case.trajectory)]
-    yield range(n), [*zip(paths, values, strict=False)]
-    for each in case.design.catalogues:
-        listed_only |= set(each.columns)
-        key = "choices" if isinstance(case.design.entries[each.name], Choices) else "values"
-        where = [("design", each.name, key)] * len(each.rows)
-        yield [n + k for k in each.columns], [*zip(where, each.rows, strict=True)]
-    for k, (name, column) in enumerate(case.design.parameters.items()):
-        if k not in listed_only:
-            ends = (("min", column.min), ("max", column.max))
-            yield [n + k], [(("design", name, key), (value,)) for key, value in ends]
