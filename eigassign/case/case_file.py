@@ -39,11 +39,13 @@ from eigassign.case.reader import (
     value_below,
     with_values,
 )
-from eigassign.case.rules.consistency import inconsistent, keys_have_values, too_many
-from eigassign.case.rules.files import (
+from eigassign.case.rules.consistency import (
     NamedFile,
+    inconsistent,
+    keys_have_values,
     named_files,
     not_allowed,
+    too_many,
     unreadable,
 )
 from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, implausible

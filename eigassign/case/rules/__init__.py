@@ -6,7 +6,6 @@ In reading order, each importing only from those above it:
 
     properties    the number that a path names, what it may be, and values whose unit it decides
     mechanism     rules: links and what stands on their nodes; joints, coordinates, loops
-    files         files that the case names: whether they can be read; choices listed in one
-    consistency   rules of the whole case: trajectory, design, targets, method; the table of all
+    consistency   files that the case names; rules of the whole case, and the table of all
     plausibility  bounds of nothing that exists; warnings: what is allowed but looks like a slip
 """

@@ -333,7 +333,7 @@ def _absolute(file: str, info: ValidationInfo) -> str:
     return file if folder is None else os.path.abspath(os.path.join(folder, file))
 
 
-File: TypeAlias = Annotated[str, AfterValidator(_absolute)]  # `rules.files` looks at it
+File: TypeAlias = Annotated[str, AfterValidator(_absolute)]  # rules look at it
 Named: TypeAlias = Annotated[Mapping[Name, T], Frozen]  # parts by the names that a file gives them
 OneOrMoreNamed: TypeAlias = Annotated[Mapping[Name, T], Field(min_length=1), Frozen]
 ByReference: TypeAlias = Annotated[Mapping[str, T], Frozen]  # values by the names of other parts

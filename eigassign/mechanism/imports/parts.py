@@ -21,7 +21,7 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import listed, shown
-from eigassign.case.rules.files import split_variable
+from eigassign.case.rules.consistency import split_variable
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
