@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from eigassign.case.reader import Finding, KeyPath, Tree, at, items, listed, unknown
 from eigassign.case.rules import mechanism, properties
@@ -72,7 +72,7 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     return found
 
 
-def _limit(tree: Tree, path: KeyPath) -> float:
+def _limit(tree: Any, path: KeyPath) -> int:
     """How large a file named there may be; 0 where none is. Of tip paths a `file` is too much."""
     match path:
         case ("mechanism", "links", str(link), key, *_):
@@ -80,7 +80,7 @@ def _limit(tree: Tree, path: KeyPath) -> float:
             kind = str(at(tree, "mechanism", "links", link, "type"))
             return (MESH if key == "mesh" else MATRIX) * (key in keys.get(kind, ()))
         case ("trajectory", *inner, "file"):
-            motion = reduce(lambda node, key: node[key], inner, tree["trajectory"])
+            motion: Any = reduce(lambda node, key: node[key], inner, tree["trajectory"])
             return TABLE * ("tip" not in motion)
         case ("targets" | "measurements" | "sweep", *_, "file"):
             return TABLE
