@@ -28,21 +28,22 @@ from eigassign.errors import CaseError, MechanismError, Problem
 class Variants:
     """The variants of one case in order: a value of each key for each of them.
 
-    ``columns`` has the values of each key: of a file the k-th ones belong together, else every
-    combination of them is a variant, the last key changing fastest.
+    ``columns`` has the values of each key: the k-th ones belong ``together``, or every combination
+    of them is a variant, the last key changing fastest.
     """
 
     keys: tuple[str, ...]
     columns: tuple[tuple[Any, ...], ...]
+    together: bool = False
     file: str = ""  # the CSV file they are from, a line of ``lines`` for each
     lines: tuple[int, ...] = ()
 
     def __len__(self) -> int:
-        return len(self.lines) if self.file else math.prod(map(len, self.columns))
+        return len(self.columns[0]) if self.together else math.prod(map(len, self.columns))
 
     def __getitem__(self, index: int) -> dict[str, object]:
         """The values of one variant by key."""
-        if self.file:
+        if self.together:
             row = [column[index] for column in self.columns]
         else:
             row = []
@@ -88,10 +89,10 @@ def _spread(sweep: Sweep, folder: Path) -> Variants:
         (_, keys), *rows = read_words(file, "sweep.file")
         cells = zip(*(map(resolve, row) for _, row in rows), strict=True)
         lines = tuple(line for line, _ in rows)
-        return Variants(tuple(keys), tuple(cells), file=file.name, lines=lines)
+        return Variants(tuple(keys), tuple(cells), True, file.name, lines)
     bodies = sweep.parameters or {}
     columns = (body.values if isinstance(body, Range) else body for body in bodies.values())
-    found = Variants(tuple(bodies), tuple(columns))
+    found = Variants(tuple(bodies), tuple(columns), sweep.sample == "list")
     if len(found) > MOST:
         raise MechanismError("sweep.parameters", f"{len(found)} variants: at most {MOST}")
     return found

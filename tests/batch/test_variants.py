@@ -55,6 +55,11 @@ def test_the_rows_of_a_file_are_variants(tmp_path: Path) -> None:
     assert found.lines == (3, 5)
 
 
+def test_a_list_takes_the_values_of_all_keys_together(tmp_path: Path) -> None:
+    text = f"  sample: list\n  parameters:\n    {MASS}: [1, 2, 1]\n    {WANTED}: [180, 190, 190]\n"
+    assert rows(swept(tmp_path, text)) == [[1, 180], [2, 190], [1, 190]]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -81,6 +86,11 @@ def test_a_wrong_file_of_variants_is_refused_with_its_line(
         (f"  parameters: {{{MASS}: []}}\n", "needs at least 1 entries"),
         (f"  parameters: {{{MASS}: 3}}\n", "expected a list of values or a range"),
         (f"  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "count: required key is missing"),
+        (f"  sample: list\n  parameters: {{{MASS}: [1, 2], {WANTED}: [1]}}\n", "equally many"),
+        (
+            f"  sample: list\n  parameters: {{{MASS}: [1, 2, 1]}}\n",
+            "variant 3 has the values of variant 1",
+        ),
         (f"  parameters: {{{MASS}: {{min: 1, max: 2, count: 1}}}}\n", "must be >= 2, got 1"),
         (f"  parameters: {{{MASS}: [1, '1']}}\n", "'1' is given twice"),
         (f"  parameters: {{{MASS}: [1 g, 1g]}}\n", "'1g' is given twice"),

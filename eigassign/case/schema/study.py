@@ -249,22 +249,34 @@ class Sweep(Part):
 
     Keys:
         parameters: for each key, a dotted path such as `targets.0.frequency`, a list of values or a
-            range; every value of every key is taken with every other, the last key changing fastest
+            range
+        sample: `grid` takes every value of every key with every other, the last key changing
+            fastest; `list` the first of each, then the second, and so on
         file: instead of `parameters`: a CSV file with a column for each key and a row for each
             variant
     """
 
     parameters: Annotated[ByReference[Body], Field(min_length=1)] | None = None
+    sample: Literal["grid", "list"] = "grid"
     file: File | None = None
 
     _is_one_kind = one_of("parameters", "file")
 
     @model_validator(mode="after")
     def _lists_each_once(self) -> Self:
-        for key, body in (self.parameters or {}).items():
+        for key, body in (self.parameters or {}).items() if self.sample == "grid" else ():
             seen: set[str] = set()
             for k, value in enumerate(body if isinstance(body, tuple) else ()):
                 if (written := text_of(value)) in seen:
                     raise wrong(f"{shown(value)} is given twice", "parameters", key, k)
                 seen.add(written)
+        return self
+
+    @model_validator(mode="after")
+    def _lists_as_many_of_each(self) -> Self:
+        bodies = (self.parameters or {}).items()
+        counts = {key: len(b.values if isinstance(b, Range) else b) for key, b in bodies}
+        if self.sample == "list" and len(set(counts.values())) > 1:
+            told = ", ".join(f"{key} has {count}" for key, count in counts.items())
+            raise wrong(f"a list takes equally many values of each key, but {told}", "sample")
         return self
