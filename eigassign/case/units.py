@@ -92,6 +92,7 @@ _DIMENSIONS = (
     ),
     Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm, N/um", 1e-24, 1e24),
     Dimension("compliance", (-1, 0, 2, 0, 0), "m/N", "mm/N, um/N", 1e-24, 1e24),
+    Dimension("transmission", (0, -1, 0, 1, 0), "rad/m", "rad/mm, deg/mm", 1e-12, 1e12),
     Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
     Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz, rpm", 1e-12, 1e15),
     Dimension("acceleration", (0, 1, -2, 0, 0), "m/s2", "mm/s2", 1e-12, 1e9),

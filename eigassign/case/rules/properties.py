@@ -49,6 +49,8 @@ DRIVEN = {  # of a drive: what it is where the joint turns, and where it slides
         quantity("stiffness", above=0),
     ),
     "inertia": (quantity("rotary inertia", at_least=0), quantity("mass", at_least=0)),
+    "motor_inertia": (quantity("rotary inertia", at_least=0),) * 2,
+    "ratio": (Quantity(above=0), quantity("transmission", above=0)),
 }
 
 

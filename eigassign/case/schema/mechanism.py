@@ -291,8 +291,9 @@ class Drive(Part):
 
     Keys:
         stiffness: without it the joint is free
-        inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint, in rad/m where
-            it slides
+        inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint
+        motor_inertia: J_m of the motor's data sheet, instead of `inertia`
+        ratio: N of the gear; 1 unless given; of a joint that slides 2π over the lead
     """
 
     stiffness: (
@@ -309,10 +310,21 @@ class Drive(Part):
         ]
         | None
     ) = None
+    motor_inertia: Annotated[float, quantity("rotary inertia", at_least=0)] | None = None
+    ratio: (
+        Annotated[float, Quantity(above=0, elsewhere="a number, or rad/m where the joint slides")]
+        | None
+    ) = None
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
-        if self.stiffness is None and self.inertia is None:
+        if self.inertia is not None and self.motor_inertia is not None:
+            message = "is reflected through the gear to motor_inertia ratio²: give it or inertia"
+            raise wrong(f"{message}, not both", "motor_inertia")
+        if self.ratio is not None and self.motor_inertia is None:
+            message = "has no effect without motor_inertia: give the motor's inertia J_m"
+            raise wrong(f"{message}; inertia is J_m ratio² already", "ratio")
+        if self.stiffness is None and self.inertia is None and self.motor_inertia is None:
             raise wrong("a drive needs stiffness, inertia or both; else write free or locked")
         return self
 

@@ -281,9 +281,15 @@ def add_drives(
 
 
 def drive_value(case: CaseFile, parameters: ModelParameters, name: str, key: str) -> Scalar | None:
-    """Stiffness or inertia of a coordinate's drive, None where it has none."""
+    """Stiffness or inertia of a coordinate's drive, None where it has none.
+
+    The inertia of a motor's rotor J_m is J_m N² on the joint, with the gear's ratio N.
+    """
     drive: Any = case.coordinates[name].drive
     path = f"coordinates.{name}.drive"
+    if key == "inertia" and getattr(drive, "motor_inertia", None) is not None:
+        ratio = parameters.number(f"{path}.ratio", drive.ratio or 1.0)
+        return parameters.number(f"{path}.motor_inertia", drive.motor_inertia) * ratio**2.0
     given = getattr(drive, key, None)
     return None if given is None else parameters.number(f"{path}.{key}", given)
 

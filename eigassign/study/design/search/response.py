@@ -290,6 +290,11 @@ def reduced_models(scene: Scene) -> ReducedModels | None:
     return ReducedModels(scene.model, scene.path) if large else None
 
 
+MOMENTS = (
+    "inertia",
+    "motor_inertia",
+    "ratio",
+)  # what gives a body or a rotor its moment of inertia
 MOST_SIDES = 6  # of a box with at most 64 corners, as many as a tolerance study draws
 
 
@@ -310,12 +315,12 @@ def _effect(file: CaseFile, path: str) -> float:
     group, name, *rest = path.split(".")
     if weighs and (group in ("springs", "materials") or rest == ["mass"]):  # loads change, too
         return 0.0
-    if loose and rest[-1] == "inertia":
+    if loose and rest[-1] in MOMENTS:
         return 0.0
     match group, ".".join(rest):
         case ("bodies" | "links", "mass") | ("materials", "density"):
             return -1.0
-        case "bodies" | "links" | "coordinates", _ if rest[-1] == "inertia":
+        case "bodies" | "links" | "coordinates", _ if rest[-1] in MOMENTS:
             return -1.0
         case ("springs", "translational" | "rotational") | ("coordinates", "drive.stiffness"):
             return 1.0
