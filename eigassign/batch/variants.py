@@ -121,12 +121,16 @@ def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
 
 
 def _repeated(variants: Variants) -> Iterator[Finding]:
-    """The first row of a file whose values are those of one before; a grid has none."""
+    """The first variant whose values are those of one before; a grid has none."""
     seen: dict[tuple[str, ...], int] = {}
-    rows = zip(*variants.columns, strict=True) if variants.file else ()
-    for row, line in zip(rows, variants.lines, strict=True):
-        if (first := seen.setdefault(tuple(map(text_of, row)), line)) != line:
-            yield ("sweep", "file"), f"{variants.file}:{line}: has the values of line {first}"
+    for k, row in enumerate(zip(*variants.columns, strict=True) if variants.together else ()):
+        if (first := seen.setdefault(tuple(map(text_of, row)), k)) != k:
+            if variants.file:
+                line, before = variants.lines[k], variants.lines[first]
+                yield ("sweep", "file"), f"{variants.file}:{line}: has the values of line {before}"
+            else:
+                why = f"variant {k + 1} has the values of variant {first + 1}"
+                yield ("sweep", "parameters"), why
             return
 
 
