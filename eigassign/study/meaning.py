@@ -37,8 +37,8 @@ from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.followed import solve_design
 from eigassign.study.design.search.optimum import Choices
-from eigassign.study.design.search.response import corners, effects
-from eigassign.study.design.search.variants import SPREAD, Designs, PosedProblem, Task, variant_of
+from eigassign.study.design.search.response import Designs, corners, effects
+from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
 from eigassign.study.results import (
     Meaning,
     RangeRow,
@@ -180,7 +180,7 @@ def _nearest(
     bands = [_at(band, at) for one in others for band in one.bands if _holds(band, at)]
     names = {one.name for one in (*others, *scene.limits) if one in others or one.constraint}
     task = Task(alone, (there, *beside, *bands), (Margin(),) * len(bands))
-    belows = Designs.all_over(alone, bands, SPREAD).choices[:CHOICES]
+    belows = Designs.all_over(alone, bands).choices[:CHOICES]
     every, (lower, upper) = Choices(task, belows, names), scene.bounds
     if every.count > COMBINED * len(belows):
         return None

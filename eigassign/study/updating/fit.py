@@ -31,7 +31,7 @@ from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
 from eigassign.study.design.judgement import NEAR
-from eigassign.study.design.search.variants import spread_designs
+from eigassign.study.design.search.response import spread_designs
 from eigassign.study.results import CaseRow, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 

@@ -36,20 +36,16 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import check_band, wanting
 from eigassign.study.design.lists import KEEP, catalogues, every_combination, with_rows
-from eigassign.study.design.search.response import reduced_models
-from eigassign.study.design.search.starts import (
+from eigassign.study.design.search.response import Designs, reduced_models
+from eigassign.study.design.search.variants import (
     SOLVES,
+    Counts,
+    PosedProblem,
     Searched,
+    Task,
     coarse_to_fine,
     most_starts,
     search_starts,
-)
-from eigassign.study.design.search.variants import (
-    SPREAD,
-    Counts,
-    Designs,
-    PosedProblem,
-    Task,
     variant_of,
 )
 from eigassign.study.results import ClearanceRow
@@ -281,7 +277,7 @@ class _Search:
         self.models = None if followed_modes(task.scene.file) else reduced_models(task.scene)
         self.levels = coarse_to_fine(task, self.models)
         few = self.levels[0]
-        self.designs = Designs.all_over(few.scene, few.wanted, SPREAD) if few.bands else None
+        self.designs = Designs.all_over(few.scene, few.wanted) if few.bands else None
         belows: Sequence[Counts] = [()] if self.designs is None else self.designs.choices
         self.every = Choices(task, belows)
         self.outcomes: list[Searched] = []
@@ -381,7 +377,10 @@ class _Search:
         """Designs to search a choice from; few that are like those of other choices."""
         starts, least = [*self.starts], most_starts(self.task.scene.file, alone=False)
         if self.designs is not None and not self.task.followers:
-            starts = [*self.designs.best_of(variant, PROMISING), *starts]
+            starts = [
+                *self.designs.best_of(variant.requirements.modes, variant.worth, PROMISING),
+                *starts,
+            ]
         if self.every.listed:
             starts = [*(one.best.y for one in self.ranked[:1]), *starts][: min(2, least)]
         return [np.clip(y, variant.problem.lower, variant.problem.upper) for y in starts]

@@ -19,7 +19,7 @@ has, and what the weight does along that way is in K (see `apart_from_rigid`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -27,16 +27,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.design_problem import best_first
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.requirements.requirement import Frequencies, Solved
+from eigassign.assignment.requirements.kinds import ForbiddenBand
+from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, EigassignError, LostModeError
+from eigassign.errors import AccuracyError, EigassignError, LostModeError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
+from eigassign.study.design.followed import (
+    Follower,
+    Spectrum,
+    follow_all,
+    followers,
+    unfollowed,
+    with_followed,
+)
 from eigassign.study.scene import OTHERS, Scene
 
 Floats = NDArray[np.float64]
@@ -345,3 +354,109 @@ def box_corners(n: int) -> Floats:
     if n <= MOST_SIDES:
         return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
     return np.concatenate([np.tri(n), 1.0 - np.tri(n), np.eye(n), 1.0 - np.eye(n)])
+
+
+# --- Designs all over the bounds, and bands
+
+ALL_OVER = 8  # beside corners and middle
+MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them in order
+
+
+def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:
+    """Designs (count, n_y) of a Latin hypercube over the ``bounds``, lower and upper (n_y,)."""
+    lower, upper = bounds
+    cells = np.tile(np.arange(count), (len(lower), 1))
+    share = (np.random.default_rng(seed).permuted(cells, axis=1).T + 0.5) / count
+    wide = (lower > 0.0) & (upper > 10.0 * lower)
+    low = np.where(wide, lower, 1.0)
+    ratio = np.where(wide, upper, 1.0) / low
+    return np.where(wide, low * ratio**share, lower + share * (upper - lower))
+
+
+@dataclass(frozen=True)
+class Designs:
+    """Designs all over the bounds with their frequencies, and what these say of bands.
+
+    ``solved`` are the lowest frequencies of each on the samples of ``scene``, as many as reach
+    beyond every band, and those followed; ``y`` (m, n_y) are the designs.
+    """
+
+    scene: Scene
+    bands: Sequence[ForbiddenBand]
+    y: Floats
+    solved: Sequence[Solved]
+
+    @classmethod
+    def all_over(cls, scene: Scene, wanted: Sequence[Requirement]) -> Designs:
+        """The initial design, corners and the middle, and `ALL_OVER` spread ones.
+
+        Raises LostModeError where a followed mode is lost at all of them.
+        """
+        bands, own = [b for one in wanted for b in one.bands], followers(scene, wanted)
+        lower, upper = scene.bounds
+        extremes = corners(scene.file, scene.initial, lower, upper)
+        designs = [scene.initial, lower, upper, 0.5 * (lower + upper), *extremes]
+        if len(lower):
+            designs += list(spread_designs(scene.bounds, ALL_OVER, 1))
+        found: list[tuple[Floats, Solved]] = []
+        for y in designs:
+            try:
+                found.append((y, solved_below(scene, bands, own, y)))
+            except EigassignError as error:
+                lost = error
+        if not found:
+            raise lost
+        return cls(scene, bands, *(np.array([y for y, _ in found]), [each for _, each in found]))
+
+    @cached_property
+    def choices(self) -> list[tuple[int, ...]]:
+        """Choices of a number for every band, those that designs are nearest to first.
+
+        From the fewest to the most of any design. Of more than `MOST_CHOICES` not all are listed.
+        """
+        each = [[band.below(solved) for solved in self.solved] for band in self.bands]
+        near = np.array([[int(np.median(own[k])) for own in each] for k in range(len(self.y))])
+        counts = (
+            range(min(int(k.min()) for k in own), max(int(k.max()) for k in own) + 1)
+            for own in each
+        )
+        listed = itertools.islice(itertools.product(*counts), MOST_CHOICES)
+        return sorted(
+            dict.fromkeys((*map(tuple, near.tolist()), *listed)),
+            key=lambda choice: int(np.abs(near - choice).sum(axis=1).min()),
+        )
+
+    def best_of(
+        self, modes: int, worth: Callable[[Floats, Floats], tuple[float, float]], most: int
+    ) -> list[Floats]:
+        """The designs that promise most, of a ``worth`` in y and frequencies (n_t, modes)."""
+        worths = []
+        for y, each in zip(self.y, self.solved, strict=True):
+            lacking = ((0, 0), (0, max(modes - each.hz.shape[1], 0)))
+            lowest = np.pad(each.hz, lacking, constant_values=np.inf)
+            worths.append(worth(y, np.hstack([lowest, each.followed])))
+        order = best_first(range(len(worths)), lambda k: worths[k])
+        return [self.y[k] for k in order[:most]]
+
+
+def solved_below(
+    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
+) -> Solved:
+    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass.
+
+    At all samples, with the modes that are followed.
+    """
+    q = scene.path.at(y)[0]
+    available = scene.model.n_dof - scene.model.n_rigid
+    beyond = max((float(band.upper.max()) for band in bands), default=0.0)
+    named = (mode for band in bands for mode in band.counted)
+    count = min(max((4, *named)), available)
+    while True:
+        try:
+            hz = scene.model.frequencies(q, y, count)
+        except MissingMassError as error:
+            count = available = error.most
+            continue
+        if count == available or hz[:, -1].min() > beyond:
+            return with_followed(scene, own, y, hz)
+        count = min(2 * count, available)

@@ -1,51 +1,71 @@
-"""The problems that the targets of a case make, one for each choice of what its bands leave open.
+"""The problem that one choice makes, and its local optima from several starts.
 
 What the case file asks for becomes requirements (`assignment.exact.requirements`). A band to keep
 out of leaves a choice: on a connected trajectory it is clear if and only if the number k of
 modes below it is the same everywhere, so each k that the bounds may allow is one more problem.
+
+Starts are followed on few samples of a long trajectory, of large models by reduced ones; what they
+lead to is then optimised on all samples, and by exact solves last.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import (
+    MET,
     Appraisal,
     Cost,
     DesignProblem,
     Objective,
+    UnitBox,
     best_first,
 )
 from eigassign.assignment.exact.requirements import Appraise, Requirements, with_scenarios
+from eigassign.assignment.exact.sequential import (
+    FINISHED,
+    NOTHING,
+    PAYS,
+    ROUND_OFF,
+    STOPPED,
+    End,
+    Optimum,
+    Tally,
+    minimise,
+    with_end,
+    worth,
+)
 from eigassign.assignment.program import constraints_agree
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeGap
-from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
+from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
-from eigassign.errors import CaseError, EigassignError, MissingMassError
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import mode_above
-from eigassign.study.design.followed import Follower, followers, with_followed
+from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.lists import catalogues, price_of_one
 from eigassign.study.design.search.response import (
     DesignResponse,
     Glances,
     Outlook,
     ReducedModels,
-    corners,
     outlook_of,
     response_of,
+    solved_below,
+    spread_designs,
 )
+from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-SPREAD = 8  # designs all over the bounds, beside corners and middle, that bands are looked at in
 Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
-MOST_CHOICES = 100_000  # of numbers of modes below the bands: 0.3 s to put them in order
 
 
 @dataclass(frozen=True)
@@ -97,7 +117,7 @@ class Task:
     @cached_property
     def bands(self) -> tuple[ForbiddenBand, ...]:
         """The bands along each trajectory for itself."""
-        return tuple(_bands(self.wanted))
+        return tuple(band for one in self.wanted for band in one.bands)
 
     @cached_property
     def glances(self) -> dict[int, Glances]:
@@ -228,97 +248,6 @@ def cost_of(scene: Scene, unit: float) -> Cost | None:
     )
 
 
-@dataclass(frozen=True)
-class Designs:
-    """Designs all over the bounds with their frequencies, and what these say of bands.
-
-    ``solved`` are the lowest frequencies of each on the samples of ``scene``, as many as reach
-    beyond every band, and those followed; ``y`` (m, n_y) are the designs.
-    """
-
-    scene: Scene
-    bands: Sequence[ForbiddenBand]
-    y: Floats
-    solved: Sequence[Solved]
-
-    @classmethod
-    def all_over(cls, scene: Scene, wanted: Sequence[Requirement], count: int) -> Designs:
-        """The initial design, corners and the middle, and ``count`` spread ones.
-
-        Raises LostModeError where a followed mode is lost at all of them.
-        """
-        bands, own = tuple(_bands(wanted)), followers(scene, wanted)
-        lower, upper = scene.bounds
-        extremes = corners(scene.file, scene.initial, lower, upper)
-        designs = [scene.initial, lower, upper, 0.5 * (lower + upper), *extremes]
-        if len(lower):
-            designs += list(spread_designs(scene.bounds, count, 1))
-        found: list[tuple[Floats, Solved]] = []
-        for y in designs:
-            try:
-                found.append((y, solved_below(scene, bands, own, y)))
-            except EigassignError as error:
-                lost = error
-        if not found:
-            raise lost
-        return cls(scene, bands, *(np.array([y for y, _ in found]), [each for _, each in found]))
-
-    @cached_property
-    def choices(self) -> list[tuple[int, ...]]:
-        """Choices of a number for every band, those that designs are nearest to first.
-
-        From the fewest to the most of any design. Of more than `MOST_CHOICES` not all are listed.
-        """
-        each = [[band.below(solved) for solved in self.solved] for band in self.bands]
-        near = np.array([[int(np.median(own[k])) for own in each] for k in range(len(self.y))])
-        counts = (
-            range(min(int(k.min()) for k in own), max(int(k.max()) for k in own) + 1)
-            for own in each
-        )
-        listed = itertools.islice(itertools.product(*counts), MOST_CHOICES)
-        return sorted(
-            dict.fromkeys((*map(tuple, near.tolist()), *listed)),
-            key=lambda choice: int(np.abs(near - choice).sum(axis=1).min()),
-        )
-
-    def best_of(self, variant: PosedProblem, most: int) -> list[Floats]:
-        """The designs that a variant promises most from."""
-        modes, worths = variant.requirements.modes, []
-        for y, each in zip(self.y, self.solved, strict=True):
-            lacking = ((0, 0), (0, max(modes - each.hz.shape[1], 0)))
-            lowest = np.pad(each.hz, lacking, constant_values=np.inf)
-            worths.append(variant.worth(y, np.hstack([lowest, each.followed])))
-        order = best_first(range(len(worths)), lambda k: worths[k])
-        return [self.y[k] for k in order[:most]]
-
-
-def solved_below(
-    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
-) -> Solved:
-    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass.
-
-    At all samples, with the modes that are followed.
-    """
-    q = scene.path.at(y)[0]
-    available = scene.model.n_dof - scene.model.n_rigid
-    beyond = max((float(band.upper.max()) for band in bands), default=0.0)
-    named = (mode for band in bands for mode in band.counted)
-    count = min(max((4, *named)), available)
-    while True:
-        try:
-            hz = scene.model.frequencies(q, y, count)
-        except MissingMassError as error:
-            count = available = error.most
-            continue
-        if count == available or hz[:, -1].min() > beyond:
-            return with_followed(scene, own, y, hz)
-        count = min(2 * count, available)
-
-
-def _bands(wanted: Sequence[Requirement]) -> Iterator[ForbiddenBand]:
-    return (band for one in wanted for band in one.bands)
-
-
 def lacking(task: Task, y: Floats) -> list[Floats]:
     """What a design lacks to be clear of each band, by the number of modes below it from 0."""
     if not task.bands:
@@ -333,12 +262,216 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
     return [np.max(own, axis=0) for own in known]
 
 
-def spread_designs(bounds: tuple[Floats, Floats], count: int, seed: int) -> Floats:
-    """Designs (count, n_y) of a Latin hypercube over the ``bounds``, lower and upper (n_y,)."""
-    lower, upper = bounds
-    cells = np.tile(np.arange(count), (len(lower), 1))
-    share = (np.random.default_rng(seed).permuted(cells, axis=1).T + 0.5) / count
-    wide = (lower > 0.0) & (upper > 10.0 * lower)
-    low = np.where(wide, lower, 1.0)
-    ratio = np.where(wide, upper, 1.0) / low
-    return np.where(wide, low * ratio**share, lower + share * (upper - lower))
+STARTS = 100  # with `starts: auto`, at most
+# Of each of several choices: those that cannot meet the limits have many optima. Of 150 random
+# problems with lists beside continuous parameters none was worse than with ten each.
+OF_SEVERAL = 20
+# Exact solves of a search after which `starts: auto` ends: a count, so that no answer depends on
+# the clock; 100 starts of 20 steps on 24 samples take 50 000
+SOLVES = 50_000
+FEW = 24  # samples on which starts are followed, of more than twice as many
+SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The optima found of one choice, and how much work that was."""
+
+    variant: PosedProblem
+    optima: tuple[Optimum, ...] = ()  # distinct ones, the best first
+    starts: int = 0
+    tally: Tally | None = None  # None where no start was made
+    ended: End | None = None  # by the clock or by Ctrl-C
+    exact_solves: int = 0
+    lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
+    rows: tuple[int, ...] = ()  # of every list
+    below: Counts = ()  # the numbers of modes below every band, None of one that is left out
+    missed: float = np.inf  # by the best, of bands between the samples too
+    clearances: tuple[ClearanceRow, ...] = ()  # the bands as they were checked
+
+    @property
+    def best(self) -> Optimum:
+        """The best design found."""
+        return self.optima[0]
+
+    def with_best(self, best: Optimum) -> Searched:
+        """The same with another best design."""
+        return replace(self, optima=(best, *self.optima[1:]))
+
+
+def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
+    """The levels on which optima are sought one after the other, the whole task last."""
+    few = thinned(whole, FEW)
+    coarse = ([] if few is None else [few]) + ([] if models is None else [whole])
+    return (*(replace(task, models=models) for task in coarse), whole)
+
+
+def most_starts(file: CaseFile, alone: bool = True) -> int:
+    """The number of designs to start from, of a choice that is ``alone`` or of each of several."""
+    asked = file.assignment.starts
+    return asked if not isinstance(asked, str) else STARTS if alone else OF_SEVERAL
+
+
+def search_starts(
+    levels: Sequence[Task],
+    posed: Callable[[Task], PosedProblem],
+    starts: Sequence[Floats],
+    made: int,
+    deadline: float,
+    progress: Callable[[str], None],
+    most: int,
+    ended: End | None = None,
+) -> Searched:
+    """The local optima of what is ``posed`` that ``starts`` lead to, and spread designs up to most.
+
+    So many starts were ``made`` before. Of a search that has ``ended`` the first is judged alone.
+    ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
+    answer; with scenarios, in which others may have one, where none has.
+    """
+    first, keys = levels[0], levels[0].scene.file.assignment
+    search, lost = Searched(posed(first), ended=ended), list[EigassignError]()
+    for start in _in_turn(first, posed, search.variant, starts, most):
+        progress(f"  from start {made + search.starts + 1}")
+        try:
+            search = _after(search, start, keys.steps, deadline)
+        except EigassignError as error:
+            if not first.scenarios:
+                raise
+            lost.append(error)
+        search = replace(search, starts=search.starts + 1)
+        if search.ended or (keys.starts == "auto" and _is_enough(search)):
+            break
+    if lost and not search.optima:
+        raise lost[0]
+    responses = [search.variant.response]
+    for level in levels[1:]:
+        if not search.ended:
+            progress("  from what was found, on all samples and exactly")
+        refined = replace(search, variant=posed(level), optima=())
+        finer = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
+        search = replace(finer, tally=search.tally)
+        responses.append(search.variant.response)
+    return replace(
+        search,
+        missed=search.best.seen.violation,
+        exact_solves=sum(response.exact_solves for response in responses),
+        lost=tuple(line for response in responses for line in response.lost),
+    )
+
+
+def _after(
+    search: Searched, start: Floats, steps: int, deadline: float, before: Optimum | None = None
+) -> Searched:
+    """The search with what ``start`` leads to, the optimum ``before`` of a rougher level, if any.
+
+    Once it has ended, a start is only judged. Where Ctrl-C hits before the start itself is judged,
+    it is judged only if nothing is known. A start without an answer leads nowhere; the first one of
+    all raises EigassignError.
+    """
+    problem, optima = search.variant.problem, search.optima
+    try:
+        found = minimise(problem, start, 0 if search.ended else steps, deadline)
+        ended = search.ended or (found.end if found.end in STOPPED else None)
+        if before is not None:  # what was said there is its prediction
+            said, steps_before = before.seen.residual, before.steps
+            if found.predicted is None and said.shape == found.seen.residual.shape:
+                found = replace(found, predicted=said)
+            found = replace(found, steps=(*steps_before, *found.steps))
+        apart = with_end(optima, found, None if ended else problem)
+    except KeyboardInterrupt:
+        if search.ended:  # pressed again
+            raise
+        search = replace(search, ended=End.INTERRUPTED)
+        return search if optima else _after(search, start, steps, deadline, before)
+    except EigassignError:
+        if not optima and before is None:
+            raise
+        return search
+    known, there = search.tally or Tally(), sum(one.end in FINISHED for one in apart)
+    tally = Tally(known.starts + (found.end in FINISHED), there)
+    return replace(search, optima=apart, tally=tally, ended=ended)
+
+
+def _refined(
+    search: Searched, coarse: Sequence[Optimum], initial: Floats, steps: int, deadline: float
+) -> Searched:
+    """The optima on a finer level from ``coarse`` ones; or the initial design, if it is better."""
+    problem = search.variant.problem
+    for optimum in coarse[:3]:  # the best few
+        search = _after(search, optimum.y, steps, deadline, optimum)
+        if search.ended:
+            break
+    try:
+        seen = problem.appraise(initial)
+    except EigassignError:
+        if not search.optima:
+            raise
+        return search
+    inside = np.all((initial >= problem.lower) & (initial <= problem.upper))
+    own, known = (seen.violation, problem(initial, seen)), map(worth, search.optima)
+    if not search.optima or (inside and best_first([*known, own], lambda each: each)[0] is own):
+        search = _after(search, initial, steps, deadline)
+    return search
+
+
+# --- Whether more starts would help
+
+
+def _is_enough(search: Searched) -> bool:
+    """True where more starts are not expected to lead to more optima, or exact solves are used up.
+
+    No errors at all cannot be improved, nor what is cheapest of all within the bounds.
+    """
+    if search.tally is None:
+        return False
+    (violation, value), problem = worth(search.optima[0]), search.variant.problem
+    least = problem.least_value(problem.lower, problem.upper, np.zeros(0))
+    if violation <= MET and value <= least + ROUND_OFF * abs(least) + NOTHING:
+        return True
+    return search.tally.unseen <= PAYS or search.variant.response.exact_solves > SOLVES
+
+
+# --- Starts
+
+
+def _in_turn(
+    task: Task,
+    posed: Callable[[Task], PosedProblem],
+    variant: PosedProblem,
+    starts: Sequence[Floats],
+    most: int,
+) -> Iterator[Floats]:
+    """The first starts, then by turns those that promise most of a sample, and spread ones.
+
+    What promises most leads to good optima; what is expected not to be seen rests on designs that
+    are spread. Of a design only frequencies at fewest samples are solved to judge it: all of them
+    are less work than a start. Where modes are followed or reduced models lead, it is more: there
+    none is judged.
+    """
+    yield from starts
+    most -= len(starts)
+    if most <= 0:
+        return
+    bounds = variant.problem.lower, variant.problem.upper
+    box, spread = UnitBox.of(variant.problem), spread_designs(bounds, most, 0)
+    if task.models is not None or task.followers:
+        yield from spread
+        return
+    asked = posed(thinned(task, 8) or task)
+    ranked: list[tuple[tuple[float, float], Floats]] = []
+    for y in spread_designs(bounds, min(SCREENED * box.n, MOST_SCREENED), 1):
+        z = box.inside(box.z(y))
+        y, worths = box.y(z), (np.inf, np.inf)
+        with suppress(EigassignError):
+            q, model = asked.response.path.at(y)[0], asked.response.model
+            missed, value = asked.worth(y, model.frequencies(q, y, asked.requirements.modes))
+            worths = max(missed, MET), value
+        ranked.append((worths, z))
+    apart: list[Floats] = []
+    near: list[Floats] = []
+    for _, z in sorted(ranked, key=lambda one: one[0]):
+        alone = all(np.abs(z - other).max(initial=0.0) > 0.2 for other in apart)  # of the bounds
+        (apart if alone else near).append(z)
+    promising = [box.y(z) for z in (*apart, *near)]
+    turns = zip_longest(promising, spread)
+    yield from islice((y for turn in turns for y in turn if y is not None), most)
