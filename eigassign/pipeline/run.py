@@ -174,9 +174,7 @@ def _solved(
     """The initial design, the answer and the paper's one shot, solved exactly at every sample."""
     own, count = followers(scene, wanted), scene.shown_modes(answer.modes)
     with stages("initial", "solving the initial design exactly"):
-        initial = None if answer.found is None else answer.found.initial_solved(count)
-        if initial is None:
-            initial = solve_design(scene, own, scene.initial, count, stages.advance)
+        initial = solve_design(scene, own, scene.initial, count, stages.advance)
     with stages("verification", "solving the optimal design exactly"):
         exact = solve_design(scene, own, answer.y, count, stages.advance)
         if answer.one_shot is None or answer.found is None:

@@ -106,15 +106,6 @@ def outside(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryErro
     return TrajectoryError(f"trajectory.branch.{joint}", message, k)
 
 
-def other_assembly(ik: TipProblem, course: Course) -> TrajectoryError:
-    """The first sample can be reached only with the loops put together otherwise."""
-    message = (
-        f"{course.label(0)} can be reached only with the loops put together otherwise than at "
-        f"{pose(ik, ik.seeds[0])}, or past a dead point: move the path, or mechanism.assembly"
-    )
-    return TrajectoryError(WAYPOINTS, message, 0)
-
-
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 
@@ -165,7 +156,11 @@ def follow(
             continue
         return Followed(ik.coordinates(u), _notes(ik, candidates), ik, u, path)
     if not failures:
-        raise other_assembly(ik, course)
+        message = (
+            f"{course.label(0)} can be reached only with the loops put together otherwise than at "
+            f"{pose(ik, ik.seeds[0])}, or past a dead point: move the path, or mechanism.assembly"
+        )
+        raise TrajectoryError(WAYPOINTS, message, 0)
     raise max(failures, key=lambda error: error.sample)
 
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.brief import Brief, cut
+from eigassign.brief import Brief
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
     PointTrajectory,
@@ -211,28 +211,34 @@ def _from_points(spec: PointTrajectory) -> Trajectory:
 
 def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
     """A note for each angle that moves by more than half a turn from sample to sample."""
-    steps = np.abs(np.diff(q, axis=0))
+    found = _largest_turns(q, q_names, q_units)
     return tuple(
-        f"{name} jumps by {steps[k, i]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
-        for i, (name, unit) in enumerate(
-            zip(q_names, q_units or ["rad"] * len(q_names), strict=True)
-        )
-        if unit == "rad" and steps[k := int(np.argmax(steps[:, i])), i] > np.pi
+        f"{name} jumps by {step:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
+        for step, name, k in found
+        if step > np.pi
     )
 
 
 def _sparse(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
     """A note where listed samples are so far apart that a motion between them seems to be meant."""
-    steps = np.abs(np.diff(q, axis=0))
-    steps[:, [unit != "rad" for unit in q_units or ["rad"] * len(q_names)]] = 0.0
+    step, name, k = max(_largest_turns(q, q_names, q_units), default=(0.0, "", 0))
     # more than 0.5 rad between listed samples looks like points of a motion
-    if not np.any(steps > 0.5):
+    if step <= 0.5:
         return ()
-    k, i = divmod(int(np.argmax(steps)), steps.shape[1])
     return (
-        f"{q_names[i]} moves by {np.rad2deg(steps[k, i]):.3g} deg from sample {k} to {k + 1}: q "
+        f"{name} moves by {np.rad2deg(step):.3g} deg from sample {k} to {k + 1}: q "
         "lists every pose that is looked at; for a motion through a few poses write points",
     )
+
+
+def _largest_turns(
+    q: Floats, q_names: Sequence[str], q_units: Sequence[str]
+) -> list[tuple[float, str, int]]:
+    """The largest step of each angle in rad, its name, and the sample before it."""
+    steps = np.abs(np.diff(q, axis=0))
+    units = q_units or ["rad"] * len(q_names)
+    named = zip(steps.T, q_names, units, strict=True)
+    return [(own.max(), name, int(own.argmax())) for own, name, unit in named if unit == "rad"]
 
 
 # --- several trajectories
@@ -246,8 +252,8 @@ class NamedTrajectory(NamedTuple):
     weight: float = 1.0
 
 
-@dataclass(frozen=True)
-class Trajectories:
+@dataclass(frozen=True, repr=False)
+class Trajectories(Brief):
     """At least one trajectory; n samples in all, those of the first one first.
 
     The time of each begins where its own does, so ``time_s`` need not increase from one to the
@@ -260,13 +266,6 @@ class Trajectories:
     def __post_init__(self) -> None:
         if not self.parts:
             raise UsageError("trajectories: none given")
-
-    def __repr__(self) -> str:
-        each = (
-            f"{p.name!r}: {len(p.trajectory.q)} samples in {np.ptp(p.trajectory.time_s):.6g} s"
-            for p in self.parts
-        )
-        return cut(f"<Trajectories of {self.q.shape[1]} coordinates: {', '.join(each)}>")
 
     @cached_property
     def time_s(self) -> Floats:

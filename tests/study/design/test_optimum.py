@@ -88,15 +88,6 @@ def test_what_is_cheapest_of_all_and_meets_all_limits_ends_the_search(tmp_path: 
     assert found.starts == 1
 
 
-def test_the_initial_design_is_handed_on_as_the_search_has_solved_it(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, SHIPPED + "assignment: {starts: 1}\n")
-    found = find_optimum(scene, requirements_of(scene.file, scene.path), [], str)
-    solved = found.initial_solved(4)
-    assert solved is not None
-    np.testing.assert_allclose(solved.hz, scene.exact(scene.initial, 4), rtol=1e-11)
-    assert found.initial_solved(5) is None  # one mode is assigned, and three above it shown
-
-
 def test_starts_go_on_until_no_half_optimum_more_is_expected(tmp_path: Path) -> None:
     tally = found_of(tmp_path, SHIPPED, []).tally
     assert tally is not None

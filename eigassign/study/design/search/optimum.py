@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import STOPPED, End, Optimum, Tally, minimise, worth
-from eigassign.assignment.program import can_be_kept, frozen
+from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
-from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
@@ -121,13 +121,6 @@ class Found:
         """The same with another best design."""
         first, *others = self.outcomes
         return replace(self, outcomes=(first.with_best(best), *others))
-
-    def initial_solved(self, count: int) -> Solved | None:
-        """The initial design as the search has solved it; None without so many modes."""
-        solved = self.variant.response.solved
-        if solved is None or solved.hz.shape[1] < count:
-            return None
-        return replace(solved, hz=frozen(solved.hz[:, :count]))
 
 
 def find_optimum(
@@ -377,10 +370,8 @@ class _Search:
         """Designs to search a choice from; few that are like those of other choices."""
         starts, least = [*self.starts], most_starts(self.task.scene.file, alone=False)
         if self.designs is not None and not self.task.followers:
-            starts = [
-                *self.designs.best_of(variant.requirements.modes, variant.worth, PROMISING),
-                *starts,
-            ]
+            modes = variant.requirements.modes
+            starts = [*self.designs.best_of(modes, variant.worth, PROMISING), *starts]
         if self.every.listed:
             starts = [*(one.best.y for one in self.ranked[:1]), *starts][: min(2, least)]
         return [np.clip(y, variant.problem.lower, variant.problem.upper) for y in starts]

@@ -40,13 +40,11 @@ from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.study.design.followed import (
     Follower,
-    Spectrum,
     follow_all,
     followers,
-    unfollowed,
     with_followed,
 )
-from eigassign.study.scene import OTHERS, Scene
+from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +54,7 @@ class DesignResponse:
     """The lowest ``count`` frequencies at every sample and the one above, then those followed.
 
     By exact solves, which are remembered; by reduced ``models``, if any, where they can be trusted,
-    and then without the one above. Of the ``initial`` design all that is shown is kept: ``solved``.
+    and then without the one above.
     """
 
     model: Model
@@ -65,8 +63,6 @@ class DesignResponse:
     count: int
     followers: tuple[Follower, ...] = ()
     models: ReducedModels | None = None
-    initial: Floats | None = None
-    solved: Solved | None = None
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)  # designs at which a followed mode is lost
@@ -94,29 +90,22 @@ class DesignResponse:
 
     def _exact(self, y: Floats, q: Floats, of_design: Floats) -> Frequencies:
         self.exact_solves += len(q)
-        shown = self.initial is not None and np.array_equal(y, self.initial)
+        pencil, wanted = self.model.pencil, self.wanted
         if self.followers:
-            found, slopes, mixed = self._with_followed(y)
-            solved, lam = found.solved, found.modes.lam[:, : self.count + 1]
-            lam = np.hstack([lam, found.followed.lam])
+            found = follow_all(self.model, self.path, self.followers, y, self.count)
+            own = Modes(
+                *(each[..., : self.count + 1] for each in (found.modes.lam, found.modes.phi))
+            )
+            slopes, mixed = mode_slopes(pencil, found.x, own, wanted, mixed=True)
+            of_followed = mode_slopes(pencil, found.x, found.followed, wanted)[0]
+            slopes = np.concatenate([slopes, of_followed], axis=1)
+            lam = np.hstack([own.lam, found.followed.lam])
         else:
-            x, above = self.model.x(q, y), OTHERS if shown else 1
-            lam, slopes, mixed = exact_slopes(self.model.pencil, x, self.count, self.wanted, above)
-            solved, lam = unfollowed(np.sqrt(lam) / (2.0 * np.pi)), lam[:, : self.count + 1]
-        self.solved = solved if shown else self.solved
+            lam, slopes, mixed = exact_slopes(pencil, self.model.x(q, y), self.count, wanted, 1)
         hz, slopes = in_hz(lam, slopes)
         lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
         mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
         return Frequencies(hz, *(self.path.in_design(own, of_design) for own in (slopes, mixed)))
-
-    def _with_followed(self, y: Floats) -> tuple[Spectrum, Floats, Floats]:
-        """The modes, slopes of λ in (q, y), and those off the diagonal of numbered modes alone."""
-        found = follow_all(self.model, self.path, self.followers, y, self.count)
-        pencil = self.model.pencil
-        own = Modes(found.modes.lam[:, : self.count + 1], found.modes.phi[..., : self.count + 1])
-        slopes, mixed = mode_slopes(pencil, found.x, own, self.wanted, mixed=True)
-        of_followed = mode_slopes(pencil, found.x, found.followed, self.wanted)[0]
-        return found, np.concatenate([slopes, of_followed], axis=1), mixed
 
 
 def response_of(
@@ -133,8 +122,7 @@ def response_of(
     if scene.file.assignment.robust:  # what deviates has slopes, though it may have no choice
         free = free | scene.tolerances.given
     wanted = np.append(moving, free)
-    own = scene.model, scene.path, wanted, count, followers, models
-    return DesignResponse(*own, initial=scene.initial)
+    return DesignResponse(scene.model, scene.path, wanted, count, followers, models)
 
 
 # --- Of many designs, without slopes
