@@ -47,9 +47,8 @@ SHARE = 0.05  # of the way of a coordinate, which may be a slide
 LIMIT = 1e-4  # of a limit, by which it may be missed between samples
 FINE = 1e-6  # of an edge, or Hz: a room that is told no nearer
 WITHIN = 1e-4  # of a least frequency or room that is stated: what four digits show
-STILL = (
-    1e-6  # rad or m: over less no frequency changes; a coordinate may be still but for round-off
-)
+# rad or m: over less no frequency changes; a coordinate may be still but for round-off
+STILL = 1e-6
 
 
 def check_band(

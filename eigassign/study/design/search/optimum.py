@@ -198,16 +198,14 @@ class Choices:
     def base(self, k: int) -> PosedProblem:
         """The problem of some numbers below the bands, whatever the rows."""
         if k not in self.bases:
-            self.bases[k] = self._only(variant_of(self.task, self.belows[k], self.soft))
+            task, below = self.task, self.belows[k]
+            self.bases[k] = variant_of(task, below, self.soft, names=self.names)
         return self.bases[k]
 
     def posed(self, k: int, task: Task) -> PosedProblem:
         """The problem of a choice in a task, such as on few samples."""
         held = self.lower[k], self.upper[k]
-        return self._only(variant_of(task, self.belows[self.of[k]], self.soft, held))
-
-    def _only(self, variant: PosedProblem) -> PosedProblem:
-        return variant if self.names is None else variant.with_limits(self.names)
+        return variant_of(task, self.belows[self.of[k]], self.soft, held, self.names)
 
     @property
     def bounds_left(self) -> NDArray[np.bool_]:

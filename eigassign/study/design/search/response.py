@@ -287,11 +287,7 @@ def reduced_models(scene: Scene) -> ReducedModels | None:
     return ReducedModels(scene.model, scene.path) if large else None
 
 
-MOMENTS = (
-    "inertia",
-    "motor_inertia",
-    "ratio",
-)  # what gives a body or a rotor its moment of inertia
+MOMENTS = ("inertia", "motor_inertia", "ratio")  # of which a moment of inertia is made
 MOST_SIDES = 6  # of a box with at most 64 corners, as many as a tolerance study draws
 
 

@@ -73,7 +73,6 @@ class PosedProblem:
     """One choice of the number of modes below some bands, with the problem that it makes."""
 
     task: Task
-    below: tuple[tuple[str, int | None], ...]  # the band in words, and k; None of one left out
     requirements: Requirements
     problem: DesignProblem
     response: DesignResponse
@@ -84,15 +83,6 @@ class PosedProblem:
         """The names of all limits, those that every step keeps the last."""
         kept = (row.name for row in self.problem.constraints)
         return tuple(dict.fromkeys((*self.requirements.limit_names, *kept)))
-
-    def with_limits(self, names: Collection[str]) -> PosedProblem:
-        """The problem with those limits only that are named, and without prices."""
-        some = self.requirements.with_limits(names)
-        kept = tuple(row for row in self.problem.constraints if row.name in names)
-        appraise = _appraise(self.task, some, self.response)
-        problem = replace(self.problem, appraise=appraise, constraints=kept, cost=None)
-        outlook = self.outlook and replace(self.outlook, requirements=some)
-        return replace(self, requirements=some, problem=problem, outlook=outlook)
 
     def worth(self, y: Floats, hz: Floats) -> tuple[float, float]:
         """What a design of frequencies (n_t, n_modes) misses, and F."""
@@ -163,11 +153,13 @@ def variant_of(
     below: Counts,
     missed: bool = False,
     held: tuple[Floats, Floats] | None = None,
+    names: Collection[str] | None = None,
 ) -> PosedProblem:
     """The problem of a task with so many modes below each of its bands, without those of None.
 
     Linear limits may be ``missed`` as others may, and are where they contradict each other. The
-    bounds are those of the scene, or what a choice from lists leaves ``held`` of them.
+    bounds are those of the scene, or what a choice from lists leaves ``held`` of them. With those
+    limits only that are in ``names``, if any are given, and then without prices.
     """
     scene, wanted = task.scene, task.wanted
     lower, upper = held or scene.bounds
@@ -200,17 +192,20 @@ def variant_of(
         aims=tuple(aims),
     )
     response = response_of(scene, requirements.modes, task.followers, task.models)
+    if names is not None:
+        requirements = requirements.with_limits(names)
     problem = DesignProblem(
         appraise=_appraise(task, requirements, response),
         lower=lower,
         upper=upper,
-        constraints=scene.constraints if kept else (),
-        cost=cost,
+        constraints=tuple(
+            row for row in scene.constraints if kept and (names is None or row.name in names)
+        ),
+        cost=cost if names is None else None,
         objective=objective,
     )
-    named = tuple(zip((band.label for band in task.bands), below, strict=True))
     outlook = outlook_of(scene, requirements, task.followers, task.glances)
-    return PosedProblem(task, named, requirements, problem, response, outlook)
+    return PosedProblem(task, requirements, problem, response, outlook)
 
 
 def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appraise:
