@@ -341,4 +341,4 @@ def least_changed(found: Found, initial: Floats) -> Found:
         return found
     left, limits = first_order(problem, y, seen)
     moved = replace(best, y=y, seen=seen, objective=value, stationarity=left, limits=limits)
-    return found.replaced(moved)
+    return found.with_best(moved)

@@ -130,7 +130,7 @@ class _Deviations:
     def __init__(self, found: Found, had: float | None = None) -> None:
         self.found, self.task, self.y = found, found.task, found.best.y
         self.scene = found.task.scene
-        variant = variant_of(replace(self.task, scenarios=()), found.outcomes[0].below, missed=True)
+        variant = variant_of(replace(self.task, scenarios=()), found.below, missed=True)
         self.asked = replace(variant.requirements, objective=Objective.WORST_CASE)
         self.response = variant.response
         self.edges = (*self.asked.residuals, *self.asked.excesses)

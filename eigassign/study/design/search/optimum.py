@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, best_first
-from eigassign.assignment.exact.sequential import STOPPED, End, Optimum, Tally, minimise, worth
+from eigassign.assignment.exact.sequential import STOPPED, End, minimise, worth
 from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement
@@ -63,49 +63,16 @@ BEFORE = 1e-12  # of F: less is no better
 BOUNDED, TRIED, DONE, EXCLUDED = 0, 100, 101, 102  # what is known of a choice; bounds by level
 
 
-@dataclass(frozen=True)
-class Found:
-    """The best design, what it was chosen among, and how much work that was."""
+@dataclass(frozen=True, kw_only=True)
+class Found(Searched):
+    """The best choice, what it was chosen among, and how much work that was in all."""
 
     task: Task
     outcomes: tuple[Searched, ...]  # of the choices that were searched, the best first
     choices: int  # of all lists and bands
     untried: int  # of these, neither excluded nor searched
     initial: tuple[float, float]  # violation and objective of the initial design
-    starts: int
-    exact_solves: int
     every: Choices  # what is known of each choice
-    ended: End | None = None  # by the clock or by Ctrl-C
-
-    @property
-    def variant(self) -> PosedProblem:
-        """The problem of the best choice."""
-        return self.outcomes[0].variant
-
-    @property
-    def optima(self) -> tuple[Optimum, ...]:
-        """Its distinct local optima, the best first."""
-        return self.outcomes[0].optima
-
-    @property
-    def best(self) -> Optimum:
-        """The best design."""
-        return self.optima[0]
-
-    @property
-    def clearances(self) -> tuple[ClearanceRow, ...]:
-        """Every band along every trajectory."""
-        return self.outcomes[0].clearances
-
-    @property
-    def tally(self) -> Tally | None:
-        """Of the starts of the best choice."""
-        return self.outcomes[0].tally
-
-    @property
-    def lost(self) -> tuple[str, ...]:
-        """Designs passed over because a followed mode is lost there."""
-        return tuple(dict.fromkeys(line for one in self.outcomes for line in one.lost))
 
     @property
     def are_listed(self) -> bool:
@@ -116,11 +83,6 @@ class Found:
     def is_discrete(self) -> bool:
         """True where nothing continuous is left beside the choices."""
         return self.every.is_discrete
-
-    def replaced(self, best: Optimum) -> Found:
-        """The same with another best design."""
-        first, *others = self.outcomes
-        return replace(self, outcomes=(first.with_best(best), *others))
 
 
 def find_optimum(
@@ -288,22 +250,27 @@ class _Search:
         self.run()
         if not self.outcomes and self.failed is not None:
             raise self.failed
-        scene, every = self.task.scene, self.every
+        every = self.every
         best, *others = self.ranked
         if self.ended is not None:
             best = best.with_best(replace(best.best, end=self.ended))
         solved = [one for level in self.levels for one in level.glances.values()]
         beside = sum(one.exact_solves for one in [*solved, self.models] if one is not None)
+        outcomes, scene = [best, *others], self.task.scene
+        work = {
+            "starts": self.made,
+            "exact_solves": len(scene.path.q) + self.spent + beside,
+            "lost": tuple(dict.fromkeys(line for one in outcomes for line in one.lost)),
+            "ended": self.ended,
+        }
         return Found(
+            **vars(best) | work,
             task=self.task,
-            outcomes=(best, *others),
+            outcomes=tuple(outcomes),
             choices=every.count,
             untried=int((every.level < DONE).sum()),
             initial=_initial(scene, best.variant),
-            starts=self.made,
-            exact_solves=len(scene.path.q) + self.spent + beside,
             every=every,
-            ended=self.ended,
         )
 
     def run(self) -> None:

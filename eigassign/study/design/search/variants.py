@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, zip_longest
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -289,7 +290,7 @@ class Searched:
         """The best design found."""
         return self.optima[0]
 
-    def with_best(self, best: Optimum) -> Searched:
+    def with_best(self, best: Optimum) -> Self:
         """The same with another best design."""
         return replace(self, optima=(best, *self.optima[1:]))
 
