@@ -144,15 +144,14 @@ class Glances:
     @cached_property
     def order(self) -> NDArray[np.intp]:
         """All samples, those first that are spread over the trajectories."""
-        spread = np.concatenate([self.path.spread(few) for few in SPREAD])
-        return np.array([*dict.fromkeys([*spread.tolist(), *range(len(self.path.q))])])
+        spread = [one for few in SPREAD for one in self.path.spread(few).tolist()]
+        return np.array([*dict.fromkeys([*spread, *range(len(self.path.q))])])
 
     @cached_property
     def levels(self) -> tuple[int, ...]:
         """The numbers of samples to look at, one after the other: none first, and all last."""
-        fewest = (np.isin(self.order, self.path.spread(few)) for few in SPREAD)
-        ends = (int(np.flatnonzero(those).max()) + 1 for those in fewest)
-        return tuple(sorted({0, *ends, len(self.order)}))
+        seen = (np.flatnonzero(np.isin(self.order, self.path.spread(few))) for few in SPREAD)
+        return tuple(sorted({0, *(int(own.max()) + 1 for own in seen), len(self.order)}))
 
     def look(self, designs: Floats, few: int) -> None:
         """Solve designs (n, n_y) at the first samples, as far as they are not known."""
