@@ -68,7 +68,8 @@ class LimitedQuantity(Requirement):
     @property
     def constraint(self) -> LinearConstraint | None:
         """The same as a row of the program, kept exactly by each step; None of most."""
-        return self.quantity if isinstance(self.quantity, LinearConstraint) else None
+        row, (low, high) = self.quantity, self.allowed
+        return replace(row, lower=low, upper=high) if isinstance(row, LinearConstraint) else None
 
     @property
     def in_one_shot(self) -> bool:
