@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+import scipy.sparse
 from scenes import SHIPPED, changed, scene_of
 
 import eigassign
@@ -145,7 +146,7 @@ def test_modes_that_have_no_mass_are_not_asked_for(target: str, tmp_path: Path) 
     """A part with masses and no inertias: 25 of 32 modes have mass."""
     starters = Path(eigassign.__file__).parent / "starters"
     shutil.copytree(starters / "imported_part", tmp_path / "imported_part")
-    points = np.diag(np.tile([0.13, 0.13, 0.0], 7))
+    points = scipy.sparse.diags_array(np.tile([0.13, 0.13, 0.0], 7))
     scipy.io.mmwrite(tmp_path / "imported_part" / "mass.mtx", points)
     text = (starters / "imported_part.yaml").read_text()
     path = tmp_path / "case.yaml"

@@ -48,7 +48,7 @@ def test_reduced_models_stand_for_exact_solves_of_large_models(fine: Scene) -> N
         np.testing.assert_allclose(said.hz, right.hz[:, :2], rtol=1e-5)
         slopes = right.slopes[:, :2]
         assert (np.abs(said.slopes - slopes) <= 1e-3 * np.abs(slopes).max(axis=0)).all()
-    assert reduced.exact_solves == 2 * len(models.watched) == 4
+    assert models.exact_solves == 2 * len(models.watched) == 4
 
 
 def test_exact_solves_stand_in_where_no_reduced_model_may_be_made(fine: Scene) -> None:
