@@ -34,7 +34,7 @@ __all__, __getattr__, __dir__ = face(
         "storage": "expansion_arrays tree_arrays",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "
-            "sags strut_error weight_changes"
+            "sags weight_changes"
         ),
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.recursion": "expand_subspace",
