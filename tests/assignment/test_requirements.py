@@ -22,6 +22,7 @@ from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 from eigassign.study import named_design, named_pose
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
+RISING = "{time: [0, 3], frequency: [100, 0.4 kHz]}"
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"
 TARGETS = TEXT[TEXT.index("targets:\n") : TEXT.index("validation:")]
 T_A, T_B = np.linspace(0.0, 1.0, 11), np.linspace(2.0, 3.0, 6)
@@ -32,7 +33,6 @@ def folder(tmp_path: Path) -> Path:
     for name, time in (("a", T_A), ("b", T_B)):
         rows = "".join(f"{t},{t},{2 * t}\n" for t in time)
         (tmp_path / f"{name}.csv").write_text("time,q1,q2\n" + rows)
-    (tmp_path / "f.csv").write_text("frequency [kHz],time [ms]\n0.1,0\n0.4,3000\n")
     return tmp_path
 
 
@@ -83,8 +83,8 @@ def test_a_band_lies_between_its_edges_and_follows_the_harmonic(wanted: Read) ->
     (fixed,) = wanted("{keep_out: [48, 52]}")
     assert set(fixed.lower) == {48.0}
     assert set(fixed.upper) == {52.0}
-    (moving,) = wanted("{keep_out: {harmonic: 2, of: {file: f.csv}, margin: 10 %}, trajectory: b}")
-    f = 100.0 + 100.0 * T_B  # the file: 100 Hz at 0 s, 400 Hz at 3 s
+    (moving,) = wanted(f"{{keep_out: {{harmonic: 2, of: {RISING}, margin: 10 %}}, trajectory: b}}")
+    f = 100.0 + 100.0 * T_B
     np.testing.assert_allclose(moving.lower, 0.9 * 2 * f, rtol=1e-14)
     np.testing.assert_allclose(moving.upper, 1.1 * 2 * f, rtol=1e-14)
 
@@ -101,7 +101,7 @@ def test_each_trajectory_takes_a_profile_by_its_own_time(wanted: Read) -> None:
 
 
 def test_a_part_of_a_trajectory_has_its_samples_only(wanted: Read) -> None:
-    (one,) = wanted("{mode: 1, frequency: {file: f.csv}, trajectory: b, during: [2.4, 2.8]}")
+    (one,) = wanted(f"{{mode: 1, frequency: {RISING}, trajectory: b, during: [2.4, 2.8]}}")
     assert one.rows == slice(13, 16)  # 2.4, 2.6 and 2.8 s, of 11 + 6 samples
     np.testing.assert_allclose(one.hz, [340.0, 360.0, 380.0], rtol=1e-14)
 
@@ -186,10 +186,6 @@ def test_modes_near_a_band_and_on_either_side_of_it_are_shown_with_it(wanted: Re
             "targets[0].at_least: target time: 0 … 1 s does not cover the trajectory's 2 … 3 s "
             "(trajectory 'b')",
         ),
-        (
-            "{mode: 1, at_least: {file: a.csv}}",
-            "targets[0].at_least.file: a.csv:1: no column frequency",
-        ),
     ],
 )
 def test_what_cannot_be_sampled_is_named(wanted: Read, target: str, message: str) -> None:
@@ -247,14 +243,12 @@ def test_a_difference_that_is_round_off_is_none(wanted: Read) -> None:
     assert asked.appraise(apart, found).residual.all()
 
 
-def test_speeds_of_rotation_are_frequencies(folder: Path, wanted: Read) -> None:
-    (folder / "n.csv").write_text("frequency [rpm],time\n3000,0\n6000,3\n")
+def test_speeds_of_rotation_are_frequencies(wanted: Read) -> None:
     (edges,) = wanted("{keep_out: [3000 rpm, 60 Hz]}")
     assert (edges.lower[0], edges.upper[0]) == (50.0, 60.0)
     for of, last in (
         ("3000 rpm", 50.0),
         ("{time: [0, 3], frequency: [3000 rpm, 100 Hz]}", 100.0),
-        ("{file: n.csv}", 100.0),
     ):
         (one,) = wanted(f"{{keep_out: {{harmonic: 2, of: {of}, margin: 10 %}}}}")
         assert one.lower[0] == pytest.approx(90.0, rel=1e-12)

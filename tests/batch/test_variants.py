@@ -152,15 +152,14 @@ def test_a_variant_is_the_case_with_its_values_and_without_a_sweep(tmp_path: Pat
 
 
 def test_content_is_what_a_case_says_and_what_its_files_do(tmp_path: Path) -> None:
-    file, table = tmp_path / "case.yaml", tmp_path / "curve.csv"
-    table.write_text("time,frequency\n0,180\n1,190\n")
-    text = TEXT.replace("190 Hz", "{file: curve.csv}")
-    assert text != TEXT
+    file, table = tmp_path / "case.yaml", tmp_path / "measured.csv"
+    table.write_text("time,mode,frequency\n0,1,180\n")
+    text = f"{TEXT}measurements: {{file: measured.csv, deviation: 1 %}}\n"
     file.write_text(text)
     content = read(file).content()
     file.write_text(f"# a comment\n{text}sweep: {{parameters: {{{MASS}: [1, 2]}}}}\n")
     assert read(file).content() == content
-    table.write_text("time,frequency\n0,180\n1,191\n")
+    table.write_text("time,mode,frequency\n0,1,181\n")
     assert read(file).content() != content
 
 

@@ -26,7 +26,6 @@ from eigassign.case.schema.targets import (
     AnyTarget,
     AtLeastTarget,
     AtMostTarget,
-    FrequencyFile,
     FrequencyProfile,
     FrequencyTarget,
     GapTarget,
@@ -264,7 +263,7 @@ def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
     return "as high as can be", np.array(0.0), endless
 
 
-def _in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:
+def _in_hz(curve: float | FrequencyProfile) -> str:
     return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"
 
 

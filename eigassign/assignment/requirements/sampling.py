@@ -9,7 +9,6 @@ trajectory (`with_instants`). From one of all these to the next the edges are li
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,18 +28,14 @@ from eigassign.case.schema.targets import (
     AnyMode,
     AnyTarget,
     FollowedMode,
-    FrequencyFile,
     FrequencyProfile,
     StaticTarget,
 )
-from eigassign.case.table import CsvColumn, read_table
-from eigassign.case.units import DIMENSIONS
-from eigassign.errors import CaseError, MechanismError, UsageError
+from eigassign.errors import CaseError, UsageError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 
-_Curve = float | FrequencyProfile | FrequencyFile
-_Knots = tuple[ArrayLike, ArrayLike | None]
+_Curve = float | FrequencyProfile
 _SLACK = 1e-9  # of the duration: rounding of a time grid, far below a step
 _LINEAR = 1e-12  # relative: a point of a profile this near to a straight line is on it
 
@@ -86,19 +81,13 @@ def _static(file: CaseFile, path: Trajectories) -> Iterator[Placed]:
 
 
 def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
-    """The trajectories with the instants between samples that targets ask something of.
-
-    Raises CaseError where a file cannot be read.
-    """
+    """The trajectories with the instants between samples that targets ask something of."""
     times: list[list[float]] = [[] for _ in path.parts]
-    for k, target in enumerate(file.targets):
-        curves = [
-            _knots(file, curve, f"targets[{k}].{dotted(keys)}")
-            for keys, curve in target.frequencies
-        ]
+    for target in file.targets:
+        profiles = [c for _, c in target.frequencies if isinstance(c, FrequencyProfile)]
         for part, found in zip(path.parts, times, strict=True):
             if target.trajectory in (None, part.name):
-                found += _instants(part.trajectory.time_s, target.during, curves)
+                found += _instants(part.trajectory.time_s, target.during, profiles)
     if file.design.torque:
         for part, found in zip(path.parts, times, strict=True):
             breaks, near = part.trajectory.motion.breaks_s, _SLACK * np.ptp(part.trajectory.time_s)
@@ -107,7 +96,7 @@ def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
 
 
 def _instants(
-    time_s: Floats, during: tuple[float, float] | None, curves: Iterable[_Knots]
+    time_s: Floats, during: tuple[float, float] | None, curves: Iterable[FrequencyProfile]
 ) -> Iterator[float]:
     """Yield the ends of a part, and the points of curves that are not linear between samples."""
     slack = _SLACK * float(np.ptp(time_s))
@@ -118,10 +107,8 @@ def _instants(
         yield from ends if first < last else ()
     inside = time_s[(time_s > first) & (time_s < last)]
     at = np.unique([first, *inside, last])
-    for values, knots in curves:
-        if knots is None or first >= last:
-            continue
-        hz, times = np.asarray(values), np.asarray(knots)
+    for profile in curves if first < last else ():
+        hz, times = np.asarray(profile.frequency), np.asarray(profile.time)
         own = (times > first) & (times < last)
         chord = np.interp(times[own], at, np.interp(at, times, hz))
         off = np.abs(chord - hz[own]) > _LINEAR * hz[own]
@@ -267,7 +254,7 @@ def _seconds(path: Trajectories, rows: slice) -> Floats:
 
 def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:
     """The frequency (n,) in Hz at ``rows``, each trajectory by its own time."""
-    knots = _knots(file, curve, key)
+    knots = (curve.frequency, curve.time) if isinstance(curve, FrequencyProfile) else (curve, None)
     found = []
     for name, own in _along(path, rows):
         try:
@@ -276,17 +263,3 @@ def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Traject
             which = f" (trajectory {name!r})" if path.several else ""
             raise CaseError((file.problem(key, f"{error}{which}"),)) from error
     return np.concatenate(found)
-
-
-def _knots(file: CaseFile, curve: _Curve, key: str) -> _Knots:
-    """Frequency in Hz, and the times in s that it is given at."""
-    if isinstance(curve, FrequencyProfile):
-        return curve.frequency, curve.time
-    if isinstance(curve, FrequencyFile):
-        columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
-        try:
-            numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
-        except MechanismError as error:
-            raise CaseError((file.problem(error.path, error.message),)) from error
-        return numbers["frequency"], numbers["time"]
-    return float(curve), None

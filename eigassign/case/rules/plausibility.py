@@ -19,7 +19,7 @@ from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, SolidLink, Taper
 from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
-from eigassign.case.schema.targets import FrequencyFile, FrequencyProfile
+from eigassign.case.schema.targets import FrequencyProfile
 from eigassign.case.schema.trajectory import Added, TipTrajectory, named_trajectories
 from eigassign.case.units import TWO_TURNS
 
@@ -282,8 +282,6 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
     low, high = FREQUENCY
     for k, target in enumerate(document.targets):
         for keys, curve in target.frequencies:
-            if isinstance(curve, FrequencyFile):
-                continue
             values = curve.frequency if isinstance(curve, FrequencyProfile) else (curve,)
             worst = max(values) if max(values) > high else min(values)
             if not low <= worst <= high:

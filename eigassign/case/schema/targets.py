@@ -13,12 +13,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from eigassign.case.reader import KeyPath, at, listed, suggestion
+from eigassign.case.reader import KeyPath, listed, suggestion
 from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
     ByReference,
     Direction,
-    File,
     FrozenDict,
     NumberOr,
     OneOrList,
@@ -66,20 +65,7 @@ class FrequencyProfile(Part):
         return self
 
 
-class FrequencyFile(Part):
-    """The same in a CSV file.
-
-    Keys:
-        file: relative to the case file; columns `time` and `frequency`
-    """
-
-    file: File
-
-
-Curve: TypeAlias = Annotated[
-    Frequency | FrequencyProfile | FrequencyFile,
-    Told(lambda value: 2 if at(value, "file") is not None else isinstance(value, Mapping)),
-]
+Curve: TypeAlias = ValueOr[Frequency, FrequencyProfile]
 
 
 class Harmonic(Part):

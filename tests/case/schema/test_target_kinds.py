@@ -1,9 +1,7 @@
 # ruff: noqa: E501  (a table)
 """Every kind of target is read in Hz, comes to requirements by mode, and is written out again."""
 
-import hashlib
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ from json_schema_reader import SCHEMA, accepts
 from small_case import TEXT, edited
 
 from eigassign.assignment import Requirement, requirements_of
-from eigassign.case import CaseFile, load, parse, read_yaml
+from eigassign.case import CaseFile, parse, read_yaml
 from eigassign.errors import CaseError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 
@@ -123,25 +121,6 @@ def test_a_followed_mode_may_be_named_at_a_choice() -> None:
     case = parse(edited(old, new).replace(T, f"  - {target}\n").encode(), "case.yaml")
     assert case.targets[0].mode.design == {"d": "thick"}
     assert parse(case.resolved().encode(), "case.yaml") == case
-
-
-@pytest.mark.parametrize(
-    "target",
-    [
-        "{mode: 1, frequency: {file: f.csv}}",
-        "{mode: 1, at_most: {file: f.csv}}",
-        "{keep_out: {harmonic: 2, of: {file: f.csv}, margin: 5 %}}",
-    ],
-)
-def test_a_file_of_frequencies_is_found_beside_the_case_and_its_content_known(
-    target: str, tmp_path: Path
-) -> None:
-    (tmp_path / "f.csv").write_text("time,frequency\n0,1\n1,2\n")
-    (tmp_path / "case.yaml").write_text(edited(T, f"  - {target}\n"))
-    case = load(tmp_path / "case.yaml")
-    ((_, curve),) = case.targets[0].frequencies
-    assert curve.file == str(tmp_path / "f.csv")
-    assert case.files == {"f.csv": hashlib.sha256(b"time,frequency\n0,1\n1,2\n").hexdigest()}
 
 
 @pytest.mark.parametrize("given", ASSIGNMENTS)
