@@ -28,7 +28,7 @@ import numpy as np
 
 import eigassign as ea
 from eigassign.modal.exact.solver import modes
-from eigassign.modal.taylor.coefficients import pencil_series
+from eigassign.modal.taylor.bordered import pencil_series
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.modal.taylor.vectors import local_space, vector_set

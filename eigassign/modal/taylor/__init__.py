@@ -3,9 +3,8 @@
 The first four modules are the recursion; they know the pencil's series and nothing of variables.
 In reading order:
 
-    bordered      the bordered system of every order, factored once, dense or sparse
-    coefficients  the pencil's power series K_γ, M_γ, and the recursion's right-hand sides
-    recursion     eigenvector coefficients of a cluster of modes, degree by degree
-    rayleigh      2m + 1: eigenvalues to order p from eigenvectors to half of it
-    vectors       Taylor vectors about one x0, over the variables that anything depends on
+    bordered   the pencil's power series; the bordered system of every order, factored once
+    recursion  eigenvector coefficients of a cluster of modes, degree by degree
+    rayleigh   2m + 1: eigenvalues to order p from eigenvectors to half of it
+    vectors    Taylor vectors about one x0, over the variables that anything depends on
 """

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.taylor.bordered import Solve, add_product
-from eigassign.modal.taylor.coefficients import PencilSeries, pencil_series
+from eigassign.modal.taylor.bordered import PencilSeries, Solve, add_product, pencil_series
 from eigassign.series.multi_index import LowerSet
 
 Floats = NDArray[np.float64]
