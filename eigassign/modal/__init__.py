@@ -4,7 +4,6 @@ In reading order:
 
     arguments       samples of (q, y), modes and orders as callers give them, checked
     exact           exact elastic modes
-    projection      the pencil's terms projected on a basis
     taylor          Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced         Ritz on the Taylor vectors
     expansion       the Taylor polynomial of eigenvalues (eqs. (7)-(9))
@@ -28,7 +27,7 @@ __all__, __getattr__, __dir__ = face(
         "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
         "expansion": "Expansion NearestExpansion expand",
         "model": "Model",
-        "projection": "project project_at project_terms",
+        "taylor.rayleigh": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "storage": "expansion_arrays tree_arrays",

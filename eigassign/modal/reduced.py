@@ -36,7 +36,7 @@ from eigassign.mechanism.assembly.pencil import Pencil, theta_at, theta_slopes
 from eigassign.modal.arguments import chunks, mode_numbers, samples, whole_within
 from eigassign.modal.exact.dense import condense_blocks, inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.projection import project
+from eigassign.modal.taylor.rayleigh import project
 from eigassign.modal.taylor.vectors import vectors_to_order
 from eigassign.series.compiler import Program
 

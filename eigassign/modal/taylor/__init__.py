@@ -5,6 +5,6 @@ In reading order:
 
     bordered   the pencil's power series; the bordered system of every order, factored once
     recursion  eigenvector coefficients of a cluster of modes, degree by degree
-    rayleigh   2m + 1: eigenvalues to order p from eigenvectors to half of it
+    rayleigh   2m + 1: eigenvalues to order p from eigenvectors to half of it; projections
     vectors    Taylor vectors about one x0, over the variables that anything depends on
 """
