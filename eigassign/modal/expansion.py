@@ -22,7 +22,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
 from eigassign.modal.exact.solver import CLUSTER_GAP
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
-from eigassign.modal.taylor.vectors import (
+from eigassign.modal.taylor.recursion import (
     LocalSpace,
     local_space,
     substitute,

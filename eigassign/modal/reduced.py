@@ -37,7 +37,7 @@ from eigassign.modal.arguments import chunks, mode_numbers, samples, whole_withi
 from eigassign.modal.exact.dense import condense_blocks, inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.taylor.rayleigh import project
-from eigassign.modal.taylor.vectors import vectors_to_order
+from eigassign.modal.taylor.recursion import vectors_to_order
 from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]

@@ -31,7 +31,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive_order import raise_order
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.vectors import local_space
+from eigassign.modal.taylor.recursion import local_space
 from eigassign.modal.under_load import buckling
 
 Floats = NDArray[np.float64]
