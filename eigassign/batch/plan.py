@@ -28,7 +28,7 @@ from eigassign.case.schema.study import text_of
 from eigassign.case.units import NUMBER
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, file_digest, folder_name
-from eigassign.modal.storage import ALGORITHM
+from eigassign.modal.expansion import ALGORITHM
 from eigassign.output.batch.index import NAMES
 from eigassign.output.store.run_record import MARKER
 

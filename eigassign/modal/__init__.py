@@ -6,8 +6,7 @@ In reading order:
     exact           exact elastic modes
     taylor          Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced         Ritz on the Taylor vectors
-    expansion       the Taylor polynomial of eigenvalues (eqs. (7)-(9))
-    storage         expansions as plain arrays
+    expansion       the Taylor polynomial of eigenvalues (eqs. (7)-(9)), and as plain arrays
     mesh_error      what meshes of beams and solids leave out
     model           the model of a case, as notebooks meet it
     under_load      what the weight does to frequencies, and what gives way under forces
@@ -25,12 +24,11 @@ __all__, __getattr__, __dir__ = face(
         "exact.solver": "clusters eigenvalues exact_slopes lowest_modes modes rounding_error",
         "exact.large": "solve_large solve_sparse solve_together",
         "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
-        "expansion": "Expansion NearestExpansion expand",
+        "expansion": "Expansion NearestExpansion expand expansion_arrays tree_arrays",
         "model": "Model",
         "taylor.rayleigh": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
-        "storage": "expansion_arrays tree_arrays",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "
             "sags weight_changes"

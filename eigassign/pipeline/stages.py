@@ -28,9 +28,16 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import folder_name, printable
 from eigassign.modal.arguments import MOST_TERMS
-from eigassign.modal.expansion import Expansion, NearestExpansion, expand
+from eigassign.modal.expansion import (
+    ALGORITHM,
+    Expansion,
+    NearestExpansion,
+    expand,
+    expansion_arrays,
+    stored_series,
+    tree_arrays,
+)
 from eigassign.modal.model import Model
-from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
 from eigassign.output.documents import dumps, to_json
 from eigassign.output.result_files import sample_files
 from eigassign.output.store.cache import Cache, content_key, hdf5
