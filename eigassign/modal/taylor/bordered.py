@@ -1,6 +1,6 @@
 """The pencil's power series, and the bordered system that yields every eigenvector coefficient.
 
-⎡ K0 − λ0 M0   −M0 Φ0 ⎤ ⎡ φ_γ ⎤   ⎡ rhs_γ ⎤
+    ⎡ K0 − λ0 M0   −M0 Φ0 ⎤ ⎡ φ_γ ⎤   ⎡ rhs_γ ⎤
     ⎣ −Φ0ᵀ M0        0    ⎦ ⎣ λ_γ ⎦ = ⎣   0   ⎦
 
 Symmetric and regular although K0 − λ0 M0 is singular; it replaces the paper's pseudo-inverse. The

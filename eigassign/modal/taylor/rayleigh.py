@@ -1,4 +1,4 @@
-"""2m + 1: eigenvalues to order p from eigenvectors to order ⌊p/2⌋; the pencil projected.
+r"""2m + 1: eigenvalues to order p from eigenvectors to order ⌊p/2⌋; the pencil projected.
 
 The block Rayleigh quotient of X = Σ_{γ ∈ H} X_γ w^γ,
 

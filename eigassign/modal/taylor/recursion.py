@@ -8,13 +8,10 @@ inside the cluster. Order γ of K X = M X Λ reads (eqs. (4)-(6)), column j with
 with Y = X Λ and Ỹ_γ = Σ_{0<δ<γ} X_{γ−δ} Λ_δ. All γ of one degree are solved together; the
 right-hand side is formed in the memory of the result.
 
-w are the relative joint coordinates and design parameters on which anything depends, or, for a set
-that was given over x, those of x. A series over w becomes one over x by substituting V (x − x0).
-
-φ(x0 + x) ≈ Σ_γ φ_γ w^γ,   w = V (x − x0)
-
-in the local variables w of `local_coordinates`, cluster by cluster. Eigenvalues follow from them by
-the Rayleigh quotient; a reduced model has them as its basis.
+Taylor vectors are those of all clusters, φ(x0 + x) ≈ Σ_γ φ_γ w^γ with w = V (x − x0): the relative
+joint coordinates and design parameters on which anything depends, or, for a set that was given over
+x, those of x. A series over w becomes one over x by substituting V (x − x0). Eigenvalues follow by
+the Rayleigh quotient; a reduced model has the vectors as its basis.
 """
 
 from __future__ import annotations
