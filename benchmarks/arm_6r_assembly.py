@@ -30,8 +30,7 @@ import eigassign as ea
 from eigassign.modal.exact.solver import modes
 from eigassign.modal.taylor.bordered import pencil_series
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
-from eigassign.modal.taylor.recursion import expand_subspace
-from eigassign.modal.taylor.recursion import local_space, vector_set
+from eigassign.modal.taylor.recursion import expand_subspace, local_space, vector_set
 
 DOFS = (1_000, 3_000, 10_000, 30_000)
 LINKS = (2, 4, 6, 9, 12)
