@@ -31,7 +31,7 @@ __all__, __getattr__, __dir__ = face(
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "
-            "sags weight_changes"
+            "sags strut_error weight_changes"
         ),
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.recursion": "expand_subspace",

@@ -120,6 +120,14 @@ class Model:
         whole = {name: mesh.whole for name, mesh in self.meshes.items()}
         return self._rebuilt(with_reduction(self.poses.case, dict.fromkeys(self._reducible)), whole)
 
+    @cached_property
+    def bent(self) -> Pencil | None:
+        """K and M with imported matrices that bend under weight between their nodes, if any do."""
+        links = self.poses.case.mechanism.links.values()
+        if self.pencil.weight is None or all(link.type != "superelement" for link in links):
+            return None
+        return self._rebuilt(self.poses.case, self.meshes, bent=True)
+
     def refined(self, factor: float = 2.0) -> tuple[CaseFile, Pencil]:
         """The case, K and M with ``factor`` times the elements in every beam, no beam reduced."""
         if factor not in self._refined:
@@ -140,9 +148,9 @@ class Model:
         links = self.poses.case.mechanism.links.items()
         return [name for name, link in links if getattr(link, "reduce_to", None) is not None]
 
-    def _rebuilt(self, case: CaseFile, known: Mapping[str, LinkMesh]) -> Pencil:
+    def _rebuilt(self, case: CaseFile, known: Mapping[str, LinkMesh], bent: bool = False) -> Pencil:
         given = case, self.poses.parameters, self.motion
-        return build_pencil(*given, local_links(*given, known))
+        return build_pencil(*given, local_links(*given, known), bent)
 
     @cached_property
     def under_load(self) -> StiffnessUnderLoad:

@@ -38,6 +38,7 @@ from eigassign.modal.under_load import (
     buckling,
     sag_changes,
     sag_of_nodes,
+    strut_error,
     weight_changes,
 )
 from eigassign.study.planning import poses_at
@@ -211,7 +212,8 @@ def _row(
     rows.sort(key=lambda one: -one.most)
     share = float(buckling(model, q, y).max())
     known = share if np.isfinite(share) else None
-    return replace(row, sag=tuple(rows), turn=float(turns.max()), buckling=known)
+    struts = strut_error(model, q, y, modes)
+    return replace(row, sag=tuple(rows), turn=float(turns.max()), buckling=known, struts=struts)
 
 
 def weight_doubt(
@@ -228,6 +230,8 @@ def weight_doubt(
         yield f"{said}, and {100 * accepted:.3g} % are accepted{_advice(file)}"
     if asks and row is None and file.mechanism.gravity != "none":
         yield "the effect of gravity is not known"
+    if row is not None and row.struts is not None and row.struts > accepted:
+        yield f"{_struts(row.struts)}, and {100 * accepted:.3g} % are accepted"
     if file.design.torque and file.mechanism.gravity is None:
         yield (
             "the drives have limits, and carry a weight that the case does not state"
@@ -239,6 +243,8 @@ def _weight_warnings(file: CaseFile, row: WeightRow) -> Iterator[str]:
     said, change = _worst(row, row.modes)
     if change > WARNED:
         yield f"{said}{_advice(file)}"
+    if row.struts is not None and row.struts > WARNED:
+        yield _struts(row.struts)
     if row.buckling is not None and row.buckling > NEAR_BUCKLING:
         most = f"above {100 * NEAR_BUCKLING:g} % frequencies that are linear in it are inaccurate"
         yield f"{_share(row.buckling)}: {most}"
@@ -267,6 +273,13 @@ def _share(buckling: float) -> str:
     return f"the weight is {100 * buckling:.3g} % of the buckling load"
 
 
+def _struts(error: float) -> str:
+    return (
+        "imported matrices have no stress inside, and are struts under the weight: frequencies may "
+        f"be off by about {100 * max(error, SAID):.2g} %"
+    )
+
+
 def _advice(file: CaseFile) -> str:
     """The key to write, where it is not there."""
     if file.mechanism.gravity is not None:
@@ -281,6 +294,8 @@ def _of_whole(row: WeightRow) -> Iterator[str]:
         yield f"{row.sag[0].node} sags by {row.sag[0].most:.3g} m under the weight"
     if row.buckling is not None:
         yield _share(row.buckling)
+    if row.struts is not None:
+        yield _struts(row.struts)
 
 
 # Of the shipped cases the worst of 5 poses has 97 % of the error of the worst sample at least, of

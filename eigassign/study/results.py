@@ -948,6 +948,9 @@ class WeightRow:
     sag: Annotated[tuple[SagRow, ...], Fact("of named nodes, the farthest first")] = ()
     turn: Annotated[float | None, Fact("of a node under the weight at most", unit="rad")] = None
     buckling: Annotated[Share | None, Fact("the weight, relative to that which buckles")] = None
+    struts: Annotated[
+        Share | None, Fact("what imported matrices may put frequencies off, from 2 % of it on")
+    ] = None
 
 
 @dataclass(frozen=True)

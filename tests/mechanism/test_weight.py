@@ -317,6 +317,35 @@ def test_a_stiff_imported_part_is_the_beam_it_was_exported_from(
     np.testing.assert_allclose(changes[1], changes[0], rtol=1e-3)
 
 
+@pytest.mark.parametrize(("g", "doubted"), [(100.0, None), (200.0, False), (800.0, True)])
+def test_struts_say_how_far_they_are_off_and_are_doubted_above_what_is_accepted(
+    tmp_path: Path, g: float, doubted: bool | None
+) -> None:
+    """A standing column, at 1.5, 3 and 12 % of what buckles it, against the beam it is."""
+    imported = part("planar", write(tmp_path, "npy", *exported("planar")))
+    models, results = [], []
+    for link in (imported, beam_arm("planar")["mechanism"]["links"]["part"]):
+        tree = arm("planar", {"part": link})
+        m = tree["mechanism"] | {"gravity": [0.0, -g], "bodies": {"b": {"at": "part.end"}}}
+        m["bodies"]["b"]["mass"] = 3.0
+        m["links"].pop("upper")
+        m["joints"] = {"a": {"type": "revolute", "base": "ground", "follower": "part.start"}}
+        q = {"a": {"joint": "a", "drive": "locked"}}
+        tree = {"title": "t", "mechanism": m, "coordinates": q}
+        tree |= {"trajectory": {"q": [[np.pi / 2]]}, "targets": [{"mode": 1, "at_least": 1.0}]}
+        tree["design"] = {"m": {"parameter": "bodies.b.mass", "min": 2.99, "max": 3.0}}
+        (tmp_path / "case.yaml").write_text(yaml.safe_dump(tree), encoding="utf-8")
+        case = ea.load_case(tmp_path / "case.yaml")
+        models.append(case.model().frequencies([np.pi / 2], [3.0], 1)[0, 0])
+        results.append(ea.assign(case).results)
+    strut, beam = results
+    assert beam.weight.struts is None
+    assert any("have no stress inside" in line for line in strut.notes) == (doubted is not None)
+    assert ("have no stress inside" in strut.assignment.reason) == bool(doubted)
+    if doubted is not None:
+        assert 1.0 < strut.weight.struts / (models[0] / models[1] - 1.0) < 3.0
+
+
 # --- bars welded and pinned to each other in many loops
 
 

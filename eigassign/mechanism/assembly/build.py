@@ -71,10 +71,11 @@ def build_pencil(
     parameters: ModelParameters,
     motion: Kinematics,
     local: LocalLinks | None = None,
+    bent: bool = False,
 ) -> Pencil:
     """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong.
 
-    ``local`` is what `local_links` gave, where that is known already.
+    ``local`` is what `local_links` gave, where that is known already; ``bent`` as in `Loaded`.
     """
     links, nodes = local_links(case, parameters, motion) if local is None else local
     stiffness, mass = AffineEntries(), AffineEntries()
@@ -83,7 +84,7 @@ def build_pencil(
     g, weight, K_g = gravity(case), AffineEntries(summed=True), None
     if g is not None:
         known = parameters.with_passive(motion.passive)
-        scene = Loaded(case, known, motion, by_name(motion, links), nodes)
+        scene = Loaded(case, known, motion, by_name(motion, links), nodes, bent)
         add_weight(weight, scene, g, lambda: _in_few_elements(scene, parameters))
     add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)

@@ -23,7 +23,8 @@ its own weight, M r g on all its dofs, do the work
     Σ [F · (−φ × v + φ × (φ × X)/2) − M · (φ × θ)/2] + vᵀ M r (φ × g) + m g · (φ × (φ × c))/2,
 
 r its translations, c its centre of mass and g = −Σ F/m. What bends between the nodes under the
-forces inside is left out.
+forces inside is left out, or taken as that of a cubic between two nodes that turn alike, which is
+shorter by its arms from the middle: −F · (θ̄ × (θ̄ × (X − X̄)))/6 with θ̄ = θ − φ.
 
 A node that turns by θ (a rotation vector) moves what is rigidly attached at r by θ × (θ × r)/2 to
 second order. Through a joint with lever t, whose follower moves by t₁ and turns by ψ₁ against the
@@ -183,6 +184,7 @@ def _crossed(a: Floats, b: Floats, axis: int) -> Floats:
 
 
 ON_A_LINE = 1e-6  # of the nodes' second moment, about an axis that they do not turn about
+BENT = 1.0 / 3.0
 AXES = np.eye(3)
 # (a × b)_k = Σ CROSSED_kij a_i b_j
 CROSSED = np.cross(AXES[:, None], AXES[None]).transpose(2, 0, 1)
@@ -193,6 +195,7 @@ def imported_terms(
     wrenches: Sequence[tuple[str, Objects]],
     spin: Objects | None,
     space: str,
+    bent: bool = False,
 ) -> list[Term]:
     """Affine terms of k_σ (n_local, n_local) of a mesh from what acts on its nodes.
 
@@ -202,7 +205,7 @@ def imported_terms(
     for name, wrench in wrenches:
         found[name] = found.get(name, np.zeros(6, dtype=object)) + wrench
     if mesh.whole.stressed is None:
-        return _strut_terms(mesh, found, space)
+        return _strut_terms(mesh, found, space, bent)
     still = np.zeros(6, dtype=object)
     each = [found.get(name, still) for name in mesh.whole.nodes]
     loads = np.concatenate([*each, still if spin is None else spin])
@@ -212,11 +215,14 @@ def imported_terms(
     return [Term(one_atom(loads[k]), A) for k, A in zip(acting, matrices, strict=True)]
 
 
-def _strut_terms(mesh: LinkMesh, wrenches: Mapping[str, Objects], space: str) -> list[Term]:
+def _strut_terms(
+    mesh: LinkMesh, wrenches: Mapping[str, Objects], space: str, bent: bool
+) -> list[Term]:
     moved, of_nodes = _node_motions(mesh)
     kept = [d - 3 for d in DOFS[space] if d >= 3]
     phi = _rotation([(X.astype(float), moved[name]) for name, X in mesh.positions.items()], kept)
     Mr, first, m = _momentum(mesh, space)
+    middle = np.mean([X.astype(float) for X in mesh.positions.values()], axis=0)
     out: list[Term] = []
 
     def add(coefficient: Scalar, columns: Floats) -> None:
@@ -229,6 +235,8 @@ def _strut_terms(mesh: LinkMesh, wrenches: Mapping[str, Objects], space: str) ->
         X = mesh.positions[name].astype(float)
         for axis in range(3):
             lever = _turned_twice(phi, X - first / m, axis) - _mixed(axis, phi, v)
+            if bent:
+                lever -= BENT * _turned_twice(theta - phi, X - middle, axis)
             turned = Mr.T @ (CROSSED[:, :, axis] @ phi) / m
             add(wrench[axis], of_nodes @ lever - turned)
             add(wrench[3 + axis], of_nodes @ (-0.5 * _mixed(axis, phi, theta)))
@@ -369,7 +377,7 @@ def add_second_order(K: AffineEntries, scene: Loaded, loads: Loads) -> Statics:
         if is_imported(scene.case, name):
             mesh, wrenches = scene.nodes.meshes[name], on_nodes(scene, found, loads, name)
             spin, space = loads.in_solids.get(name), scene.nodes.space
-            terms = imported_terms(mesh, wrenches, spin, space)
+            terms = imported_terms(mesh, wrenches, spin, space, scene.bent)
             add_stressed(K, link, terms, scene.nodes.count)
         for node in scene.sites_of(name):
             D = loads.arms[node]

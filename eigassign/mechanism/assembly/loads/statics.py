@@ -62,13 +62,17 @@ from eigassign.series.expression import Scalar
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A mechanism that loads act on; the passive freedoms of ``known`` are known."""
+    """A mechanism that loads act on; the passive freedoms of ``known`` are known.
+
+    ``bent``: parts known by their matrices bend between their nodes as beams do: `second_order`.
+    """
 
     case: CaseFile
     known: ModelParameters
     motion: Kinematics
     links: Mapping[str, LocalLink]
     nodes: NodeMotions
+    bent: bool = False
 
     @cached_property
     def springs(self) -> Sequence[SpringMotion]:
