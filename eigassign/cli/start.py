@@ -23,7 +23,7 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
     "four_bar": "a closed loop",
     "gantry": "a carriage that travels along a girder",
     "imported_part": "matrices from another finite-element program",
-    "casting": "a part by its mesh, from gmsh, Abaqus or CalculiX",
+    "casting": "a part by its mesh, from gmsh, Abaqus or Nastran",
 }
 
 

@@ -440,7 +440,7 @@ class SolidLink(Part):
     In a plane its nodes move in the x-y plane only; the mesh stays spatial.
 
     Keys:
-        mesh: its file, of gmsh (.msh), Abaqus or CalculiX (.inp)
+        mesh: its file, of gmsh (.msh), Abaqus, CalculiX (.inp) or Nastran (.bdf)
         units: of the file; lengths are in mm where it is `mm-t-s` or `mm-kg-ms`
         material: its name
         nodes: by name

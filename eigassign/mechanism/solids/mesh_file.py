@@ -1,4 +1,4 @@
-"""A mesh of solid elements from a file: gmsh (.msh), Abaqus and CalculiX (.inp).
+"""A mesh of solid elements from a file: gmsh (.msh), Abaqus and CalculiX (.inp), Nastran (.bdf).
 
 The format is recognised by its content. Elements of lines and surfaces name nodes and do nothing
 else; solid ones of other kinds than `KINDS` are refused by name. Such files come from anywhere:
@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import itertools
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports.entries import LARGEST, UnfitError
+from eigassign.mechanism.imports.programs import CARD, fields_of
 from eigassign.mechanism.solids.elements import KINDS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Edges = Sequence[tuple[int, int]]
 LONGEST = 10_000  # characters of a line: far more than a card or a name
 MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
 
@@ -33,11 +33,15 @@ _MESH_WITH = "; mesh with tetrahedra of 10 nodes (or of 4), or hexahedra of 20"
 _ALONE = (
     ", which is not read: save the elements alone; couplings, masses and springs stand in the case"
 )
-_GMSH_EDGES = {  # of each kind, where it has another order than Abaqus
-    10: ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
-    20: (
+_EDGES = {  # of each kind, where a format has another order than Abaqus
+    ("gmsh", 10): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+    ("gmsh", 20): (
         *((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3)),
         *((2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
+    ),
+    ("Nastran", 20): (
+        *((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7)),
+        *((4, 5), (5, 6), (6, 7), (7, 4)),
     ),
 }
 
@@ -75,7 +79,8 @@ class _Raw:
 def read_mesh(file: Path, key: str) -> SolidMesh:
     """The mesh in a file; raises MechanismError at ``key`` for what is none, or has other elements.
 
-    The sets are gmsh's physical groups, Abaqus' node sets, element sets and surfaces.
+    The sets are gmsh's physical groups, Abaqus' node sets, element sets and surfaces, Nastran's
+    sets, and ``pid N`` of its surface elements of property N.
     """
     try:
         return _read(read_bytes(file, MESH))
@@ -97,16 +102,20 @@ def _read(data: bytes) -> SolidMesh:
     if data.lstrip().startswith(b"$MeshFormat"):
         if b" 1 " in data.split(b"\n", 2)[1]:
             raise UnfitError("is binary: save it as ASCII (Mesh.Binary = 0)")
-        return _numbered(_gmsh(data.decode("utf-8", "replace")), _GMSH_EDGES)
-    if re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
-        return _numbered(_abaqus(data.decode("utf-8", "replace")), {})
-    raise UnfitError(
-        "is no mesh that is known: expected gmsh's .msh (ASCII, 2.2 or 4.1), or Abaqus' or "
-        "CalculiX's .inp; gmsh opens others, such as Nastran's .bdf, and saves them as .msh"
-    )
+        raw, program = _gmsh(data.decode("utf-8", "replace")), "gmsh"
+    elif re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
+        raw, program = _abaqus(data.decode("utf-8", "replace")), "Abaqus"
+    elif re.search(rb"^(BEGIN\s+BULK|GRID[ *,])", head, re.MULTILINE):
+        raw, program = _nastran(data.decode("utf-8", "replace")), "Nastran"
+    else:
+        raise UnfitError(
+            "is no mesh that is known: expected gmsh's .msh (ASCII, 2.2 or 4.1), Abaqus' or "
+            "CalculiX's .inp, or Nastran bulk data (.bdf)"
+        )
+    return _numbered(raw, program)
 
 
-def _numbered(raw: _Raw, order: Mapping[int, Edges]) -> SolidMesh:
+def _numbered(raw: _Raw, program: str) -> SolidMesh:
     """Nodes by place instead of id, and those within elements in one order."""
     if not raw.elements:
         raise UnfitError("has no solid elements" + _MESH_WITH)
@@ -124,12 +133,12 @@ def _numbered(raw: _Raw, order: Mapping[int, Edges]) -> SolidMesh:
     for count, kind in KINDS.items():
         own = {key: nodes for key, nodes in raw.elements.items() if len(nodes) == count}
         if own:
-            columns = list(range(count))
-            if edges := order.get(count):
+            order = list(range(count))
+            if (edges := _EDGES.get((program, count))) is not None:
                 given = {frozenset(edge): k for k, edge in enumerate(edges, len(kind.corners))}
-                columns[len(kind.corners) :] = [given[frozenset(edge)] for edge in kind.edges]
+                order[len(kind.corners) :] = [given[frozenset(edge)] for edge in kind.edges]
             rows = np.array([[place[node] for node in nodes] for nodes in own.values()])
-            found[count] = _checked(x, rows[:, columns], count, list(own))
+            found[count] = _checked(x, rows[:, order], count, list(own))
     sets = {
         name: np.array(sorted(place[node] for node in nodes if node in place), dtype=np.intp)
         for name, nodes in raw.sets.items()
@@ -243,10 +252,9 @@ def _abaqus(text: str) -> _Raw:
     blocks = list(_keywords(text))
     if sum(word == "PART" for word, _, _ in blocks) > 1:
         raise UnfitError("holds several parts: save the one part alone")
-    metals = {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
-    if len(metals) > 1:
-        each = "save a mesh of each, a link of its own"
-        raise UnfitError(f"is of {len(metals)} materials: {each}")
+    _require_one(
+        {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
+    )
     for word, options, lines in blocks:
         rows = [[entry.strip() for entry in line.split(",")] for line in lines]
         if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
@@ -345,3 +353,79 @@ def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[s
             elif face is not None:
                 found.update(nodes[k] for k in KINDS[len(nodes)].face(int(face[1]) - 1))
     return found
+
+
+# --- Nastran bulk data
+
+_PASSED = ("CORD1R", "CORD2R", "CORD1C", "CORD2C", "CORD1S", "CORD2S")
+_NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
+_SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
+
+
+def _nastran(text: str) -> _Raw:
+    start = re.search(r"^BEGIN\s+BULK.*$", text, re.MULTILINE | re.IGNORECASE)
+    control, bulk = ("", text) if start is None else (text[: start.start()], text[start.end() :])
+    raw, materials = _Raw(), set[str | None]()
+    for number, members in re.findall(
+        r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", control, re.MULTILINE | re.IGNORECASE
+    ):
+        raw.add(number, _listed(re.split(r"[,\s]+", members.strip())))
+    for name, values in _cards(bulk):
+        if name == "INCLUDE":
+            raise UnfitError("includes other files: save the mesh in one")
+        if name == "GRID":
+            if values[1] not in ("", "0"):
+                raise UnfitError("has nodes in a coordinate system of their own (CP): save in 0")
+            x = [_real(value) for value in (*values[2:5], "", "", "")[:3]]
+            raw.nodes[int(values[0])] = tuple(x)
+        elif name in _NASTRAN:
+            nodes = [int(value) for value in values[2:] if value]
+            if (name, len(nodes)) not in (("CTETRA", 4), ("CTETRA", 10), ("CHEXA", 20)):
+                raise UnfitError(f"has {name} of {len(nodes)} nodes{_MESH_WITH}")
+            raw.elements[int(values[0])] = nodes
+        elif name in _SURFACES:
+            n = (4 if "QUAD" in name else 3) * (2 if name in ("CTRIA6", "CQUAD8") else 1)
+            raw.add(f"pid {int(values[1])}", (int(v) for v in values[2 : 2 + n] if v))
+        elif name == "SET1":
+            raw.add(values[0], _listed(values[1:]))
+        elif name == "PSOLID":
+            materials.add(values[1])
+        elif name not in _PASSED and re.match(r"C[A-Z]|RB[AE]|RROD|RTRPLT|MPC", name):
+            raise UnfitError(f"has {name[:8]}{_ALONE}")
+    _require_one(materials)
+    return raw
+
+
+def _require_one(materials: set[str | None]) -> None:
+    if len(materials) > 1:
+        raise UnfitError(
+            f"is of {len(materials)} materials: save a mesh of each, a link of its own"
+        )
+
+
+def _listed(entries: Iterable[str]) -> set[int]:
+    """Ids, with THRU between two for all from one to the other."""
+    found: set[int] = set()
+    last, through = 0, False
+    for entry in entries:
+        if entry.upper() == "THRU":
+            through = True
+        elif entry:
+            first, last = last + 1 if through else int(entry), int(entry)
+            _require_few(last - first)
+            found.update(range(first, last + 1))
+            through = False
+    return found
+
+
+def _cards(bulk: str) -> Iterator[tuple[str, list[str]]]:
+    """Name and fields of each card, without comments."""
+    lines = (line.split("$", 1)[0].rstrip() for line in bulk.splitlines())
+    for card in CARD.finditer("\n".join(filter(None, lines)).encode("ascii", "replace")):
+        own = (cell.decode().strip() for cell in fields_of(card.group()).tolist())
+        yield card.group(1).decode().upper(), list(own)
+
+
+def _real(value: str) -> float:
+    """A number as Nastran writes it: 1.5-3 is 1.5e-3."""
+    return float(re.sub(r"(?<=[\d.])([-+]\d)", r"e\1", value.replace("D", "E"))) if value else 0.0

@@ -1,4 +1,4 @@
-"""Bars of solid elements, written as gmsh and Abaqus write meshes."""
+"""Bars of solid elements, written as gmsh, Abaqus and Nastran write meshes."""
 
 from collections.abc import Mapping
 from itertools import product
@@ -27,6 +27,7 @@ CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 SIX = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
 # the middle nodes of each kind, where a program has another order than Abaqus
 GMSH = {10: [0, 1, 2, 3, 5, 4], 20: [0, 3, 8, 1, 9, 2, 10, 11, 4, 7, 5, 6], 4: []}
+NASTRAN = {10: range(6), 20: [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7], 4: []}
 
 
 class Bar(NamedTuple):
@@ -142,6 +143,32 @@ def _faces(part: Bar, own: set[int]) -> list[str]:
         for f, face in enumerate(faces, 1)
         if {row[c] for c in face} <= own
     ]
+
+
+def bdf(part: Bar, form: str = "small") -> str:
+    """Nastran bulk data in fields of 8 or 16 characters, or free."""
+    count, lines = part.elements.shape[1], ["SOL 103", "CEND"]
+    for k, own in enumerate(part.sets.values(), 1):
+        lines.append(f"SET {k} = " + ",\n ".join(str(i + 1) for i in own))
+    lines.append("BEGIN BULK")
+    for k, x in enumerate(part.x, 1):
+        if form == "small":
+            lines.append(f"GRID    {k:<8d}        " + "".join(f"{v:<8.5f}"[:8] for v in x))
+        elif form == "large":
+            lines.append(f"GRID*   {k:<16d}{'':16s}{x[0]:<16.9E}{x[1]:<16.9E}*")
+            lines.append(f"*       {x[2]:<16.9E}")
+        else:
+            lines.append(f"GRID,{k},," + ",".join(f"{v:.12g}".replace("e", "") for v in x))
+    name = "CHEXA" if count == 20 else "CTETRA"
+    for k, row in enumerate(_renumbered(part, NASTRAN[count]).tolist(), 1):
+        fields = [str(k), "1", *map(str, row)]
+        for j in range(0, len(fields), 8):
+            head = name if j == 0 else "+"
+            if form == "free":
+                lines.append(",".join([head, *fields[j : j + 8]]))
+            else:
+                lines.append(f"{head:8s}" + "".join(f"{v:8s}" for v in fields[j : j + 8]))
+    return "\n".join([*lines, "ENDDATA\n"])
 
 
 def case(folder: Path, part: Bar, held: str = "weld", **more: Any) -> dict[str, Any]:
