@@ -383,8 +383,8 @@ class SuperelementNode(Part):
 class SuperelementLink(Part):
     """A part by its matrices, from another program, without supports.
 
-    What a file is, is told by its content: Nastran (DMIG punch, OP4), Abaqus (matrix output,
-    substructures), CalculiX (.sti, .mas), Ansys (Matrix Market), MATLAB, NumPy.
+    What a file is, is told by its content: Nastran (DMIG punch, OP4), Abaqus (matrix output),
+    CalculiX (.sti, .mas), Ansys (Matrix Market), MATLAB, NumPy.
 
     Keys:
         stiffness: file of the matrix; of a file with several, `parts.mat:K` names it

@@ -50,7 +50,6 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
     programs.read_op4_binary,
     programs.read_op4_text,
     programs.read_bulk,
-    programs.read_substructure,
     programs.read_nodes,
     programs.read_entries,
     programs.read_labels,

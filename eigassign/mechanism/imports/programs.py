@@ -19,7 +19,6 @@ Each kind is told by its first lines:
     %%MatrixMarket      coordinates behind a header, of Ansys: row, column, value
     12.3                .dof of CalculiX: node.freedom of each row
     7  12  ROTX         .mapping of Ansys: row, node, freedom
-    *MATRIX,TYPE=MASS   substructures: the lower triangle row by row, behind nodes and freedoms
     *NODE               input files: node, x, y, z
 """
 
@@ -253,10 +252,6 @@ _BANNER = re.compile(
 _DOFS = re.compile(rb"\A(?:[ \t]*\d+\.\d{1,2}[ \t]*\r?\n)+\Z")
 _FREEDOMS = (b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ")
 _MAPPED = re.compile(rb"^[ \t]*(\d+)[ \t]+(\d+)[ \t]+(U[XYZ]|ROT[XYZ])[ \t]*\r?$", re.MULTILINE)
-_BLOCK = re.compile(rb"^\*MATRIX, *TYPE *= *(STIFFNESS|MASS)[^\n]*\n([^*]*)", re.M | re.I)
-_ELEMENT = re.compile(
-    rb"^\*USER ELEMENT[^\n]*\n\*\* *ELEMENT NODES[^\n]*\n((?:\*\*[^\n]*\n)+)([^*]*)", re.M | re.I
-)
 _NODES = re.compile(rb"^\*NODE\b(?! *(?:FILE|PRINT|OUTPUT))[^\n]*\n([^*]*)", re.M | re.I)
 
 
@@ -302,44 +297,6 @@ def read_matrix_market(data: bytes) -> Contents | None:
         return Matrix(entries.assembled(n, row - 1, column - 1, values, half))
 
     return Contents({"": matrix})
-
-
-def read_substructure(data: bytes) -> Contents | None:
-    """The matrices of one user element; None of files without."""
-    heads, blocks = list(_ELEMENT.finditer(data)), list(_BLOCK.finditer(data))
-    if not blocks:
-        return None
-    names = [block.group(1)[:1].decode().upper().replace("S", "K") for block in blocks]
-    if len(heads) != 1 or len(set(names)) < len(names):
-        raise UnfitError("holds the matrices of several elements: write those of one substructure")
-    nodes = [int(word) for word in re.findall(rb"\d+", heads[0].group(1))]
-    freedoms = list[list[int]]()
-    for line in heads[0].group(2).split(b"\n"):
-        if numbers := [int(word) for word in line.replace(b",", b" ").split()]:
-            if freedoms:  # where they change
-                if numbers[0] > len(nodes):
-                    raise ValueError("a node too many")
-                freedoms += [freedoms[-1]] * (numbers[0] - 1 - len(freedoms))
-                numbers = numbers[1:]
-            freedoms.append(numbers)
-    freedoms += freedoms[-1:] * (len(nodes) - len(freedoms))
-    pairs = zip(nodes, freedoms, strict=True)
-    labels = np.array([LABEL * node + k for node, own in pairs for k in own], dtype=np.int64)
-    made = {n: partial(_triangle, b.group(2), labels) for n, b in zip(names, blocks, strict=True)}
-    return Contents(made)
-
-
-def _triangle(body: bytes, labels: Ints) -> Matrix:
-    n = len(labels)
-    entries.require_few(n, n * n // 2)
-    if len(body) > 100 * (n * n + 1):
-        raise ValueError("more values than rows")
-    words = body.replace(b",", b" ").split()
-    if len(words) not in (n * n, n * (n + 1) // 2) or len(np.unique(labels)) < n:
-        raise ValueError("other values than rows")
-    values = np.array(words, dtype=np.bytes_).astype(np.float64)
-    rows, columns = np.tril_indices(n) if len(words) != n * n else np.indices((n, n)).reshape(2, -1)
-    return Matrix(entries.assembled(n, rows, columns, values, half=True), labels)
 
 
 def read_labels(data: bytes) -> Contents | None:

@@ -24,7 +24,6 @@ from writers import (
     matlab,
     op4_binary,
     op4_text,
-    substructure,
 )
 
 from eigassign.errors import MechanismError
@@ -79,11 +78,6 @@ def of_abaqus(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tre
     return {**files, "nodes": BY_ID}
 
 
-def of_substructure(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
-    texts(folder, part_mtx=substructure({"STIFFNESS": K, "MASS": M}, labels), nodes_csv=CSV)
-    return {"file": "part.mtx", "nodes_file": "nodes.csv", "nodes": BY_ID}
-
-
 def of_calculix(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree:
     texts(folder, p_sti=coordinate(K), p_mas=coordinate(M), p_dof=dofs(labels), nodes_csv=CSV)
     files = {"stiffness": "p.sti", "mass": "p.mas", "nodes_file": ["nodes.csv", "p.dof"]}
@@ -115,7 +109,7 @@ def of_numpy(folder: Path, K: np.ndarray, M: np.ndarray, labels: Labels) -> Tree
 
 
 WRITERS: tuple[Writer, ...] = (
-    of_dmig, of_op4, of_op4_binary, of_abaqus, of_substructure, of_calculix, of_ansys, of_matlab,
+    of_dmig, of_op4, of_op4_binary, of_abaqus, of_calculix, of_ansys, of_matlab,
     of_numpy,
 )  # fmt: skip
 
@@ -135,7 +129,7 @@ def test_frequencies_are_those_of_the_part_in_every_format(
     np.testing.assert_allclose(np.sqrt(found), np.sqrt(exact), rtol=1e-7)
 
 
-@pytest.mark.parametrize("write", [of_dmig, of_abaqus, of_substructure])
+@pytest.mark.parametrize("write", [of_dmig, of_abaqus])
 def test_a_spatial_part_moves_in_a_plane(tmp_path: Path, write: Writer) -> None:
     """Bending in the plane does not move out of it; beside it is bending between held nodes."""
     link = write(tmp_path, *exported("spatial"), labels_of("spatial"))
@@ -202,9 +196,8 @@ def test_a_line_without_end_is_refused_in_little_memory(tmp_path: Path) -> None:
     [
         coordinate,
         lambda A: abaqus_labels(A, labels_of("spatial")),
-        lambda A: substructure({"STIFFNESS": A}, labels_of("spatial")),
     ],
-    ids=["coordinate", "labels", "substructure"],
+    ids=["coordinate", "labels"],
 )
 def test_lists_of_entries(tmp_path: Path, K: np.ndarray, write: Any) -> None:
     same(tmp_path / "K.mtx", K, write(K))

@@ -20,7 +20,6 @@ from test_formats import (
     of_calculix,
     of_dmig,
     of_matlab,
-    of_substructure,
     texts,
 )
 from writers import coordinate, dmig, dofs, grids, matlab
@@ -76,7 +75,7 @@ def test_files_in_any_units_are_the_same_part(tmp_path: Path, units: str, write:
 @pytest.mark.parametrize("header", ["id, x, y, z", "id, x [mm], y [mm], z [mm]"])
 def test_places_of_files_are_in_their_units_too(tmp_path: Path, header: str) -> None:
     K, M = in_units("spatial", *SYSTEMS["mm-t-s"])
-    link = of_substructure(tmp_path, K, M, labels_of("spatial"))
+    link = {**of_abaqus(tmp_path, K, M, labels_of("spatial")), "nodes_file": "nodes.csv"}
     rows = "".join(f"{n}, {1e3 * x!r}, 0, 0\n" for n, (x, *_) in PLACES.items())
     texts(tmp_path, nodes_csv=f"{header}\n{rows}")
     found = lam(tmp_path, {**link, "units": "mm-t-s"})
@@ -104,7 +103,8 @@ def test_a_position_that_lacks_its_unit_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms"])
 def test_a_part_of_half_a_kilometre_and_grams_is_doubted(tmp_path: Path, units: str) -> None:
     """All of its files are in mm, so that nothing strains."""
-    link = of_substructure(tmp_path, *in_units("planar", *SYSTEMS[units]), labels_of("planar"))
+    K, M = in_units("planar", *SYSTEMS[units])
+    link = {**of_abaqus(tmp_path, K, M, labels_of("planar")), "nodes_file": "nodes.csv"}
     rows = "".join(f"{n},{1e3 * x!r},0\n" for n, (x, *_) in PLACES.items())
     texts(tmp_path, nodes_csv=f"id,x,y\n{rows}")
     assert "write units: mm-t-s or mm-kg-ms" in lines(tmp_path, link, "planar")[-1]
@@ -264,14 +264,11 @@ def test_rows_that_nobody_names_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("named", "twin"),
-    [("part.pch", " (MAAX)"), ("part.npz", " (MAA)"), ("part.mtx", "")],
+    [("part.pch", " (MAAX)"), ("part.npz", " (MAA)")],
 )
 def test_a_missing_mass_is_told(tmp_path: Path, named: str, twin: str) -> None:
-    K, M = exported("spatial")
-    of_substructure(tmp_path, K, M, labels_of("spatial"))
-    half = (tmp_path / "part.mtx").read_text().partition("*MATRIX,TYPE=MASS")[0]
-    text = grids(PLACES) + dmig("KAAX", K, labels_of("spatial"))
-    texts(tmp_path, part_pch=text, part_mtx=half)
+    K, _ = exported("spatial")
+    texts(tmp_path, part_pch=grids(PLACES) + dmig("KAAX", K, labels_of("spatial")))
     np.savez(tmp_path / "part.npz", KAA=K)
     message = refusal(tmp_path, {"file": named, "nodes": BY_ID})
     assert f"{named} holds stiffness, no mass: export the mass{twin} too" in message

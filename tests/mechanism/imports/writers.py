@@ -131,21 +131,6 @@ def mapping(labels: Labels) -> str:
     return "\n".join(["  Matrix Eqn     Node  DOF", *rows]) + "\n"
 
 
-def substructure(matrices: dict[str, np.ndarray], labels: Labels) -> str:
-    nodes = list(dict.fromkeys(node for node, _ in labels))
-    freedoms = [", ".join(str(f) for n, f in labels if n == node) for node in nodes]
-    out = ["**", f"*USER ELEMENT,NODES={len(nodes):10d},LINEAR", "** ELEMENT NODES"]
-    out += [f"** {', '.join(map(str, nodes[k : k + 10]))}" for k in range(0, len(nodes), 10)]
-    out += [freedoms[0]]
-    out += [f"{k + 1}, {f}" for k, f in enumerate(freedoms) if k and f != freedoms[k - 1]]
-    for name, A in matrices.items():
-        out.append(f"*MATRIX,TYPE={name}")
-        for i in range(len(A)):
-            texts = [f"{v:.17e}" for v in A[i, : i + 1]]
-            out += [" , ".join(texts[k : k + 4]) + "," for k in range(0, len(texts), 4)]
-    return "\n".join(out) + "\n"
-
-
 def matlab(file: Path, matrices: dict[str, np.ndarray], version: str, packed: bool = True) -> None:
     held = {name: sparse.csc_array(A) if version != "full" else A for name, A in matrices.items()}
     io.savemat(file, held, do_compression=packed)
