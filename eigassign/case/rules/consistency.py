@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 
 from eigassign.case.reader import Finding, KeyPath, Tree, at, items, listed, unknown
 from eigassign.case.rules import mechanism, properties
-from eigassign.case.rules.mechanism import node_problem
 from eigassign.case.rules.properties import coordinate_lists, followed_modes, freedoms, walk
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
@@ -32,7 +31,6 @@ from eigassign.case.schema.targets import (
     GapTarget,
     KeepOutTarget,
     SagTarget,
-    StaticTarget,
 )
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
@@ -248,16 +246,11 @@ def _span(motion: TrajectoryForm) -> Span | None:
     return None if motion.duration is None else (0.0, motion.duration)
 
 
-def statics_are_of_nodes(document: Document) -> Iterator[Finding]:
-    """The node of a static target exists, and what sags has a weight."""
-    mechanism = document.mechanism
+def what_sags_has_a_weight(document: Document) -> Iterator[Finding]:
+    """Gravity is stated where a sag is limited."""
     for k, target in enumerate(document.targets):
-        if not isinstance(target, StaticTarget):
-            continue
-        if problem := node_problem(mechanism, target.place.at):
-            yield ("targets", k, target.kind, "at"), problem
-        if isinstance(target, SagTarget) and not isinstance(mechanism.gravity, tuple):
-            down = "[0, -9.81]" if mechanism.space == "planar" else "[0, 0, -9.81]"
+        if isinstance(target, SagTarget) and not isinstance(document.mechanism.gravity, tuple):
+            down = "[0, -9.81]" if document.mechanism.space == "planar" else "[0, 0, -9.81]"
             yield ("targets", k, "sag"), f"nothing sags without mechanism.gravity: {down}, say"
 
 
@@ -353,14 +346,14 @@ def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
 Rule = Callable[[Document], Iterator[Finding]]
 RULES: tuple[Rule, ...] = (
     names_mean_something,
-    mechanism.links_have_known_materials,
-    mechanism.beams_have_known_sections,
+    mechanism.names_mean_parts,
+    mechanism.materials_have_what_links_need,
+    mechanism.tapers_run_between_like_sections,
     mechanism.bare_sections_have_the_moments_of_their_space,
     mechanism.rigid_links_have_one_end,
     mechanism.frames_hang_together,
     mechanism.beams_have_no_more_elements_than_can_be_meant,
     mechanism.superelements_have_a_row_for_each_freedom,
-    mechanism.bodies_and_tips_are_on_nodes,
     mechanism.springs_join_two_nodes,
     mechanism.joints_connect_two_links,
     mechanism.riders_have_a_beam_of_their_own,
@@ -368,7 +361,6 @@ RULES: tuple[Rule, ...] = (
     mechanism.coordinates_move_one_freedom_each,
     mechanism.assembly_closes_loops,
     properties.parameters_name_properties,
-    properties.properties_of_one_parameter_are_alike,
     properties.each_property_has_one_owner,
     properties.values_are_what_they_are_of,
     lists_are_as_long_as_what_they_list,
@@ -376,7 +368,7 @@ RULES: tuple[Rule, ...] = (
     branches_are_ranges_of_driven_joints,
     constraints_are_between_design_parameters,
     times_are_of_trajectories,
-    statics_are_of_nodes,
+    what_sags_has_a_weight,
     a_mode_has_one_frequency_at_a_time,
     followed_modes_are_of_possible_designs,
     one_shot_has_a_quadratic_program,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from typing import Any
 
 from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
-from eigassign.case.rules.properties import freedoms, guessed
+from eigassign.case.rules.properties import freedoms, guessed, walk
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import (
     BareSection,
@@ -14,9 +15,9 @@ from eigassign.case.schema.links import (
     FrameLink,
     Link,
     RigidLink,
-    SectionBase,
     SolidLink,
     SuperelementLink,
+    Taper,
 )
 from eigassign.case.schema.mechanism import (
     RIDING,
@@ -26,7 +27,6 @@ from eigassign.case.schema.mechanism import (
     NutJoint,
     RevoluteJoint,
 )
-from eigassign.case.schema.trajectory import TipTrajectory, named_trajectories
 from eigassign.files import how_to_raise, raised
 
 MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
@@ -95,54 +95,66 @@ def node_problem(mechanism: Mechanism, value: str, also: str = "") -> str | None
 # --- Materials and sections
 
 
-def links_have_known_materials(document: Document) -> Iterator[Finding]:
-    """The material of every beam and solid exists, and has what these need of it."""
+def names_mean_parts(document: Document) -> Iterator[Finding]:
+    """The materials, sections and nodes that parts, paths and targets name exist."""
     mechanism = document.mechanism
-    known, spatial = mechanism.materials, mechanism.space == "spatial"
-    needs: dict[str, str] = {}
-    for path, beam in beams(mechanism):
-        if beam.material not in known:
-            yield (*path, "material"), unknown("material", beam.material, known)
-        elif spatial or beam.shear:
-            needs[beam.material] = (
-                "beams in space twist" if spatial else "a beam with shear: true uses it"
-            )
-    for name, what in needs.items():
-        if known[name].poissons_ratio is None and known[name].shear_modulus is None:
-            message = f"needs poissons_ratio or shear_modulus: {what}"
-            yield ("mechanism", "materials", name), message
-    for name, solid in mechanism.links.items():
-        if not isinstance(solid, SolidLink):
+    for path, name in walk(document):
+        if not isinstance(name, str):
             continue
-        if (material := known.get(solid.material)) is None:
-            path = ("mechanism", "links", name, "material")
-            yield path, unknown("material", solid.material, known)
-        elif material.poissons_ratio is None:  # its matrices are made for one ν
+        problem = None
+        match path:
+            case ("mechanism", "links", *_, "material") if name not in mechanism.materials:
+                problem = unknown("material", name, mechanism.materials)
+            case ("mechanism", "links", *_, "section") | (
+                "mechanism",
+                "links",
+                _,
+                "section",
+                "start" | "end",
+            ) if name not in mechanism.sections:
+                problem = unknown("section", name, mechanism.sections)
+            case ("mechanism", "links", str(link), "beams", _, "from" | "to"):
+                frame: Any = mechanism.links[link]
+                problem = None if name in frame.nodes else unknown("node", name, frame.nodes)
+            case ("mechanism", "springs", _, "between", _) if name != "ground":
+                problem = node_problem(mechanism, name)
+            case (
+                ("mechanism", "bodies", _, "at")
+                | ("trajectory", *_, "tip")
+                | ("targets", _, _, "at")
+            ):
+                problem = node_problem(mechanism, name)
+        if problem:
+            yield path, problem
+
+
+def materials_have_what_links_need(document: Document) -> Iterator[Finding]:
+    """A shear modulus where beams twist or shear bends them; solids are made for one ν."""
+    mechanism = document.mechanism
+    spatial = mechanism.space == "spatial"
+    sheared = {beam.material for _, beam in beams(mechanism) if spatial or beam.shear}
+    solids = {link.material for link in mechanism.links.values() if isinstance(link, SolidLink)}
+    for name, material in mechanism.materials.items():
+        path = ("mechanism", "materials", name)
+        if material.poissons_ratio is None and name in solids:
             instead = "" if material.shear_modulus is None else " instead of shear_modulus"
-            path = ("mechanism", "materials", solid.material)
             yield path, f"a solid needs poissons_ratio{instead}"
+        elif material.poissons_ratio is None is material.shear_modulus and name in sheared:
+            what = "beams in space twist" if spatial else "a beam with shear: true uses it"
+            yield path, f"needs poissons_ratio or shear_modulus: {what}"
 
 
-def beams_have_known_sections(document: Document) -> Iterator[Finding]:
-    """The section of every beam exists, or both sections of a taper; these are alike."""
+def tapers_run_between_like_sections(document: Document) -> Iterator[Finding]:
+    """Both sections of a taper are of one shape, given by the same keys."""
     known = document.mechanism.sections
     for path, beam in beams(document.mechanism):
-        if isinstance(beam.section, str):
-            given: dict[KeyPath, str] = {("section",): beam.section}
-        else:
-            given = {("section", end): getattr(beam.section, end) for end in ("start", "end")}
-        missing = {key: name for key, name in given.items() if name not in known}
-        for key, name in missing.items():
-            yield (*path, *key), unknown("section", name, known)
-        if len(given) == 2 and not missing:
-            a, b = given.values()
-            if _keys(known[a]) != _keys(known[b]):
+        if isinstance(beam.section, Taper):
+            a, b = beam.section.start, beam.section.end
+            given = [known[name] for name in (a, b) if name in known]
+            kinds = [(type(each), each.model_fields_set - {"shape"}) for each in given]
+            if len(kinds) == 2 and kinds[0] != kinds[1]:
                 message = "a taper runs between sections of one shape, given by the same keys: "
                 yield (*path, "section"), f"{message}{a!r} and {b!r} are not"
-
-
-def _keys(section: SectionBase) -> tuple[object, set[str]]:
-    return type(section), section.model_fields_set - {"shape"}
 
 
 def bare_sections_have_the_moments_of_their_space(document: Document) -> Iterator[Finding]:
@@ -185,9 +197,6 @@ def frames_hang_together(document: Document) -> Iterator[Finding]:
         if "start" not in nodes:
             yield (*path, "nodes"), "a frame needs a node 'start'"
         for key, (a, b) in zip(link.beams, pairs, strict=True):
-            for end, node in (("from", a), ("to", b)):
-                if node not in nodes:
-                    yield (*path, "beams", key, end), unknown("node", node, nodes)
             if a in nodes and nodes[a] == nodes.get(b):
                 yield (*path, "beams", key), f"has no length: {a!r} and {b!r} are the same place"
         together = reached("start", pairs)
@@ -226,30 +235,10 @@ def superelements_have_a_row_for_each_freedom(document: Document) -> Iterator[Fi
                 yield path, f"needs {n} entries, the rows of {wanted}; got {len(body.dofs)}"
 
 
-# --- Bodies, springs and the tip stand on nodes
-
-
-def bodies_and_tips_are_on_nodes(document: Document) -> Iterator[Finding]:
-    """The node of a body, and the one that a trajectory guides, exist."""
-    placed: dict[KeyPath, str] = {
-        ("mechanism", "bodies", name, "at"): body.at
-        for name, body in document.mechanism.bodies.items()
-    }
-    for path, _, motion in named_trajectories(document.trajectory):
-        if isinstance(motion, TipTrajectory):
-            placed[(*path, "tip")] = motion.tip
-    for path, node in placed.items():
-        if problem := node_problem(document.mechanism, node):
-            yield path, problem
-
-
 def springs_join_two_nodes(document: Document) -> Iterator[Finding]:
-    """A spring runs from a node to another, or to the ground, and has a stiffness."""
+    """A spring runs from a node to another one, and has a stiffness."""
     for name, spring in document.mechanism.springs.items():
         path: KeyPath = ("mechanism", "springs", name)
-        for k, node in enumerate(spring.between):
-            if node != "ground" and (problem := node_problem(document.mechanism, node)):
-                yield (*path, "between", k), problem
         if spring.between[0] == spring.between[1]:
             yield (*path, "between"), "both ends are the same node"
         if not {"translational", "rotational"} & spring.model_fields_set:

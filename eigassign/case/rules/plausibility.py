@@ -8,7 +8,7 @@ table of all.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from eigassign.case.reader import Finding, KeyPath, listed
@@ -70,7 +70,8 @@ def bounds_hold_nothing_impossible(case: Any) -> Iterator[Finding]:
     A robust one may go further by its tolerances. Limits are linear, so that the least room of each
     entry, or of those that are chosen together, decides.
     """
-    n, ranges, columns = len(case.loads), [*_ranges(case)], [*case.design.parameters.values()]
+    loads, columns = [*case.loads.values()], [*case.design.parameters.values()]
+    n, ranges = len(loads), [*_ranges(case)]
 
     def least(k: int, factor: float, value: float) -> float:
         tolerance = columns[k - n].tolerance if case.assignment.robust and k >= n else None
@@ -82,42 +83,41 @@ def bounds_hold_nothing_impossible(case: Any) -> Iterator[Finding]:
 
     for limit in limits(case):
         terms, blamed = [limit.offset], dict[int, KeyPath]()
-        for entries, rows in ranges:
-            if own := [k for k in entries if k in limit.factors]:
-                at = [entries.index(k) for k in own]
-                room = [
-                    sum(least(k, limit.factors[k], row[i]) for k, i in zip(own, at, strict=True))
-                    for _, row in rows
-                ]
-                terms.append(min(room))
-                blamed |= dict.fromkeys(own, rows[room.index(min(room))][0])
+        for rows in ranges:
+            room, place = min(
+                (sum(least(k, f, row[k]) for k, f in limit.factors.items() if k in row), place)
+                for place, row in rows
+            )
+            terms.append(room)
+            blamed |= dict.fromkeys(rows[0][1], place)
         slack = _ROUND_OFF * sum(map(abs, terms))
         if sum(terms) < -slack or (limit.strict and sum(terms) <= 0.0):
             first = next((k for k in limit.factors if k < n), next(iter(limit.factors)))
             place = blamed[first]
             if first < n:
-                yield (*place, [*case.loads.values()][first].path), f"with this {limit.words}"
+                yield (*place, loads[first].path), f"with this {limit.words}"
                 continue
-            with_more = " with its tolerance" if case.assignment.robust else ""
+            more = " with its tolerance" if case.assignment.robust else ""
             bound = "at this bound" if place[-1] in ("min", "max") else "with one of these"
-            yield place, f"{bound}{with_more} {limit.words}; narrow the bounds"
+            yield place, f"{bound}{more} {limit.words}; narrow the bounds"
 
 
-def _ranges(case: Any) -> Iterator[tuple[Sequence[int], list[tuple[KeyPath, Sequence[float]]]]]:
-    """Entries that take their values together, and these, each with its place in the file."""
-    n, listed_only = len(case.loads), set[int]()
-    values = [*zip(*(load.along for load in case.loads.values()), strict=True)]
-    paths = [(*path, "set") for path, *_ in named_trajectories(case.trajectory)]
-    yield range(n), [*zip(paths, values, strict=False)]
+def _ranges(case: Any) -> Iterator[list[tuple[KeyPath, dict[int, float]]]]:
+    """Values that entries take together, each with its place in the file."""
+    n, chosen = len(case.loads), set[int]()
+    if n:
+        loads = [*enumerate(case.loads.values())]
+        paths = [(*path, "set") for path, *_ in named_trajectories(case.trajectory)]
+        yield [(path, {k: load.along[t] for k, load in loads}) for t, path in enumerate(paths)]
     for each in case.design.catalogues:
-        listed_only |= set(each.columns)
+        chosen |= set(each.columns)
         key = "choices" if isinstance(case.design.entries[each.name], Choices) else "values"
-        where = [("design", each.name, key)] * len(each.rows)
-        yield [n + k for k in each.columns], [*zip(where, each.rows, strict=True)]
+        entries, place = [n + k for k in each.columns], ("design", each.name, key)
+        yield [(place, dict(zip(entries, row, strict=True))) for row in each.rows]
     for k, (name, column) in enumerate(case.design.parameters.items()):
-        if k not in listed_only:
+        if k not in chosen:
             ends = (("min", column.min), ("max", column.max))
-            yield [n + k], [(("design", name, key), (value,)) for key, value in ends]
+            yield [(("design", name, key), {n + k: value}) for key, value in ends]
 
 
 # --- Warnings

@@ -400,28 +400,24 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
 
 
 def parameters_name_properties(document: Document) -> Iterator[Finding]:
-    """The paths of design parameters, and of what trajectories set, name numbers that can vary."""
-    named = [one for own in places(document.design).values() for one in own.items()]
+    """The paths of design parameters, and of what trajectories set, name numbers that can vary.
+
+    A factor has no unit: what a parameter varies together has one dimension.
+    """
+    groups = [*places(document.design).values()]
     for place, _, motion in named_trajectories(document.trajectory):
-        named += [(path, (*place, "set", path)) for path in motion.set]
-    for path, place in named:
-        try:
-            property_at(document, path)
-        except NoPropertyError as error:
-            yield place, str(error)
-
-
-def properties_of_one_parameter_are_alike(document: Document) -> Iterator[Finding]:
-    """A factor has no unit: what a parameter varies together has one dimension."""
-    for own in places(document.design).values():
-        name, *others = own
-        first = known_property(document, name)
-        for path in others:
-            kind = known_property(document, path)
+        groups += [{path: (*place, "set", path)} for path in motion.set]
+    for own in groups:
+        first, *_ = kinds = [known_property(document, path) for path in own]
+        for (path, place), kind in zip(own.items(), kinds, strict=True):
+            try:
+                property_at(document, path)
+            except NoPropertyError as error:
+                yield place, str(error)
             if kind and first and ANY not in (kind, first) and kind.dimension != first.dimension:
-                kinds = [q.dimension.name if q.dimension else "number" for q in (kind, first)]
-                message = f"{path} is a {kinds[0]}, {name} a {kinds[1]}: a factor"
-                yield own[path], f"{message} has no unit, so that they need parameters of their own"
+                a, b = (q.dimension.name if q.dimension else "number" for q in (kind, first))
+                message = f"{path} is a {a}, {next(iter(own))} a {b}: a factor has no unit, so that"
+                yield place, f"{message} they need parameters of their own"
 
 
 def each_property_has_one_owner(document: Document) -> Iterator[Finding]:

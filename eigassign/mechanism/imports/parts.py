@@ -111,20 +111,18 @@ def kind_of(name: str) -> str:
 
 
 def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
+    names = listed(each or "one without a name" for each in found)
     if not found:
         return "holds no matrix"
-    names = listed(each or "one without a name" for each in found)
     if name:
         return f"has no matrix {shown(name)}; it has {names}"
     if count > 1 or kind == "":
         return f"holds {len(found)} matrices, {names}: name one, as parts.mat:K does"
     words = {"K": "stiffness", "M": "mass"}
-    have = [words[k] for k in map(kind_of, found) if k]
+    have = next((words[k] for k in map(kind_of, found) if k), f"matrices, {names}")
     twin = next((f" ({kind}{n[1:]})" for n in found if re.fullmatch("[KM]AAX?", n)), "")
-    return (
-        f"holds {have[0] if have else f'matrices, {names}'}, no {words[kind]}: export the "
-        f"{words[kind]}{twin} too, or name stiffness and mass, a file each"
-    )
+    own = f"export the {words[kind]}{twin} too, or name stiffness and mass, a file each"
+    return f"holds {have}, no {words[kind]}: {own}"
 
 
 def guarded(read: Callable[[], T], file: Path, key: str) -> T:
