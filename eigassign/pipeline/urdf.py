@@ -117,15 +117,15 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
         lower, upper = joint.limits
         start = float(np.clip(0.0, lower, upper))
         step = 0.1 if joint.type == "prismatic" else 0.5
-        room = upper - start if upper - start >= start - lower else lower - start
+        room = max(upper - start, lower - start, key=abs)
         steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
     if not np.any(steps):
         raise UsageError(f"{path}: no joint moves a mass: give its links <inertial>")
     asked.append("trajectory: poses between which the joints move; small steps stand there")
     points = [[round(at, 6) for at in pose] for pose in zip(*steps, strict=True)]
     content["trajectory"] = {"points": points, "duration": "2 s"}
-    first = [f"# From {path.name}: masses, places and axes. To be filled in, as URDF has none:"]
-    head = "\n".join([*first, *(f"# - {each}" for each in asked)])
+    first = f"From {path.name}: masses, places and axes. To be filled in, as URDF has none:"
+    head = "\n".join(f"# {printable(each)}" for each in (first, *(f"- {one}" for one in asked)))
     coordinate, joint = next(iter(content["coordinates"])), next(iter(moving.values()))
     unit = STANDING[joint.type].partition(" ")[2]
     outlook = OUTLOOK.format(joint=coordinate, low=f"5 {unit}", high=f"50 {unit}")

@@ -302,8 +302,7 @@ def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
     for path, _ in followed_modes(document):
         yield path, f"is followed by its shape: {instead}"
     if design.mass is not None:
-        limited = design.mass.min is not None or design.mass.max is not None
-        yield ("design", "mass"), f"{'limits' if limited else 'prices'} the mass: {instead}"
+        yield ("design", "mass"), f"limits or prices the mass: {instead}"
     if "torque" in design.model_fields_set:
         yield ("design", "torque"), f"limits torques of drives: {instead}"
     for name, entry in design.entries.items():

@@ -11,23 +11,20 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from eigassign.case.reader import Finding, KeyPath, listed
-from eigassign.case.rules.mechanism import beams
+from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.rules.properties import ANY, coordinate_lists, limits, property_at, value_at
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
-from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, SolidLink, Taper
+from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
-from eigassign.case.schema.targets import FrequencyProfile
 from eigassign.case.schema.trajectory import Added, TipTrajectory, named_trajectories
 from eigassign.case.units import TWO_TURNS
 
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
-FREQUENCY = (1e-3, 1e6)  # Hz
 _ROUND_OFF = 1e-9  # of the terms of a limit
-LARGEST_ERROR = 0.5  # a tolerance of 2 was meant as 2 %
+LARGEST_ERROR = 0.5
 SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
 # The same ratio of a wire; a link of 30 bare "mm" with a depth of 10 mm is 3000.
 SLENDEREST = 2500.0
@@ -217,27 +214,6 @@ def bare_sections_can_exist(document: Document) -> Iterator[Finding]:
                 )
 
 
-def materials_and_sections_are_used(document: Document) -> Iterator[Finding]:
-    """Beams use every material and section, and so those that the design varies."""
-    used = set[tuple[str, str]]()
-    for _, beam in beams(document.mechanism):
-        used |= {("materials", beam.material), *(("sections", n) for n in _ends(beam.section))}
-    solids = (link for link in document.mechanism.links.values() if isinstance(link, SolidLink))
-    used |= {("materials", solid.material) for solid in solids}
-    unused = []
-    for group in ("materials", "sections"):
-        unused += [(group, n) for n in getattr(document.mechanism, group) if (group, n) not in used]
-    for each in unused:
-        yield ("mechanism", *each), "no link uses it"
-    for name, column in document.design.parameters.items():
-        if all(tuple(path.split(".")[:2]) in unused for path in column.factors):
-            yield ("design", name, "parameter"), "has no effect: no link uses it"
-
-
-def _ends(section: str | Taper) -> tuple[str, ...]:
-    return (section,) if isinstance(section, str) else (section.start, section.end)
-
-
 def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
     """Euler–Bernoulli beams are much longer than deep, but no beam is a thread."""
     spatial = document.mechanism.space == "spatial"
@@ -245,7 +221,9 @@ def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
     for name, link in document.mechanism.links.items():
         if not isinstance(link, BeamLink) or link.shear:
             continue
-        thick = max(_ends(link.section), key=lambda n: sections[n].depth(spatial))
+        taper = link.section if isinstance(link.section, Taper) else None
+        ends = (taper.start, taper.end) if taper else (str(link.section),)
+        thick = max(ends, key=lambda name: sections[name].depth(spatial))
         slenderness = link.length / sections[thick].depth(spatial)
         if slenderness > SLENDEREST and 1.0 < link.length <= LENGTH[1]:
             yield (
@@ -277,15 +255,8 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
 # --- What is asked
 
 
-def goals_can_be_meant(document: Document) -> Iterator[Finding]:
-    """Targets are frequencies, and errors that are accepted are small."""
-    low, high = FREQUENCY
-    for k, target in enumerate(document.targets):
-        for keys, curve in target.frequencies:
-            values = curve.frequency if isinstance(curve, FrequencyProfile) else (curve,)
-            worst = max(values) if max(values) > high else min(values)
-            if not low <= worst <= high:
-                yield ("targets", k, *keys), _outside(worst, low, high, "Hz")
+def errors_that_are_accepted_are_small(document: Document) -> Iterator[Finding]:
+    """A tolerance of 2 is meant as 2 %."""
     for part in ("assignment", "validation"):
         accepted = getattr(document, part).max_error
         if accepted is not None and accepted > LARGEST_ERROR:
@@ -294,38 +265,27 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
 
 
 def starts_outside(document: Document) -> Iterator[Finding]:
-    """The design that the file has is inside its bounds, or one of those listed."""
+    """The design that the file has is inside its bounds; a list need not have it."""
     design = document.design
-    start = [value_at(document, column.parameter) for column in design.parameters.values()]
-    listed_only = {k for catalogue in design.catalogues for k in catalogue.columns}
-    slips = set[int]()
+    chosen = {k for catalogue in design.catalogues for k in catalogue.columns}
     for k, (name, column) in enumerate(design.parameters.items()):
         dimension = property_at(document, column.parameter).dimension
         unit, bounds = dimension.si if dimension else "", f"[{column.min:g}, {column.max:g}]"
-        value = start[k]
-        if column.min <= value <= column.max:
+        value = value_at(document, column.parameter)
+        meant, size = _MEANT.get(unit, ("", 0.0))
+        slip = size * column.min <= value <= size * column.max
+        if column.min <= value <= column.max or (k in chosen and not slip):
             continue
-        why, (meant, size) = "the optimum will lie inside", _MEANT.get(unit, ("", 0.0))
-        if size * column.min <= value <= size * column.max:
-            why = f"a bare number is in {unit}: was {bounds} {meant} meant?"
-            slips.add(k)
-        elif k in listed_only:
-            continue
+        why = f"a bare number is in {unit}: was {bounds} {meant} meant?" if slip else ""
         message = f"initial value {value:g} {unit} of {column.parameter} is outside "
-        yield ("design", name), f"{message}{bounds} {unit}; {why}"
-    for catalogue in design.catalogues:
-        own = tuple(start[k] for k in catalogue.columns)
-        if own not in catalogue.rows and not slips.intersection(catalogue.columns):
-            message = f"the initial value is none of those listed: {listed(catalogue.choices)}"
-            yield ("design", catalogue.name), message
+        yield ("design", name), f"{message}{bounds} {unit}; {why or 'the optimum will lie inside'}"
 
 
 WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     numbers_have_the_size_of_machines,
     bare_sections_can_exist,
-    materials_and_sections_are_used,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
-    goals_can_be_meant,
+    errors_that_are_accepted_are_small,
     starts_outside,
 )

@@ -25,15 +25,7 @@ from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_
 
 ANY = Quantity()  # dimension unknown because of an error elsewhere
 
-_GROUPS = {
-    "materials": "material",
-    "sections": "section",
-    "links": "link",
-    "joints": "joint",
-    "bodies": "body",
-    "springs": "spring",
-    "coordinates": "coordinate",
-}
+_GROUPS = ("materials", "sections", "links", "joints", "bodies", "springs", "coordinates")
 _FORMS = (
     "expected materials.<name>.<property>, or the same of sections, links, bodies and springs, "
     "coordinates.<name>.drive.stiffness or .inertia, joints.<name>.position.0 or .angle"
@@ -75,7 +67,7 @@ def property_at(case: Any, path: str) -> Quantity:
         raise NoPropertyError(f"{_FORMS}; got {path!r}{meant}")
     parts, key = _parts(case, group), ".".join(keys).rstrip(".")
     if name not in parts:
-        raise NoPropertyError(unknown(_GROUPS[group], name, parts))
+        raise NoPropertyError(unknown("body" if group == "bodies" else group[:-1], name, parts))
     numbers = _numbers(case, group, name)
     if key not in numbers:
         own, near = f"{group}.{name}.{key}", suggestion(key, numbers)
@@ -253,15 +245,11 @@ def guessed(document: Document, joint: str, count: int) -> tuple[str, ...]:
     return next((each for each in (known, passive) if len(each) == count), ())
 
 
-def _of_freedom(freedom: str | None) -> Quantity:
-    """Angle or length; anything where the freedom is unknown."""
-    if freedom is None:
+def _of_freedom(*known: str | None) -> Quantity:
+    """Angle or length; anything where the freedom is unknown, or one of several."""
+    if len(known) != 1 or known[0] is None:
         return ANY
-    return PLACE if freedom == "translation" else ANGLE
-
-
-def _of_only(known: tuple[str, ...]) -> Quantity:
-    return _of_freedom(known[0] if len(known) == 1 else None)
+    return PLACE if known[0] == "translation" else ANGLE
 
 
 def places(design: Design) -> dict[str, dict[str, KeyPath]]:
@@ -382,14 +370,14 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
         case ["trajectory", "set", own, "add"]:
             return amount(of(own))
         case ["trajectory", "branch", joint]:
-            return _of_only(freedoms(document.mechanism, joint))
+            return _of_freedom(*freedoms(document.mechanism, joint))
         case ["mechanism", "assembly", "at", name]:
             return coordinate(name)
         case ["mechanism", "assembly", "guess", joint]:
             guess = document.mechanism.assembly.guess[joint]  # type: ignore[union-attr]
             known = guessed(document, joint, len(guess) if isinstance(guess, tuple) else 1)
             several = isinstance(guess, tuple) and known
-            return _of_freedom(known[int(path[-1])]) if several else _of_only(known)
+            return _of_freedom(known[int(path[-1])]) if several else _of_freedom(*known)
         case ["coordinates", name, "drive", key]:
             return drive_quantity(document.mechanism, moved[name], key)
     names, k = [*moved], int(path[-1])

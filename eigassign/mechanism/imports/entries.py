@@ -159,11 +159,11 @@ def read_numpy(data: bytes) -> Contents | None:
         raise UnfitError(f"unpacks to {size / 1e6:.3g} MB: {how_to_raise(size, MATRIX)}")
     if "format" in archive:
         return Contents({"": lambda: _sparse(data, archive)})
-    return Contents({name: partial(_array, archive, name) for name in archive})
 
+    def array(name: str) -> Matrix:
+        return Matrix(archive[name])
 
-def _array(archive: Any, name: str) -> Matrix:
-    return Matrix(archive[name])
+    return Contents({name: partial(array, name) for name in archive})
 
 
 def _sparse(data: bytes, archive: Any) -> Matrix:

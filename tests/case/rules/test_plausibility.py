@@ -34,7 +34,6 @@ SLIPS = {
     "angle in degrees": ("angle: 10 deg", "¦angle: 30", "was it meant in deg?"),
     "point in degrees": ("order: 4", "order: 4, ¦q: [104, 304]", "304 rad is more than two turns"),
     "start in degrees": ("tip: hand.end", "tip: hand.end\n  ¦start: [0, -90]", "was it meant in deg?"),
-    "target in mHz": ("frequency: 190 Hz", "¦frequency: 1.9e8", "is the unit right?"),
     "tolerance of 200 %": ("max_error: 2 %", "¦max_error: 2", "200 % accepts nearly anything"),
     "tolerance of 150 %": ("max_error: 2 %", "¦max_error: 150 %", "150 % accepts nearly anything"),
     "start outside the bounds": ("d: {parameter: sections.rod.diameter, min: 20 mm", "¦d: {parameter: sections.rod.diameter, min: 31 mm", "initial value 0.03 m of sections.rod.diameter is outside [0.031, 0.04] m"),
@@ -45,8 +44,6 @@ SLIPS = {
     "listed values in mm, the start among them": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "¦d: {parameter: sections.rod.diameter, values: [25, 35]}", "was [25, 35] mm meant?"),
     "listed stiffness in kN m/rad": ("  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "  ¦d: {parameter: coordinates.q2.drive.stiffness, values: [0.08, 0.12]}", "a bare number is in N m/rad: was [0.08, 0.12] kN m/rad meant?"),
     "choices in mm": ("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", "{choices: {a: {¦sections.rod.diameter: 25}, b: {sections.rod.diameter: 30}}}", "25 m is outside"),
-    "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
-    "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),
 }
 # fmt: on
 
@@ -72,8 +69,6 @@ def test_an_ordinary_arm_gives_no_warning() -> None:
         ("density: 2700", "density: 22590"),  # osmium
         ("density: 2700", "density: 20"),  # foam
         ("angle: 10 deg", "angle: 720 deg"),
-        ("frequency: 190 Hz", "frequency: 0.01"),
-        ("frequency: 190 Hz", "frequency: 900 kHz"),
         ("max_error: 2 %", "max_error: 50 %"),
         ("waypoints: [[0.3, 0.1]", "waypoints: [[-90, 0.1]"),
         ("length: 0.6", "length: 70"),
@@ -143,9 +138,3 @@ def test_any_large_slip_of_the_exponent_of_a_round_bar_is_seen_at_any_size(
 def test_a_link_of_the_misprinted_section_is_seen_to_be_deeper_than_long() -> None:
     found = warnings_of(edited("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4"))
     assert any("at most 0.2 times the depth of section 'bar'" in message for *_, message in found)
-
-
-def test_a_design_parameter_without_effect_is_warned_of() -> None:
-    text = edited("sections:\n", "sections:\n    spare: {shape: circle, diameter: 30 mm}\n")
-    text = text.replace("parameter: sections.rod.", "parameter: sections.spare.")
-    assert any("has no effect" in message for *_, message in warnings_of(text))

@@ -21,7 +21,6 @@ SLIPS = {
     "products of no body": (SPATIAL, "inertia: [1, 1, 1, 0, 0, 0.1]", "¦inertia: [1, 1, 1, 0.9, 0, 0]", "a principal moment exceeds the other two's sum"),
     "orientation in degrees": (SPATIAL, "orientation: [0, -90 deg, 0]", "¦orientation: [0, -90, 0]", "was it meant in deg?"),
     "angle among strokes in degrees": (SPATIAL, "[10 mm, 1 deg,", "[10 mm, 20,", "was it meant in deg?"),
-    "unused section": (SPATIAL, "    round: {shape", "    ¦spare: {shape: circle, diameter: 1 cm}\n    round: {shape", "no link uses it"),
 }
 # fmt: on
 

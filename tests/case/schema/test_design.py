@@ -153,9 +153,8 @@ def test_every_entry_reads_back_equal_and_is_described_by_the_schema(text: str) 
 @pytest.mark.parametrize(
     ("text", "messages"),
     [
-        (BOOM, ["design.boom: the initial value is none of those listed: light, heavy"]),
-        (LISTED, []),
-        (LISTED.replace("30 mm, ", ""), ["design.d: the initial value is none of those listed"]),
+        (BOOM, []),
+        (LISTED.replace("30 mm, ", ""), []),
         (D.replace("40 mm", "25 mm"), ["initial value 0.03 m of sections.rod.diameter is outside"]),
     ],
 )
