@@ -5,7 +5,7 @@ To add a key: give `Document` a field, with a model of what stands below it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -14,7 +14,6 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import (
     Finding,
-    KeyPath,
     Tree,
     shown,
     suggestion,
@@ -73,8 +72,6 @@ class Document(Part):
 
 # --- Errors of the schema as findings
 
-_Explained = tuple[KeyPath, str]  # keys to append to the path, message
-
 
 def validated(tree: Tree, folder: Path) -> tuple[Document | None, list[Finding]]:
     """The document, or None and everything the schema has against it.
@@ -109,10 +106,11 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
         path = tuple(p for p in loc if not str(p).startswith(TAG) and p != "[key]")
         if path[:2] == ("design", "entries"):
             path = (path[0], *path[2:])
-        suffix, message = (), f"{each['msg']}, got {shown(each['input'])}"
-        if each["type"] in _EXPLAIN:
-            suffix, message = _EXPLAIN[each["type"]](each)
-        found.append(((*path, *suffix), message))
+        more = each.get("ctx", {})
+        words = _WORDS.get(each["type"], each["msg"].replace("{", "").replace("}", ""))
+        entry = loc[-1] + 1 if loc and isinstance(loc[-1], int) else ""
+        message = words.format(got=shown(each["input"]), entry=entry, **more) + _hint(each)
+        found.append(((*path, *more.get("keys", ())), message))
     return found
 
 
@@ -129,82 +127,53 @@ def _with_entries_apart(tree: Tree) -> Tree:
     return {**tree, "design": {"entries": entries, **apart}}
 
 
-def _mapping(error: Any) -> _Explained:
-    what = "a mapping (key: value)"
-    if error["loc"][-2:-1] == ("keep_out",):
-        what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
-    if error["loc"][-1] in ("price", "tolerance"):
-        what = "values by property (path: value)"
-    found: _Explained = _expected(what, lambda e: unspaced(e["input"]))(error)
-    return found
-
-
-def _expected(what: str, hint: Callable[[Any], str] = lambda _: "") -> Any:
-    """Explanation of another value than ``what``, which the ``hint`` of an error goes on with."""
-    return lambda error: ((), f"expected {what}, got {shown(error['input'])}{hint(error)}")
-
-
-def _in_quotes(error: Any) -> str:
-    value = error["input"]
-    if "parameter" in error["loc"] and isinstance(value, Mapping):
-        return ": write a path, or several as [path, {path: factor}]"
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return f': write "{value}", in quotes, if that is its name' if number else ""
-
-
-def _of_one_entry(error: Any) -> str:
-    given = error["input"]
-    return f"; of one entry it is [{'{...}' if isinstance(given, Mapping) else shown(given)}]"
-
-
-def _too_short(error: Any) -> _Explained:
-    given, least = error["ctx"]["actual_length"], error["ctx"]["min_length"]
-    poses = {"time": ": one pose alone has no time", "points": ": one pose is q: [[...]], alone"}
-    hint = poses.get(error["loc"][-1], "") if error["loc"][0] == "trajectory" and given else ""
-    return (), f"needs at least {least} entries, got {given}{hint}"
-
-
-def _literal(error: Any) -> _Explained:
-    expected = error["ctx"]["expected"]
-    value = error["input"]
-    words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-    *_, place, tag = error["loc"]
-    parts = {"drive": "{stiffness: ...}", "objective": "{highest: 1}"}
-    also = parts.get(place, "") or (tag[2:] if tag.startswith(TAG) else "")
-    also = f", or {also}" if also else ""
-    hint = suggestion(value, words) if isinstance(value, str) else ""
-    if "objective" in error["loc"] and value == "highest":
-        hint = ": say of which mode, as {highest: 1}"
-    return (), f"expected {expected}{also}, got {shown(value)}{hint}"
-
-
-_EXPLAIN: dict[str, Any] = {
-    "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
-    "missing": lambda e: ((), f"entry {e['loc'][-1] + 1} is missing"),  # of a list
-    "literal_error": _literal,
-    "model_type": _mapping,
-    "model_attributes_type": _mapping,
-    "dict_type": _mapping,
-    "mapping_type": _mapping,
-    "is_instance_of": _mapping,
-    "tuple_type": _expected("a list", _of_one_entry),
-    "bool_type": _expected("true or false"),
-    "int_type": _expected(
-        "a whole number",
-        lambda e: ": write modes: all" if e["input"] == "all" and "mode" in e["loc"][-2:] else "",
-    ),
-    "int_from_float": _expected("a whole number"),
-    "string_type": _expected("text (in quotes if need be)", _in_quotes),
-    "string_too_short": _expected("some text"),
-    "string_too_long": lambda e: ((), f"is longer than {e['ctx']['max_length']} characters"),
-    "too_short": _too_short,
-    "too_long": lambda e: (
-        (),
-        f"takes at most {e['ctx']['max_length']} entries, got {e['ctx']['actual_length']}",
-    ),
-    "greater_than_equal": lambda e: ((), f"must be >= {e['ctx']['ge']}, got {shown(e['input'])}"),
-    "less_than_equal": lambda e: ((), f"must be <= {e['ctx']['le']}, got {shown(e['input'])}"),
+_MAPPINGS = ["model_type", "model_attributes_type", "dict_type", "mapping_type", "is_instance_of"]
+_WORDS = {
+    "at_key": "{text}",
+    "missing": "entry {entry} is missing",
+    "literal_error": "expected {expected}",
+    **dict.fromkeys(_MAPPINGS, "expected a mapping (key: value), got {got}"),
+    "tuple_type": "expected a list, got {got}",
+    "bool_type": "expected true or false, got {got}",
+    "int_type": "expected a whole number, got {got}",
+    "int_from_float": "expected a whole number, got {got}",
+    "string_type": "expected text (in quotes if need be), got {got}",
+    "string_too_short": "expected some text, got {got}",
+    "string_too_long": "is longer than {max_length} characters",
+    "too_short": "needs at least {min_length} entries, got {actual_length}",
+    "too_long": "takes at most {max_length} entries, got {actual_length}",
+    "greater_than_equal": "must be >= {ge}, got {got}",
+    "less_than_equal": "must be <= {le}, got {got}",
 }
+
+
+def _hint(error: Any) -> str:
+    """What goes on behind the words: what else may stand there, and what was probably meant."""
+    kind, value, (place, last) = error["type"], error["input"], ("", *error["loc"])[-2:]
+    match kind:
+        case "literal_error":
+            parts = {"drive": "{stiffness: ...}", "objective": "{highest: 1}"}
+            also = parts.get(place, "") or (last[2:] if str(last).startswith(TAG) else "")
+            words = error["ctx"]["expected"].replace("'", "").replace(" or ", ", ").split(", ")
+            near = suggestion(value, words) if isinstance(value, str) else ""
+            if (place, value) == ("objective", "highest"):
+                near = ": say of which mode, as {highest: 1}"
+            return f"{also and f', or {also}'}, got {shown(value)}{near}"
+        case _ if kind in _MAPPINGS:
+            return unspaced(value)
+        case "tuple_type":
+            one = "{...}" if isinstance(value, Mapping) else shown(value)
+            return f"; of one entry it is [{one}]"
+        case "int_type" if value == "all" and "mode" in (place, last):
+            return ": write modes: all"
+        case "string_type" if "parameter" in error["loc"] and isinstance(value, Mapping):
+            return ": write a path, or several as [path, {path: factor}]"
+        case "string_type" if isinstance(value, int | float) and not isinstance(value, bool):
+            return f': write "{value}", in quotes, if that is its name'
+    if kind == "too_short" and error["loc"][0] == "trajectory" and value:
+        poses = {"time": "one pose alone has no time", "points": "one pose is q: [[...]], alone"}
+        return f": {poses[last]}" if last in poses else ""
+    return ""
 
 
 # --- JSON Schema

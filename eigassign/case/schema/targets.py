@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from eigassign.case.reader import KeyPath, listed, suggestion
+from eigassign.case.reader import KeyPath, listed, shown, suggestion
 from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
     ByReference,
@@ -305,6 +305,9 @@ class KeepOutTarget(SomeModes):
     def _has_two_edges(cls, value: Any) -> Any:
         if isinstance(value, Mapping) and value.keys() & {"min", "max"}:
             raise wrong("a band is written with its two edges, as [40 Hz, 50 Hz]")
+        if not isinstance(value, Mapping | list | tuple | Harmonic):
+            forms = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
+            raise wrong(f"expected {forms}, got {shown(value)}")
         return value
 
     @model_validator(mode="after")
