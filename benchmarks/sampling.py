@@ -33,7 +33,7 @@ CATEGORIES = (IMPORTS, READING, OUTPUT, LINEAR, SERIES, BUILDING, FOLLOWING, RES
 MODULES = (  # first match wins; no match looks at the caller
     (r"(numpy|scipy)/linalg/|scipy/sparse/linalg/|/einsumfunc", LINEAR),
     (r"/(yaml|pydantic\w*)/|^ours/case/", READING),
-    (r"/(h5py|jinja2|matplotlib|rich|json|click)/", OUTPUT),
+    (r"/(h5py|jinja2|matplotlib|json|click)/", OUTPUT),
     (r"^ours/(output/|cli|keeping|signals|teller|failures)", OUTPUT),
     (r"^ours/series/", SERIES),
     (r"^ours/mechanism/(tip_|paths|trajector|inverse_kin|point_to_p|timing|course)", FOLLOWING),
@@ -48,7 +48,7 @@ OPERATION = re.compile(
 NUMERIC = re.compile(r"^ours/(modal|assignment|study|mechanism|series)/")
 SPARSE_PRODUCT = re.compile(r"scipy/sparse/_(compressed|base|csr|csc|data)\.py")
 # What others do for us, called from a line of ours or of theirs
-THEIRS = re.compile(r"/(yaml|pydantic\w*|h5py|jinja2|matplotlib|rich|json|click)/")
+THEIRS = re.compile(r"/(yaml|pydantic\w*|h5py|jinja2|matplotlib|json|click)/")
 TRANSFER = re.compile(
     r"yaml\.|zlib|crc32|sha256|draw_path|draw_text|buffer_rgba|b64encode|fsync|\bopen\(|"
     r"os\.replace|\.write\w*\(|\.read\w*\(|\.validate\w*\("

@@ -20,7 +20,6 @@ OWNERS = {
     "h5py": {"output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja
-    "rich": {"output"},
     "jinja2": {"output"},
     "platformdirs": {"output"},
     "click": {"cli"},
@@ -31,7 +30,7 @@ LATE = (  # what few cases or options need is imported when they do: a run of tw
     *("mechanism.solids", "output.figures", "output.reports.page"),
 )
 PRINTING = {
-    *("cli.cache", "cli.inspect", "cli.runs", "cli.start", "cli.reporter"),
+    *("cli.arguments", "cli.inspect", "cli.runs"),
     "output.console",
 }
 MODULES = sorted(ROOT.rglob("*.py"))

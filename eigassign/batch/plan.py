@@ -30,7 +30,7 @@ from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, file_digest, folder_name
 from eigassign.modal.expansion import ALGORITHM
 from eigassign.output.batch.index import NAMES
-from eigassign.output.store.run_record import MARKER
+from eigassign.output.store.run_folder import MARKER
 
 STUDY = "cheap"  # of what an answer means; see pipeline.run.Options
 

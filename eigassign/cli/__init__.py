@@ -5,13 +5,10 @@ command needs is imported when it runs, so that ``--help`` is instant.
 
 Reading order:
 
-    arguments  options that several commands share
-    reporter   stages, warnings and the log on stderr; JSON on stdout
+    arguments  what several commands share: options, what is written on stderr, JSON
     runs       optimize, expand, update, validate, chart
-    inspect    check, modes, schema
-    start      init, docs
+    inspect    check, modes, schema, init, docs
     batch      batch
-    cache      cache path, clear
 """
 
 from __future__ import annotations
@@ -26,13 +23,11 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign._version import __version__
+from eigassign.cli.arguments import print_json
 from eigassign.cli.batch import batch
-from eigassign.cli.cache import cache
-from eigassign.cli.inspect import check, modes, schema
+from eigassign.cli.inspect import check, docs, init, modes, schema
 from eigassign.cli.inspect import results_schema as results_schema
-from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
-from eigassign.cli.start import docs, init
 from eigassign.errors import UsageError
 
 COMPLETE = "_EIGASSIGN_COMPLETE"  # the name that click gives it
@@ -127,6 +122,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, validate, chart, cache, schema)
+MORE = (modes, expand, validate, chart, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -1,13 +1,24 @@
-"""Options and arguments that several commands share."""
+"""What several commands share: their options; stages, warnings and the log on stderr; JSON."""
 
 from __future__ import annotations
 
+import json as json_text
+import logging
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+
+from eigassign.errors import Problem
+from eigassign.files import plain, printable
+from eigassign.process import say
+
+# --- Options and arguments
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -62,7 +73,6 @@ def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tu
 
 PATH = click.Path(path_type=Path)
 POSITIVE = Number(0.0, min_open=True)
-LIMIT = Number(0.0, 1e9, min_open=True)  # s, which systems count in 64 bits
 COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)
@@ -99,7 +109,10 @@ cache_dir = click.option(
 caching = several(
     click.option(
         "--no-cache",
+        "use_cache",
         is_flag=True,
+        flag_value=False,
+        default=True,
         help="Neither read nor write the cache. $EIGASSIGN_CACHE is auto (keep what took over "
         "0.1 s to compute; the default), always or never.",
     ),
@@ -138,3 +151,68 @@ def out(usual: str) -> Callable[[F], F]:
 def writing(folder: str) -> Callable[[F], F]:
     """The options of a command that leaves a folder with figures and a report."""
     return several(out(folder), force, figures, report)
+
+
+# --- stderr while a command works
+
+_PLACE = re.compile(r"(.+?:\d+:\d+: )(.+)", re.DOTALL)  # of a problem that is text already
+
+
+@dataclass(frozen=True)
+class Reporter:
+    """Writes to stderr. ``level`` 0: errors only; 1: warnings and stages; 2, 3: more of the log."""
+
+    level: int = 1
+
+    def stage(self, line: str) -> None:
+        """Progress of long work; of a line that begins with blanks a terminal shows the last."""
+        if self.level > 0:
+            say([line], passing=line.startswith(" "))
+
+    def warn(self, warnings: Iterable[Problem | str]) -> None:
+        """``file:line:column: warning: path: message``, or without a place."""
+        for warning in dict.fromkeys(map(str, warnings)) if self.level > 0 else ():
+            located = _PLACE.fullmatch(warning)
+            place, message = located.groups() if located else ("", warning)
+            say([f"{place}warning: {message}"])
+
+    def error(self, line: str) -> None:
+        """Why the exit code will not be 0."""
+        say([f"eigassign: {line}"])
+
+
+@contextmanager
+def reporting(how: Mapping[str, Any]) -> Iterator[Reporter]:
+    """A reporter of the level that ``--quiet`` and ``-v`` ask for; the package's log on stderr."""
+    level = 0 if how["quiet"] else 1 + how["verbose"]
+    handler = _Handler()
+    ours = logging.getLogger("eigassign")
+    before = ours.level
+    ours.addHandler(handler)
+    ours.setLevel((logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)[min(level, 3)])
+    try:
+        yield Reporter(level)
+    finally:
+        ours.removeHandler(handler)
+        ours.setLevel(before)
+
+
+class _Handler(logging.Handler):
+    """``warning: text``, as all else on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        say([f"{record.levelname.lower()}: {self.format(record)}"])
+
+
+# --- stdout
+
+
+def show(*lines: str) -> None:
+    """Lines on stdout, without raw escapes and ends of lines of a name in them."""
+    for line in lines:
+        click.echo(printable(line))
+
+
+def print_json(value: object, indent: int | None = None) -> None:
+    """`plain` values on stdout, as JSON in ASCII, which every terminal shows."""
+    click.echo(json_text.dumps(plain(value), indent=indent, allow_nan=False))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import eigassign.cli.arguments as arguments
-from eigassign.cli.reporter import Reporter, reporting, show
+from eigassign.cli.arguments import Reporter, reporting, show
 from eigassign.files import folder_name
 
 if TYPE_CHECKING:
@@ -84,12 +83,12 @@ def batch(
 
 def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
     from eigassign.batch.runner import Batch
-    from eigassign.batch.work import CaseOptions
+    from eigassign.batch.workers import CaseOptions
 
     options = CaseOptions(
         out=str(folder),
         cache_dir=how["cache_dir"] and str(how["cache_dir"]),
-        use_cache=not how["no_cache"] and (not plan.is_swept or how["cache_dir"] is not None),
+        use_cache=how["use_cache"] and (not plan.is_swept or how["cache_dir"] is not None),
         force=how["force"],
         figures=how["figures"],
         reports=how["reports"] or ("all" if len(plan) <= _MANY else "failed"),
@@ -116,21 +115,21 @@ def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
 def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> list[CaseOutcome]:
     """Run it with a line of progress for each case; the rows of all."""
     from eigassign.batch import runner
-    from eigassign.output import console
 
-    with ExitStack() as stack:
-        advance: list[Callable[[str], None]] = []
+    left = ran = 0
 
-        def on_start(total: int, done: int) -> None:
-            if done:
-                reporter.stage(f"{done} of {total} cases are done and still current: skipped")
-            shown = console.progress("case", total - done, stream=reporter.stream())
-            advance.append(stack.enter_context(shown))
+    def on_start(total: int, done: int) -> None:
+        nonlocal left
+        left = total - done
+        if done:
+            reporter.stage(f"{done} of {total} cases are done and still current: skipped")
 
-        def on_outcome(found: CaseOutcome) -> None:
-            advance[0](f"{found.name}: {found.word}")
+    def on_outcome(found: CaseOutcome) -> None:
+        nonlocal ran
+        ran += 1
+        reporter.stage(f"  case {ran}/{left} {found.name}: {found.word}")
 
-        return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
+    return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
 
 
 def _cases(count: int) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +12,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.reporter import Reporter, print_json, reporting, show
+from eigassign.cli.arguments import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
@@ -88,11 +90,14 @@ def _finished(
     work: Callable[[Path, Options], Outcome], case: Path, as_json: bool, how: Mapping[str, Any]
 ) -> int:
     """Run one case into its folder and show what it found; the exit code."""
+    from eigassign.output.console import print_assignment
+
     with reporting(how) as reporter:
         outcome = work(case, _options(how, reporter))
         results = outcome.results
         reporter.warn(results.warnings)
-        _show(outcome, as_json)
+        told = partial(print_assignment, results)
+        _show(as_json, outcome.folder, results, outcome.seconds, told)
         if results.shortcoming is not None:
             reporter.error(results.shortcoming)
     if results.interrupted:
@@ -100,38 +105,30 @@ def _finished(
     return 0 if results.shortcoming is None else 1
 
 
+_UNASKED = {"use_cache": False, "figures": (), "report": "none", "study": "none"}
+
+
 def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
+    """The options of the command line that are those of a run; what a command lacks it is not."""
     from eigassign.pipeline.run import Options
 
-    return Options(
-        out=how.get("out"),
-        cache_dir=how.get("cache_dir"),
-        use_cache=not how.get("no_cache", True),
-        force=how.get("force", False),
-        figures=how.get("figures", ()),
-        report=how.get("report", "none"),
-        study=how.get("study", "none"),
-        allow_outside=how["allow_outside"],
-        progress=reporter.stage,
-    )
+    own = {field.name for field in fields(Options)}
+    given = {name: value for name, value in {**_UNASKED, **how}.items() if name in own}
+    return Options(**given, progress=reporter.stage)
 
 
-def _written(folder: Path | None, seconds: float) -> str:
-    """The last line: what to open."""
-    page = folder and folder / "report.html"
-    return f"{page if page and page.exists() else folder} written in {seconds:.2f} s"
-
-
-def _show(outcome: Outcome, as_json: bool) -> None:
+def _show(
+    as_json: bool, folder: Path | None, results: Any, seconds: float, told: Callable[[], None]
+) -> None:
+    """The results on stdout, as JSON or as they are ``told``; the last line says what to open."""
     if as_json:
         from eigassign.output.documents import results_document
 
-        print_json({"run_folder": str(outcome.folder), **results_document(outcome.results)})
-    else:
-        from eigassign.output.console import print_assignment
-
-        print_assignment(outcome.results)
-        show(_written(outcome.folder, outcome.seconds))
+        print_json({"run_folder": str(folder), **results_document(results, may_lack=True)})
+        return
+    told()
+    page = folder and folder / "report.html"
+    show(f"{page if page and page.exists() else folder} written in {seconds:.2f} s")
 
 
 @click.command(
@@ -152,23 +149,21 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     the measurements cannot determine; updated.yaml is the case with the values found. Exit code 1
     if the measurements are not explained, or do not determine the parameters.
     """
+    from eigassign.output.console import print_tables, print_verdict
+    from eigassign.output.reports.update import update_tables
     from eigassign.pipeline import studies as updating
 
     with reporting(how) as reporter:
         done = updating.update(case, _options(how, reporter))
-        reporter.warn(done.results.warnings)
-    if as_json:
-        from eigassign.output.documents import results_document
+        results = done.results
+        reporter.warn(results.warnings)
 
-        print_json({"run_folder": str(done.folder), **results_document(done.results)})
-    else:
-        from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.reports.update import update_tables
+    def told() -> None:
+        print_verdict(results.headline, results.verdict)
+        print_tables(update_tables(results))
 
-        print_verdict(done.results.headline, done.results.verdict)
-        print_tables(update_tables(done.results))
-        show(_written(done.folder, sum(done.results.timing_s.values())))
-    return 0 if done.results.verdict == "fitted" else 1
+    _show(as_json, done.folder, results, sum(results.timing_s.values()), told)
+    return 0 if results.verdict == "fitted" else 1
 
 
 @click.command(
@@ -251,7 +246,7 @@ def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
 @click.command(
     epilog=arguments.examples(
         "eigassign chart planar_arm.yaml --quick",
-        "eigassign chart planar_arm.yaml --quick --accuracy 1e-4 --evaluations 1e6",
+        "eigassign chart planar_arm.yaml --quick --accuracy 1e-4",
     )
 )
 @arguments.case
@@ -275,6 +270,8 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     """
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import ACCURACIES
+    from eigassign.output.console import print_tables, print_verdict
+    from eigassign.output.reports.chart import chart_tables, headline
     from eigassign.pipeline import studies as charting
 
     accuracies = ACCURACIES if how["accuracy"] is None else (how["accuracy"],)
@@ -282,14 +279,11 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     with reporting(how) as reporter:
         folder, made = charting.chart(case, _options(how, reporter), effort, accuracies)
         reporter.warn(made.warnings)
-    if as_json:
-        print_json({"run_folder": str(folder), **vars(made)})
-    else:
-        from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.reports.chart import chart_tables, headline
 
+    def told() -> None:
         print_verdict(headline(made) or "")
         written = "What to write in the case"
         print_tables(table for table in chart_tables(made) if table.title == written)
-        show(_written(folder, made.seconds))
+
+    _show(as_json, folder, made, made.seconds, told)
     return 0

@@ -6,8 +6,7 @@ In reading order; each imports from those above it only:
     documents     rows as JSON, and the schema of that: results.json
     result_files  the CSV files of a run
     tables        the tables of a run as text
-    console       results on stdout, progress on stderr
-    pages         HTML pages from their templates
+    console       results on stdout
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
     batch         what a batch leaves: summaries, junit.xml, index.html
@@ -22,7 +21,7 @@ __all__, __getattr__, __dir__ = face(
         "batch.summary": (
             "CaseOutcome batch_table frequency_ranges from_plain summary_json to_plain"
         ),
-        "console": "markdown print_assignment print_tables print_verdict progress",
+        "console": "print_assignment print_tables print_verdict",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
         "figures.mechanism": "mode_figures",
         "figures.paper": "draw render",
@@ -33,8 +32,7 @@ __all__, __getattr__, __dir__ = face(
         "documents": "NUMBERS results_document to_json",
         "result_files": "sample_files",
         "store.cache": "Cache content_key default_directory",
-        "store.run_folder": "run_folder",
-        "store.run_record": "is_untouched",
+        "store.run_folder": "is_untouched run_folder",
         "tables": "Table modes_table run_tables validation_table",
     },
 )

@@ -20,7 +20,6 @@ from eigassign.facts import (
     number,
     percent,
     positive_percent,
-    seconds,
     verdict_word,
 )
 from eigassign.study.results import (
@@ -38,16 +37,6 @@ Floats = NDArray[np.float64]
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 _RANGES = "label lowest_hz highest_hz error"
-STAGES = {  # of a run, as they are named in results.json
-    "model": "assembly of K and M",
-    "trajectory": "trajectory",
-    "expansion": "expansion of the eigenvalues",
-    "assignment": "search of the design",
-    "initial": "exact frequencies of the initial design",
-    "verification": "exact frequencies of the optimal design",
-    "comparison": "comparison of the expansion with exact",
-    "meaning": "study of what the answer means",
-}
 
 
 @dataclass(frozen=True)
@@ -280,31 +269,17 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 def _depends(results: RunResults) -> Iterator[Table]:
     """Slopes; what more room gains; what can be reached."""
     found = results.meaning
-    yield _sensitivity(results)
+    caption = "How the exact frequency rises at the answer with one unit more of the parameter, "
+    caption += "and in % with 1 % more: means over the samples."
+    names = "parameter label hz_per_unit percent_per_percent percent_per_percent_largest"
+    headings = {"hz_per_unit": "Hz per SI unit", "percent_per_percent": "% per %"}
+    headings["percent_per_percent_largest"] = "% per % at most"
+    yield facts_table("Sensitivity", found.sensitivity, names, caption, **headings)
     yield facts_table("Limits", found.relaxed, "words")
     caption = "All designs within the bounds, at any sample (proved)."
     if any(row.how == "bounded" for row in found.reach):
         caption += " Distances of two modes lie in between, but may not reach the ends."
     yield facts_table("Reach", found.reach, _RANGES, caption, error="least error")
-
-
-def _sensitivity(results: RunResults) -> Table:
-    """Slopes of the targeted frequencies at the answer."""
-    columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
-    units = {row.name: row.handy for row in results.design}
-    rows = []
-    for row in results.meaning.sensitivity:
-        unit, size = units.get(row.parameter, (row.unit, 1.0))
-        shares = (row.percent_per_percent, row.percent_per_percent_largest)
-        rows.append(
-            (row.parameter, row.label, f"{row.hz_per_unit * size:.3g}", unit,
-             *(f"{share + 0.0:.3g}" for share in shares))
-        )  # fmt: skip
-    caption = (
-        "How the exact frequency rises at the optimum with one unit more of the parameter, and in "
-        "% with 1 % more: means over the samples."
-    )
-    return Table("Sensitivity", columns, tuple(rows), caption)
 
 
 def _robustness(results: RunResults) -> Iterator[Table]:
@@ -350,30 +325,12 @@ def _motion(results: RunResults) -> Iterator[Table]:
 
 
 def _appendix(results: RunResults) -> Iterator[Table]:
-    """Distinct optima, the best first; expansions; the one shot's certificate; time by stage."""
-    row = results.assignment
-    if row is not None and row.catalogue is None and len(row.local_optima) > 1:
-        named = [(one.name, *one.handy) for one in results.design]
-        optima = tuple(
-            (
-                *(str(k), number(one.objective), positive_percent(one.violation)),
-                *(number(x / size) for x, (*_, size) in zip(one.design, named, strict=True)),
-            )
-            for k, one in enumerate(row.local_optima, 1)
-        )
-        columns = [f"{name} [{unit}]" if unit else name for name, unit, _ in named]
-        caption = f"Found from {row.starts} starts; the first is the answer."
-        if results.price is not None and row.objective != "lightest":
-            caption += " Objectives include prices."
-        columns = ["optimum", "objective", "violation", *columns]
-        yield Table("Local optima", tuple(columns), optima, caption)
+    """Expansions; the certificate of the one shot."""
     yield _approximation(results)
     solver = () if results.solver is None else (results.solver,)
     names = "status iterations primal_residual dual_residual gap"
     caption = "Residuals, computed again from the data of the scaled program."
     yield facts_table("Solver", solver, names, caption)
-    spent = tuple((STAGES.get(k, k), seconds(value)) for k, value in results.timing_s.items())
-    yield Table("Timing", ("stage", "time"), spent)
 
 
 def _approximation(results: RunResults) -> Table:

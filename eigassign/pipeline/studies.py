@@ -12,10 +12,9 @@ from eigassign.chart.question import Effort
 from eigassign.chart.results import ACCURACIES, Chart
 from eigassign.errors import AccuracyError
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.update import update_figures
 from eigassign.output.reports.chart import write_chart
 from eigassign.output.reports.notebook import Pictured, html
-from eigassign.output.reports.update import update_tables, write_update
+from eigassign.output.reports.update import update_figures, update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options, prepare
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case

@@ -724,7 +724,7 @@ class SensitivityRow:
     parameter: str
     unit: Annotated[str, Fact("of the parameter")]
     label: Annotated[str, Fact("the target in words", "target")]
-    hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit")]
+    hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit", digits=".3g")]
     hz_per_unit_largest: Annotated[float, Fact(unit="Hz per SI unit")]
     percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
     percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]

@@ -129,7 +129,7 @@ def test_errors_and_warnings_have_colours_on_a_terminal_only(
 
 def test_help_imports_click_and_nothing_heavy_and_blas_gets_one_thread_before_numpy() -> None:
     """One thread unless the user chose."""
-    heavy = ["numpy", "scipy", "yaml", "pydantic", "h5py", "matplotlib", "rich", "jinja2"]
+    heavy = ["numpy", "scipy", "yaml", "pydantic", "h5py", "matplotlib", "jinja2"]
     code = (
         "import os, sys; from eigassign.cli import main\n"
         "main(['--help']); main(['optimize', '-h'])\n"

@@ -1,6 +1,5 @@
 """The first minute: starters that run as they are, the manual, tabs, and the examples."""
 
-import io
 import json
 import re
 import shlex
@@ -13,7 +12,6 @@ from commands import TWO_LINK
 
 import eigassign as ea
 from eigassign.cli import cli, main
-from eigassign.output import markdown
 
 CASES = TWO_LINK.parent
 STARTERS = Path(ea.__file__).parent / "starters"
@@ -104,16 +102,6 @@ def test_the_manual_lists_its_pages_and_shows_one(capsys: Captured) -> None:
         assert capsys.readouterr().out.startswith("# ")
     assert main(["docs", "case_file"]) == 2
     assert "did you mean 'case-file'?" in capsys.readouterr().err
-
-
-def test_a_terminal_shows_markdown_and_leaves_formulas_as_they_are() -> None:
-    page = "# Title\n\nA *word*, `$x`, $K_{EE} φ_1$.\n\n$$\na \\\\ b_i c_j\n$$\n"
-    shown = markdown(page, io.StringIO())
-    assert "# Title" not in shown
-    assert "*word*" not in shown
-    assert "word, $x, $K_{EE} φ_1$" in shown
-    assert "a \\\\ b_i c_j" in shown
-    assert "\x1b" not in shown
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

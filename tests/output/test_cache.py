@@ -1,7 +1,6 @@
 """A cache hit is bit for bit what was stored, or it is no hit."""
 
 import errno
-import fcntl
 import logging
 import os
 import sys
@@ -110,21 +109,6 @@ def test_a_full_disk_in_the_middle_of_a_write_leaves_the_earlier_file(cache, sto
         cache.store(KEY, {"other": np.ones(3)})
     assert stored.read_bytes() == before
     assert list(cache.directory.iterdir()) == [stored]
-
-
-def test_clear_removes_what_is_ours_and_nothing_else(cache, stored):
-    cache.store(key("other"), {"a": np.ones(2)})
-    stored.write_bytes(b"")
-    assert cache.load(KEY) is None
-    dead = cache.directory / f".{KEY}.h5.1-deadbeef.tmp"
-    alive = cache.directory / f".{KEY}.h5.2-deadbeef.tmp"
-    foreign = cache.directory / "measurements.h5"
-    for path in (dead, alive, foreign):
-        path.write_bytes(b"")
-    with open(alive) as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
-        assert cache.clear() == 3
-    assert sorted(cache.directory.iterdir()) == sorted([alive, foreign])
 
 
 def test_what_a_killed_writer_left_is_swept_by_the_next_reader_and_nothing_else(cache, stored):

@@ -12,7 +12,6 @@ from eigassign.output import (
     print_assignment,
     print_tables,
     print_verdict,
-    progress,
     validation_table,
 )
 from eigassign.study import ValidationRow
@@ -124,14 +123,3 @@ def test_a_validation_says_which_line_failed():
     ]
     found = [(row[2], row[5], row[-1]) for row in validation_table(rows).rows]
     assert found == [("trajectory", "0.0900 %", "ok"), ("box", "5.00 %", "FAILED")]
-
-
-def test_progress_counts_in_lines_off_terminal_and_in_place_on_one():
-    log, terminal = piped(), Terminal()
-    for stream in (log, terminal):
-        with progress("cases", 2, stream=stream) as advance:
-            advance("arm")
-            advance("leg\n")
-    assert read(log) == "cases 1/2 arm\ncases 2/2 leg\n"
-    assert "\n" not in terminal.getvalue()
-    assert terminal.getvalue().endswith("\r\x1b[2K")

@@ -1,7 +1,6 @@
 """Pictures of modes."""
 
 import io
-import json
 from pathlib import Path
 
 import numpy as np
@@ -82,15 +81,8 @@ def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> 
     assert [name for name in expected if f"gallery/{name}" not in listed] == []
 
 
-def test_the_shapes_are_left_as_numbers_too(tmp_path: Path) -> None:
-    found = pictures("four_bar", 3)
-    write_modes(found, tmp_path)
-    document = json.loads((tmp_path / "modes.json").read_text())
-    assert document["frequencies_hz"] == list(found.frequencies_hz)
-    assert [line["link"] for line in document["lines"]] == ["crank", "coupler", "follower"]
-    for k, line in enumerate(document["lines"]):
-        np.testing.assert_array_equal(line["rest"], found.rest.lines[0][k])
-        np.testing.assert_array_equal(line["deformed"][2], found.deformed.lines[2][k])
+def test_a_folder_has_a_picture_of_each_mode(tmp_path: Path) -> None:
+    write_modes(pictures("four_bar", 3), tmp_path)
     assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [
         "mode_1.png",
         "mode_2.png",

@@ -28,7 +28,7 @@ from eigassign.output.batch.summary import (
     summary_json,
     write_junit,
 )
-from eigassign.output.pages import TEMPLATES, inside, page_of
+from eigassign.output.reports.page import TEMPLATES, inside, page_of
 from eigassign.output.store.atomic import replace_synced
 from eigassign.output.tables import TONES
 

@@ -2,15 +2,11 @@
 
 In reading order; each imports from those above it only:
 
-    graph          what a graph shows, whoever draws it: curves, shades, rules; its limits
-    paper          graphs drawn with matplotlib in one style, and figures as files
-    curves         curves over time: what was asked, coordinates, drives
-    approximation  expansion against exact over time and over entries of q or y
-    meaning        sensitivities and reach
-    scene          the mechanism as parts at places: links as thick as their sections, symbols
-    mechanism      the parts as curves at one scale: poses, mode shapes
-    screen         descriptions as Plotly's data; the scene for a page
-    run            which figures a run has
-    update         measured frequencies against the model, parameters with intervals
-    front          time against error of a chart's methods
+    graph      what a graph shows, whoever draws it: curves, shades, rules; its limits
+    paper      graphs drawn with matplotlib in one style, and figures as files
+    curves     curves over time: what was asked, coordinates, drives
+    scene      the mechanism as parts at places: links as thick as their sections, symbols
+    mechanism  the parts as curves at one scale: poses, mode shapes
+    screen     descriptions as Plotly's data; the scene for a page
+    run        the figures of a run: approximation, reach, and which of all there are
 """

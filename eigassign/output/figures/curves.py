@@ -29,7 +29,7 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.study.results import ModeRow, RunResults, TargetStudy
+from eigassign.study.results import DriveRow, ModeRow, RunResults, StaticRow, TargetStudy
 
 Floats = NDArray[np.float64]
 
@@ -74,51 +74,40 @@ def coordinates(results: RunResults) -> FigurePlan:
     )
 
 
-def drives(results: RunResults) -> FigurePlan:
-    """What each drive exerts before and after, with its limit, one panel for each coordinate."""
-    panels = []
-    for row in results.drives:
-        unit, size = row.handy
-        pairs = ((row.initial_curve, _BEFORE), (row.optimal_curve, _AFTER))
-        curves = [Curve(curve / size, look) for curve, look in pairs]
+def exerted(results: RunResults, name: str) -> FigurePlan:
+    """What each of the ``drives`` exerts, or how far the nodes of ``statics`` give way.
+
+    Before and after, with its limit, one panel for each.
+    """
+    drives, panels = name == "drives", list[Panel]()
+    rows: Sequence[DriveRow | StaticRow] = results.drives if drives else results.statics
+    for k, row in enumerate(rows, 1):
+        unit, size = row.handy if isinstance(row, DriveRow) else handy_unit(row.unit, row.limit)
+        values = [curve / size for curve in (row.initial_curve, row.optimal_curve)]
         edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
-        edges = [e for e in edges if any((e * curve.y).max() > 0.0 for curve in curves)]
-        label = labelled(short(row.name, 12), unit)
+        edges = [edge for edge in edges if any((edge * v > 0.0).any() for v in values)]
+        label = short(row.name, 12) if drives else f"{k}: {row.name.partition(' ')[0]}"
+        curves = map(Curve, values, (_BEFORE, _AFTER))
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
-        panels.append(Panel(label, marks, 1.3, holds=(np.array([0.0, *edges]),)))
-    key = (*BEFORE_AND_AFTER, *((("limit", EDGE),) * any(row.limit for row in results.drives)))
-    panels[0] = replace(panels[0], key=key)
-    names, title = ", ".join(row.name for row in results.drives), "What the drives carry"
+        holds = (np.array([0.0, *edges]),)
+        panels.append(Panel(labelled(label, unit), marks, 1.3, holds=holds))
+    limited = any(row.limit for row in rows)
+    panels[0] = replace(panels[0], key=(*BEFORE_AND_AFTER, *((("limit", EDGE),) * limited)))
+    if drives:
+        title, section = "What the drives carry", "motion"
+        what = f"Torques and forces of {', '.join(row.name for row in rows)}"
+        more = f"of {results.drives[0].of}"
+    else:
+        title, section, more = "What gives way at rest", "requirements", "the drives hold"
+        what = capital(", ".join(f"{k}: {row.name}" for k, row in enumerate(rows, 1)))
+    heading = f"{title}{where(results)}"
     return FigurePlan(
-        f"drives{suffix(results)}",
-        f"{title}{where(results)}",
-        f"Torques and forces of {names} along {results.along}, of {results.drives[0].of}.",
-        f"Torques and forces of {names} over time before and after.",
-        _over_time(f"{title}{where(results)}", results, panels),
-        "motion",
-    )
-
-
-def statics(results: RunResults) -> FigurePlan:
-    """Stiffness, compliance or sag before and after, with its limit, one panel for each target."""
-    panels = []
-    for k, row in enumerate(results.statics, 1):
-        unit, size = handy_unit(row.unit, row.limit)
-        pairs = ((row.initial_curve, _BEFORE), (row.optimal_curve, _AFTER))
-        edge = np.array([row.limit / size])
-        curves = (Curve(curve / size, series) for curve, series in pairs)
-        label = labelled(f"{k}: {row.name.partition(' ')[0]}", unit)
-        panels.append(Panel(label, (Rule(float(edge[0]), EDGE), *curves), 1.6, holds=(edge,)))
-    panels[0] = replace(panels[0], key=(*BEFORE_AND_AFTER, ("limit", EDGE)))
-    title = "What gives way at rest"
-    names = ", ".join(f"{k}: {row.name}" for k, row in enumerate(results.statics, 1))
-    return FigurePlan(
-        f"statics{suffix(results)}",
-        f"{title}{where(results)}",
-        f"{capital(names)}, along {results.along}; the drives hold.",
-        f"{capital(names)} over time before and after.",
-        _over_time(f"{title}{where(results)}", results, panels),
-        "requirements",
+        f"{name}{suffix(results)}",
+        heading,
+        f"{what} along {results.along}, {more}.",
+        f"{what} over time before and after.",
+        _over_time(heading, results, panels),
+        section,
     )
 
 

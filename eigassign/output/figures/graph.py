@@ -176,7 +176,7 @@ class Graph:
 class FigurePlan:
     """One figure: its file's name without ending, heading, caption, alternative text, content.
 
-    ``section`` is that of the page that it stands in; a table of this ``title`` has its numbers.
+    ``section`` is that of the page that it stands in.
     """
 
     name: str
@@ -185,7 +185,6 @@ class FigurePlan:
     alt: str
     shows: Graph
     section: str = "appendix"
-    title: str = ""
 
 
 def segments(

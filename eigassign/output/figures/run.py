@@ -1,13 +1,106 @@
-"""The figures of a run in reading order: what its results have something to show for."""
+"""The figures of a run: approximation, reach, and which of all there are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eigassign.output.figures import approximation, curves, mechanism
-from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.meaning import meaning_figures
-from eigassign.study.results import RunResults, along_each
+import numpy as np
+
+from eigassign.facts import capital, percent
+from eigassign.output.figures import curves, graph, mechanism
+from eigassign.output.figures.curves import OPTIMAL, TARGET, suffix
+from eigassign.output.figures.graph import (
+    Curve,
+    FigurePlan,
+    Graph,
+    Look,
+    Panel,
+    Shade,
+)
+from eigassign.study.results import (
+    Comparison,
+    ModeStudy,
+    RangeRow,
+    RunResults,
+    TargetAlong,
+    TargetStudy,
+    along_each,
+)
+
+EXACT = Look(graph.GREY, 3.2)
+TAYLOR = Look(graph.VERMILLION, 1.4)
+LINEARISED = Look(graph.BLUE, 1.4, "dashed")
+
+
+def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> FigurePlan:
+    """Exact, Taylor and linearised frequency along the trajectory, and the magnitudes of errors."""
+    title = f"Mode {study.mode}: expansion against exact along {results.along}, initial design"
+    taylor, linearised = percent(comparison.worst_taylor), percent(comparison.worst_linearised)
+    frequencies = (
+        Curve(comparison.exact_hz, EXACT, "exact"),
+        Curve(comparison.taylor_hz, TAYLOR, f"Taylor, order {study.order} (worst {taylor})"),
+        Curve(comparison.linearised_hz, LINEARISED, f"linearised in y (worst {linearised})"),
+    )
+    errors = tuple(
+        Curve(100.0 * np.where(np.isfinite(error), np.abs(error), np.nan), look)
+        for error, look in (
+            (comparison.taylor_error, TAYLOR),
+            (comparison.linearised_error, LINEARISED),
+        )
+    )
+    panels = (
+        Panel("frequency [Hz]", frequencies, 1.9),
+        Panel("|error| [%]", errors, 1.35, logarithmic=True),
+    )
+    return FigurePlan(
+        f"approximation_mode_{study.mode}_time{suffix(results)}",
+        f"Mode {study.mode}: expansion along {results.along}",
+        "Exact, Taylor and linearised frequency at the initial design. Worst error "
+        f"{taylor} for the full expansion, {linearised} for the partially linearised one.",
+        f"Frequency of mode {study.mode} over time and the errors of both expansions.",
+        Graph(title, "time [s]", results.time_s, panels),
+    )
+
+
+def reach_figures(results: RunResults) -> Iterator[FigurePlan]:
+    """The frequencies within the bounds of each target."""
+    reach = {row.label: row for row in results.meaning.reach}
+    number = 0
+    for target in results.targets:
+        shown = reach.get(target.label)
+        if shown is None or not target.asked.terms:
+            continue
+        for along in target.along:
+            number += 1
+            yield ranges(results, target, along, shown, number)
+
+
+def ranges(
+    results: RunResults,
+    target: TargetStudy,
+    along: TargetAlong,
+    row: RangeRow,
+    number: int,
+) -> FigurePlan:
+    """The answer inside the frequencies of all designs within the bounds."""
+    several = len(results.trajectories) > 1
+    place, clock = f" along {along.name!r}" if several else "", along.name if several else ""
+    low, high = row.lowest_hz[along.rows], row.highest_hz[along.rows]
+    curves = (
+        Curve(target.exact_hz[along.rows], OPTIMAL, "answer"),
+        Curve(target.asked.hz[along.rows], TARGET, "wanted"),
+    )
+    shade = Shade(low, high, graph.GREY, "within the bounds", 0.35)
+    panel = Panel(f"{target.asked.axis} [Hz]", (shade, *curves), 2.4, holds=(low, high))
+    time_s = results.time_s[target.asked.rows][along.rows]
+    return FigurePlan(
+        f"range_{number}",
+        f"{capital(target.label)}: reach{place}",
+        f"All designs within the bounds ({row.how}): least error {percent(row.error)}.",
+        "The answer's frequency over time inside the range of others.",
+        Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,), clock=clock),
+        "depends",
+    )
 
 
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
@@ -23,12 +116,12 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     if any(results.poses.lines):
         yield mechanism.poses(results.case.title, results.poses)
     asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
-    yield from (curves.statics(one) for one in each if one.statics)
-    yield from meaning_figures(results)
-    yield from (curves.drives(one) for one in each if asked)
+    yield from (curves.exerted(one, "statics") for one in each if one.statics)
+    yield from reach_figures(results)
+    yield from (curves.exerted(one, "drives") for one in each if asked)
     yield from (curves.coordinates(one) for one in each if one.q.size)
     for k, study in enumerate(results.studies):
         for one in each:
             comparison = one.studies[k].over_time
             if comparison is not None and comparison.exact_hz.size:
-                yield approximation.over_time(one, study, comparison)
+                yield over_time(one, study, comparison)

@@ -2,15 +2,18 @@
 
 A page begins with the verdict. A full one plots in the browser with Plotly's own script, which it
 carries; a light one shows figures as pictures and has no script. `write_run` leaves everything that
-a run shows, `write_modes` the mode shapes as figures and as numbers.
+a run shows, `write_modes` the mode shapes as figures.
 """
 
 from __future__ import annotations
 
 import base64
 import json
+import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -19,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign._version import __version__
 from eigassign.facts import about, capital, number, percent
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
@@ -27,17 +29,65 @@ from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figure
-from eigassign.output.pages import TEMPLATES, inside, page_of, today
 from eigassign.output.result_files import sample_files
 from eigassign.output.tables import SECTIONS, TONES, Table, headline, run_tables, violated
 from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetStudy
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
+
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
 
-
 Floats = NDArray[np.float64]
+TEMPLATES = Path(__file__).parents[1] / "templates"
+
+
+def today() -> str:
+    """The date as people write it, ``26 November 2026``; that of SOURCE_DATE_EPOCH if it is set."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    day = (
+        datetime.fromtimestamp(int(given), UTC)
+        if given.isdecimal()
+        else datetime.now().astimezone()
+    )
+    return f"{day.day} {day:%B %Y}"
+
+
+def page_of(name: str, **shown: Any) -> bytes:
+    """The page of the template ``name`` as UTF-8."""
+    html = _environment().get_template(name).render(**shown)
+    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+
+
+@cache
+def _environment() -> Environment:
+    """Templates are compiled once a process."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup, escape
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+    def words(text: str) -> Markup:
+        """Text with what stands between backticks as code, and no markup of its own."""
+        return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+    environment.filters |= {"words": words, "number": number}
+    return environment
+
+
+def inside(data: Any) -> str:
+    """JSON that no browser takes for the end of its script."""
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
 # --- The first screen
 
 MOST = 8  # findings on the first screen
@@ -236,12 +286,12 @@ def page(
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page; a table that has the numbers of a figure is below it, folded."""
+    """A part of a page."""
 
     key: str
     heading: str
     tables: tuple[Table, ...]
-    figures: tuple[tuple[Shown, Table | None], ...]
+    figures: tuple[Shown, ...]
 
 
 def _sections(
@@ -249,10 +299,10 @@ def _sections(
 ) -> Iterator[Section]:
     """The sections that there is something in; what is in none of them is the appendix's."""
     for key, heading in {**headings, "appendix": "Appendix"}.items():
-        own = {table.title: table for table in tables if table.section == key}
-        drawn = [(one, own.pop(one.plan.title, None)) for one in figures if one.plan.section == key]
+        own = tuple(table for table in tables if table.section == key)
+        drawn = tuple(one for one in figures if one.plan.section == key)
         if own or drawn:
-            yield Section(key, heading, tuple(own.values()), tuple(drawn))
+            yield Section(key, heading, own, drawn)
 
 
 @cache
@@ -339,30 +389,5 @@ def write_figures(
 
 
 def write_modes(pictures: ModePictures, folder: Path, formats: Sequence[str] = ("png",)) -> None:
-    """figures/mode_1.png, … and modes.json."""
+    """figures/mode_1.png, …."""
     write_figures(mode_figures(pictures), folder, formats)
-    text = json.dumps(document(pictures), ensure_ascii=False, allow_nan=False)
-    (folder / "modes.json").write_text(text + "\n", encoding="utf-8")
-
-
-def document(pictures: ModePictures) -> dict[str, Any]:
-    """The modes as numbers: ``rest`` and, mode by mode, ``deformed`` points of every line in m."""
-    rest = pictures.rest
-    lines = [
-        {
-            "link": link,
-            "rest": points.tolist(),
-            "deformed": [mode[k].tolist() for mode in pictures.deformed.lines],
-        }
-        for k, (link, points) in enumerate(zip(rest.line_links, rest.lines[0], strict=True))
-    ]
-    return {
-        "eigassign_version": __version__,
-        "title": pictures.title,
-        "q": {name: {"value": value, "unit": unit} for name, value, unit in pictures.q},
-        "y": {name: {"value": value, "unit": unit} for name, value, unit in pictures.y},
-        "rigid_modes": pictures.rigid_modes,
-        "frequencies_hz": list(pictures.frequencies_hz),
-        "amplitude": pictures.amplitude,
-        "lines": lines,
-    }

@@ -1,4 +1,4 @@
-"""What an update leaves: its tables, for console and report; results.json, and the report."""
+"""What an update leaves: its figures and tables; results.json, and the report."""
 
 from __future__ import annotations
 
@@ -6,11 +6,115 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eigassign.output.documents import to_json
-from eigassign.output.figures.update import update_figures
+from eigassign.output.figures import graph
+from eigassign.output.figures.curves import LEVEL
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
-from eigassign.study.updating.fit import UpdateResults
+from eigassign.study.updating.fit import OUTLIER, UpdateResults
+
+Floats = NDArray[np.float64]
+_BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
+_AFTER = Look(graph.BLUE, 0.0, marker="o")
+_DEVIATION = Look(graph.BLACK, 1.2)
+_STEM = Look(graph.BLUE, 1.2)
+_OUTLIER = Look(graph.GREY, 0.9, "dashed")
+_INTERVAL = Look(graph.SKY, 5.0)
+
+
+def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
+    """Measurements against the model, and the intervals of the parameters."""
+    after = max((abs(row.residual) for row in results.measurements), default=0.0)
+    return (
+        FigurePlan(
+            "measurements",
+            "Measured frequencies and the model",
+            "The model's frequencies against the measured ones, whose bars are one standard "
+            f"deviation. The worst is {after:.2g} standard deviations off after updating.",
+            "Measured frequencies with error bars, and those of the model before and after.",
+            _measurements(results),
+            "answer",
+        ),
+        FigurePlan(
+            "parameters",
+            "Parameters with their 95 % intervals",
+            "Each parameter between its bounds: as in the file, as updated, and the interval of "
+            "values that the measurements allow while the others are fitted anew.",
+            "One line for each parameter between its bounds, with its interval.",
+            _parameters(results),
+            "parameters",
+        ),
+    )
+
+
+def _measurements(results: UpdateResults) -> Graph:
+    """Frequencies relative to the measured ones above, standardised residuals below."""
+    rows = results.measurements
+    at = np.arange(1.0, len(rows) + 1.0)
+    measured = np.array([row.measured_hz for row in rows])
+    before, after = (
+        100.0 * (np.array([getattr(row, when) for row in rows]) / measured - 1.0)
+        for when in ("initial_hz", "updated_hz")
+    )
+    names = tuple(f"{row.label}, mode {row.mode}" for row in rows)
+    above: tuple[Mark, ...] = (
+        Rule(0.0, LEVEL),
+        _deviations(at, 100.0 * np.array([row.deviation_hz for row in rows]) / measured),
+        Curve(before, _BEFORE, "model before", names=names),
+        Curve(after, _AFTER, "model after", names=names),
+    )
+    residual = np.array([row.residual for row in rows])
+    below: tuple[Mark, ...] = (
+        Rule(0.0, LEVEL),
+        *(Rule(limit, _OUTLIER) for limit in (-OUTLIER, OUTLIER)),
+        graph.segments(at, np.zeros(at.size), residual, _STEM),
+        Curve(residual, _AFTER, names=names),
+    )
+    room = np.array([-OUTLIER - 0.5, OUTLIER + 0.5])
+    panels = (
+        Panel("off the measured [%]", above, 2.2),
+        Panel("residual [σ]", below, 1.6, holds=(room,)),
+    )
+    ends = 0.4, at.size + 0.6
+    title = "Measured frequencies and the model"
+    return Graph(title, "measurement", at, panels, x_limits=ends)
+
+
+def _deviations(at: Floats, bars: Floats) -> Mark:
+    """One standard deviation to either side of each measurement: bars, a band where they merge."""
+    label = "measured ± standard deviation"
+    if at.size > 150:
+        return Shade(-bars, bars, graph.GREY, label, 0.35)
+    return graph.segments(at, -bars, bars, _DEVIATION, label)
+
+
+def _parameters(results: UpdateResults) -> Graph:
+    """One line a parameter from bound to bound, with its interval and value."""
+    rows = [row for row in results.parameters if row.upper > row.lower]
+    at = -np.arange(float(len(rows)))
+    low, high, value, initial = (
+        np.array([(getattr(row, of) - row.lower) / (row.upper - row.lower) for row in rows])
+        for of in ("low", "high", "value", "initial")
+    )
+    names = tuple(
+        f"{row.name} = {row.value / size:.4g} {unit}".rstrip()  # k1 = 52.47 kN m/rad
+        for row in rows
+        for unit, size in [row.handy]
+    )
+    curves = (
+        graph.segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
+        Curve(at, _BEFORE, "before", initial, names=names),
+        Curve(at, _AFTER, "after", value, names=names),
+    )
+    room = np.array([0.5, 0.5 - len(rows)])
+    panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
+    title, label = "Parameters with their 95 % intervals", "from bound to bound"
+    return Graph(title, label, np.zeros(0), (panel,), x_limits=(-0.02, 1.02))
+
 
 SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 
@@ -19,12 +123,12 @@ SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
     """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
-    sections = {"parameters": _parameters(results), "fit": _fit(results, most)}
+    sections = {"parameters": _found(results), "fit": _fit(results, most)}
     every = (replace(table, section=key) for key, own in sections.items() for table in own)
     return tuple(table for table in every if table.rows)
 
 
-def _parameters(results: UpdateResults) -> Iterator[Table]:
+def _found(results: UpdateResults) -> Iterator[Table]:
     """Parameters before and after, with intervals; what cannot be told; of several minima all."""
     caption = (
         "Deviation: standard deviation of the linear model. Interval: 95 % by the profile "

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import EigassignError, StorageError, UsageError
+from eigassign.errors import EigassignError, UsageError
 from eigassign.files import CACHE, at_home, raised, read_bytes
 from eigassign.output.store.atomic import replace_synced, sweep_files
 
@@ -112,19 +112,6 @@ class Cache:
                 self._trim()
         except OSError as error:
             self._warn(f"the cache cannot be written ({error}); going on without it")
-
-    def clear(self) -> int:
-        """Delete all entries, damaged ones too, and temporary files of killed writers.
-
-        Returns how many. Raises StorageError when one cannot be deleted.
-        """
-        swept, files = sweep_files(self.directory, _is_ours), self._by_age()
-        for _, _, path in files:
-            try:
-                path.unlink(missing_ok=True)
-            except OSError as error:
-                raise StorageError(f"cannot delete {path}: {error.strerror}") from error
-        return len(files) + swept
 
     def _trim(self) -> None:
         """Delete the oldest files until all are within the limit; another process may, too."""
