@@ -10,5 +10,4 @@ Read in this order; each imports only from those above it:
     build             from a case to its pencil
     mode_shapes       the total mass; displacements of nodes and beams in [u; q̇]
     dynamics          what motion and loads add to eq. (1), at a pose
-    sagged            the mechanism as its weight has bent it, assembled anew
 """
