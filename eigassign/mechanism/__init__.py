@@ -28,7 +28,7 @@ __all__, __getattr__, __dir__ = face(
         "forces": "DriveForces drive_forces",
         "elements.beam": "fields",
         "elements.superelement": "free_part_lines part_lines",
-        "elements.mesh": "total",
+        "elements.links": "total",
         "elements.sections": "section_values",
         "elements.craig_bampton": "factorise kept_factor largest_beside",
         "imports.parts": "imported_part matrix_of read_contents",

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.mesh import LinkMesh, Lost
+from eigassign.mechanism.elements.links import LinkMesh, Lost
 from eigassign.mechanism.kinematics.joints import Objects
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes

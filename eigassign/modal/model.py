@@ -29,7 +29,7 @@ from eigassign.mechanism.assembly.mode_shapes import (
     shapes,
 )
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.mesh import LinkMesh
+from eigassign.mechanism.elements.links import LinkMesh
 from eigassign.mechanism.forces import DriveForces, drive_forces
 from eigassign.mechanism.kinematics.forward import Kinematics, LinkFrames
 from eigassign.mechanism.kinematics.parameters import Label

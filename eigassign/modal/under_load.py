@@ -52,8 +52,7 @@ from eigassign.mechanism.assembly.dynamics.under_load import Beams, LoadedPose
 from eigassign.mechanism.assembly.mode_shapes import shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import factorise
-from eigassign.mechanism.elements.links import BentElement, bent_link
-from eigassign.mechanism.elements.mesh import LinkMesh, Strand
+from eigassign.mechanism.elements.links import BentElement, LinkMesh, Strand, bent_link
 from eigassign.mechanism.elements.sections import Profile, each_element
 from eigassign.mechanism.forces import Forces, forces
 from eigassign.mechanism.kinematics.forward import LinkFrames

@@ -26,8 +26,7 @@ from eigassign.mechanism.assembly.pencil import (
 )
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
-from eigassign.mechanism.elements.links import copies_of, link_mesh
-from eigassign.mechanism.elements.mesh import LinkMesh
+from eigassign.mechanism.elements.links import LinkMesh, copies_of, link_mesh
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.joints import DOFS, Floats
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference

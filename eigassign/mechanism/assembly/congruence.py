@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import AffineEntries, Row
-from eigassign.mechanism.elements.mesh import Reduction, Term, total
+from eigassign.mechanism.elements.links import Reduction, Term, total
 from eigassign.mechanism.kinematics.joints import multiply, scaled, some
 from eigassign.series.expression import Scalar
 

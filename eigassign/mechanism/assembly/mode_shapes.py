@@ -26,10 +26,10 @@ from eigassign.mechanism.assembly.congruence import (
     motion_scalars,
 )
 from eigassign.mechanism.elements.beam import Shear, fields
-from eigassign.mechanism.elements.links import axes
-from eigassign.mechanism.elements.mesh import (
+from eigassign.mechanism.elements.links import (
     LinkMesh,
     Strand,
+    axes,
     element_motion,
 )
 from eigassign.mechanism.kinematics.forward import LinkFrames, Placement

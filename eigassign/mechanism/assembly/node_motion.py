@@ -33,7 +33,7 @@ from scipy import linalg
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.pencil import AffineEntries
-from eigassign.mechanism.elements.mesh import LinkMesh
+from eigassign.mechanism.elements.links import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
 from eigassign.mechanism.kinematics.joints import (
     DOFS,

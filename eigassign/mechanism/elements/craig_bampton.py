@@ -33,7 +33,7 @@ from scipy.sparse import linalg
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import StaticTarget
 from eigassign.errors import AccuracyError, MechanismError
-from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
+from eigassign.mechanism.elements.links import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported, link_type
 
 Floats = NDArray[np.float64]

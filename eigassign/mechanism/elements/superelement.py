@@ -31,7 +31,7 @@ from eigassign.mechanism.elements.craig_bampton import (
     kept_factor,
     largest_modes,
 )
-from eigassign.mechanism.elements.mesh import (
+from eigassign.mechanism.elements.links import (
     Entries,
     LinkMesh,
     Lost,

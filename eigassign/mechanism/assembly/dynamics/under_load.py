@@ -58,7 +58,7 @@ from eigassign.mechanism.elements.beam import (
     shear,
 )
 from eigassign.mechanism.elements.craig_bampton import factorise
-from eigassign.mechanism.elements.mesh import Entries, Strand
+from eigassign.mechanism.elements.links import Entries, Strand
 from eigassign.mechanism.elements.sections import SHARES, STATIONS, BeamValues, Profile
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.joints import DOFS, Objects, present

@@ -40,7 +40,7 @@ from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.elements.beam import fields
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term
+from eigassign.mechanism.elements.links import Entries, LinkMesh, Strand, Term
 from eigassign.mechanism.elements.sections import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.joints import CROSS, DOFS, Objects

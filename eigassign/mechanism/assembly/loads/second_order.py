@@ -68,7 +68,7 @@ from eigassign.mechanism.elements.beam import (
     shares,
     stretched_slopes,
 )
-from eigassign.mechanism.elements.mesh import LinkMesh, Term
+from eigassign.mechanism.elements.links import LinkMesh, Term
 from eigassign.mechanism.kinematics.forward import walked
 from eigassign.mechanism.kinematics.joints import (
     DOFS,

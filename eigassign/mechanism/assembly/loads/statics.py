@@ -32,7 +32,7 @@ from eigassign.mechanism.assembly.node_motion import (
     SpringMotion,
     pivots,
 )
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, add_bodies, summed
+from eigassign.mechanism.elements.links import Entries, LinkMesh, add_bodies, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
 from eigassign.mechanism.kinematics.joints import (
     DOFS,

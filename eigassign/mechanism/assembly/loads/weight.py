@@ -36,7 +36,7 @@ from eigassign.mechanism.assembly.loads.statics import (
 from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Strand, Term, summed
+from eigassign.mechanism.elements.links import Entries, LinkMesh, Strand, Term, summed
 from eigassign.mechanism.kinematics.joints import (
     DOFS,
     Floats,
