@@ -26,13 +26,24 @@ from eigassign.mechanism.assembly.pencil import (
 )
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
-from eigassign.mechanism.elements.links import LinkMesh, copies_of, link_mesh
+from eigassign.mechanism.elements.links import (
+    LinkMesh,
+    beam_mesh,
+    copies_of,
+    frame_mesh,
+    rigid_link,
+)
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.joints import DOFS, Floats
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
-from eigassign.mechanism.kinematics.parameters import ModelParameters, property_limits, rails
+from eigassign.mechanism.kinematics.parameters import (
+    ModelParameters,
+    link_type,
+    property_limits,
+    rails,
+)
 from eigassign.mechanism.kinematics.parameters import parameters as variables
-from eigassign.mechanism.kinematics.topology import build_tree, coordinates
+from eigassign.mechanism.kinematics.topology import Topology, build_tree, coordinates
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Scalar
 
@@ -190,9 +201,27 @@ def _meshes(
     for name in (p.link for p in motion.placements if p.link not in found):
         key = copies.get(name, name)
         if key not in made:
-            made[key] = link_mesh(case, known, motion.tree, name)
+            made[key] = _link_mesh(case, known, motion.tree, name)
         found[name] = made[key]
     return {p.link: found[p.link] for p in motion.placements}
+
+
+def _link_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
+    """The mesh of one link with all its dofs, its bodies included."""
+    match link_type(case, name):
+        case "rigid":
+            return rigid_link(case, parameters, tree, name)
+        case "frame":
+            return frame_mesh(case, parameters, name)
+        case "superelement":
+            from eigassign.mechanism.elements.superelement import superelement_mesh
+
+            return superelement_mesh(case, parameters, name)
+        case "solid":
+            from eigassign.mechanism.elements.superelement import solid_mesh
+
+            return solid_mesh(case, parameters, name)
+    return beam_mesh(case, parameters, tree, name)
 
 
 def local_links(

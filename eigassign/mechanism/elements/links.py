@@ -278,24 +278,6 @@ def rigid_link(case: CaseFile, parameters: ModelParameters, tree: Topology, name
     return LinkMesh(width, nodes, arms, [], mass.terms(), rigid)
 
 
-def link_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
-    """The mesh of one link with all its dofs, its bodies included."""
-    match link_type(case, name):
-        case "rigid":
-            return rigid_link(case, parameters, tree, name)
-        case "frame":
-            return _frame(case, parameters, name)
-        case "superelement":
-            from eigassign.mechanism.elements.superelement import superelement_mesh
-
-            return superelement_mesh(case, parameters, name)
-        case "solid":
-            from eigassign.mechanism.elements.superelement import solid_mesh
-
-            return solid_mesh(case, parameters, name)
-    return _beam(case, parameters, tree, name)
-
-
 def copies_of(
     case: CaseFile, parameters: ModelParameters, tree: Topology
 ) -> dict[str, tuple[object, ...]]:
@@ -364,7 +346,7 @@ class _Beams:
         return LinkMesh(self.n_local, nodes, places, *terms, strands)
 
 
-def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
+def beam_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
     """A straight beam along x, in two segments where a carriage or nut rides on it."""
     link: Any = case.mechanism.links[name]
     total, n = length(case, parameters, name), link.elements
@@ -440,7 +422,7 @@ def _rolled(beam: Any) -> Floats:
 # --- frames: links of several beams
 
 
-def _frame(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
+def frame_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
     """Nodes joined by beams, each in as many elements as asked for; nodes are rigid connections."""
     link: Any = case.mechanism.links[name]
     points = [np.array([*map(float, X), 0.0][:3]) for X in link.nodes.values()]

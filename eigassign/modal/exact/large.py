@@ -371,14 +371,13 @@ def _converged(one: Galerkin, count: int) -> tuple[Floats, tuple[Floats, Floats,
 
 def solve_large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     """Modes at θ (n_theta, n_samples): together where that works, else one by one."""
-    parts = range(0, theta.shape[1], 256)  # so many at once, for memory
-    found = [_large(pencil, theta[:, i : i + 256], count, vectors) for i in parts]
+    found = []
+    for i in range(0, theta.shape[1], 256):  # so many at once, for memory
+        some = theta[:, i : i + 256]
+        many = some.shape[1] >= FEWEST
+        together = solve_together(pencil, some, count, vectors) if many else None
+        found.append(together or solve_sparse(pencil, some, count, vectors))
     return Modes(np.concatenate([f.lam for f in found]), np.concatenate([f.phi for f in found]))
-
-
-def _large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
-    together = solve_together(pencil, theta, count, vectors) if theta.shape[1] >= FEWEST else None
-    return together or solve_sparse(pencil, theta, count, vectors)
 
 
 def solve_together(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes | None:
