@@ -79,7 +79,7 @@ class ReducedModel:
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
-        return self.stiffness.matrices.shape[1]
+        return int(self.stiffness.matrices.shape[1])
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n_samples, n_modes) in Hz.
