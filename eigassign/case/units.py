@@ -151,22 +151,9 @@ def handy(amount: float, unit: str) -> str:
 
 
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}
-_PREFIXED: tuple[tuple[str, str, Exponents], ...] = (  # the µ of two: micro sign, Greek mu
-    ("m", "n u µ μ m c k", (0, 1, 0, 0, 0)),
-    ("s", "u µ μ m", (0, 0, 1, 0, 0)),
-    ("N", "m k M", (1, 1, -2, 0, 0)),
-    ("Nm", "k", (1, 2, -2, 0, 0)),
-    ("Pa", "k M G T", (1, -1, -2, 0, 0)),
-    ("Hz", "m k M", (0, 0, -1, 0, 1)),
-    ("rad", "m", (0, 0, 0, 1, 0)),
-)
 ONE = Unit(Fraction(1), (0, 0, 0, 0, 0))
-_KG: Exponents = (1, 0, 0, 0, 0)
 UNITS: dict[str, Unit] = {
-    "mg": Unit(Fraction(1, 10**6), _KG),
-    "g": Unit(Fraction(1, 1000), _KG),
-    "kg": Unit(Fraction(1), _KG),
-    "t": Unit(Fraction(1000), _KG),
+    "t": Unit(Fraction(1000), (1, 0, 0, 0, 0)),
     "min": Unit(Fraction(60), (0, 0, 1, 0, 0)),
     "h": Unit(Fraction(3600), (0, 0, 1, 0, 0)),
     "deg": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
@@ -177,10 +164,19 @@ UNITS: dict[str, Unit] = {
     "rpm": Unit(Fraction(1, 60), (0, 0, -1, 0, 1)),
     "%": Unit(Fraction(1, 100), ONE.exponents),
 }
-for _unit, _prefixes, _exponents in _PREFIXED:
-    UNITS[_unit] = Unit(Fraction(1), _exponents)
+for _unit, _prefixes, _own in (  # the µ of two: micro sign, Greek mu
+    ("g", "m k", Unit(Fraction(1, 1000), (1, 0, 0, 0, 0))),
+    ("m", "n u µ μ m c k", Unit(Fraction(1), (0, 1, 0, 0, 0))),
+    ("s", "u µ μ m", Unit(Fraction(1), (0, 0, 1, 0, 0))),
+    ("N", "m k M", Unit(Fraction(1), (1, 1, -2, 0, 0))),
+    ("Nm", "k", Unit(Fraction(1), (1, 2, -2, 0, 0))),
+    ("Pa", "k M G T", Unit(Fraction(1), (1, -1, -2, 0, 0))),
+    ("Hz", "m k M", Unit(Fraction(1), (0, 0, -1, 0, 1))),
+    ("rad", "m", Unit(Fraction(1), (0, 0, 0, 1, 0))),
+):
+    UNITS[_unit] = _own
     for _p in _prefixes.split():
-        UNITS[_p + _unit] = Unit(Fraction(10) ** _PREFIXES[_p], _exponents)
+        UNITS[_p + _unit] = Unit(Fraction(10) ** _PREFIXES[_p] * _own.factor, _own.exponents)
 
 TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degrees
 

@@ -192,12 +192,7 @@ class SomeModes(AnyTarget):
 
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
-
-    @model_validator(mode="after")
-    def _names_them_once(self) -> Self:
-        if self.mode is not None and self.modes is not None:
-            raise wrong("mode is given already: one of them is enough", "modes")
-        return self
+    _names_them_once = one_of("mode", "modes", needed=False)
 
 
 class ModeTarget(SomeModes):
