@@ -44,7 +44,9 @@ __all__, __getattr__, __dir__ = face(
         "kinematics.topology": "JointEdge",
         "solids.mesh_file": "read_mesh",
         "solids.part": "Coupling joined solid_part",
-        "trajectory.motion": "read_samples timing_law",
-        "trajectory.trajectory": "NamedTrajectory Trajectories Trajectory build_trajectory rates",
+        "trajectory.motion": "timing_law",
+        "trajectory.trajectory": (
+            "NamedTrajectory Trajectories Trajectory build_trajectory rates read_samples"
+        ),
     },
 )

@@ -15,7 +15,7 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.trajectory.motion import TIME, TIP_COLUMNS
+from eigassign.mechanism.trajectory.trajectory import TIME, TIP_COLUMNS
 from eigassign.study.results import RunResults, TargetStudy, TrajectoryRow
 
 Floats = NDArray[np.float64]

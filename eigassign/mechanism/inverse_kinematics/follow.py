@@ -49,6 +49,7 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     trace,
 )
+from eigassign.mechanism.kinematics.loop_closure import wrapped
 
 
 def pose(ik: TipProblem, u: Floats) -> str:
@@ -302,7 +303,7 @@ def _distinct(ik: TipProblem, u: Floats) -> list[Floats]:
         if ik.start is not None:
             return (float(np.linalg.norm((candidate - ik.start)[: ik.n_q])),)
         turns = ik.chain.of_kind("turn")[: ik.n_q]
-        bend = _wrapped(ik.joint_coordinates(candidate[None])[0])[turns][1:].round(6)
+        bend = wrapped(ik.joint_coordinates(candidate[None])[0])[turns][1:].round(6)
         return (round(float(bend @ bend), 6), *(-bend))
 
     turns = ik.chain.of_kind("turn")
@@ -310,20 +311,15 @@ def _distinct(ik: TipProblem, u: Floats) -> list[Floats]:
     for candidate in sorted(_normalised(ik, u, turns), key=preference):
         apart = (candidate - other for other in distinct)
         # solutions nearer than 1e-4 rad, or of L, are one
-        if all(np.abs(np.where(turns, _wrapped(d), d)).max() > 1e-4 for d in apart):
+        if all(np.abs(np.where(turns, wrapped(d), d)).max() > 1e-4 for d in apart):
             distinct.append(candidate)
     return distinct
-
-
-def _wrapped(angle: Floats) -> Floats:
-    """The same angle in [−π, π)."""
-    return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def _normalised(ik: TipProblem, u: Floats, turns: Bools) -> Floats:
     """The same pose within π of the start, else in [0, 2π), where round-off below 0 stays 0."""
     if ik.start is not None:
-        return np.where(turns, ik.start + _wrapped(u - ik.start), u)
+        return np.where(turns, ik.start + wrapped(u - ik.start), u)
     turned = np.mod(u, 2.0 * np.pi)
     # 1e-9 rad below 2π is taken for round-off below 0
     turned = np.where(turned >= 2.0 * np.pi - 1e-9, turned - 2.0 * np.pi, turned)

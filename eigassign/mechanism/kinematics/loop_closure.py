@@ -277,11 +277,11 @@ class _Branches:
         turning = np.array([kind != "translation" for kind in kinds], dtype=bool)
         distinct: list[Floats] = []
         for candidate in p[self._missed(p) < ACCEPT]:
-            turned = _wrapped(candidate)
+            turned = wrapped(candidate)
             for k in self._balls if several else ():
                 if abs(turned[k + 1]) > np.pi / 2:
                     alpha, beta, gamma = turned[k : k + 3]
-                    turned[k : k + 3] = _wrapped(np.array([alpha, -beta, gamma]) + np.pi)
+                    turned[k : k + 3] = wrapped(np.array([alpha, -beta, gamma]) + np.pi)
             near = np.where(turning & several, turned, candidate)
             apart = (near - d for d in distinct)  # full turns not counted
             # solutions within 1e-6 rad or m are one: Newton settles at round-off
@@ -424,7 +424,7 @@ def kronecker(count: int, n: int) -> Floats:
     return np.mod(0.5 + np.arange(count)[:, None] * g ** -np.arange(1.0, n + 1.0), 1.0)
 
 
-def _wrapped(angles: Floats) -> Floats:
+def wrapped(angles: Floats) -> Floats:
     """The same angles in [−π, π)."""
     return np.asarray(np.mod(angles + np.pi, 2.0 * np.pi) - np.pi)
 

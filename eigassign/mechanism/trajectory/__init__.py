@@ -2,6 +2,6 @@
 
 Read in this order; each imports only from those above it:
 
-    motion      samples from CSV files; q, q̇ and q̈ at any time: of points, of samples, of a tip
-    trajectory  the trajectory of a case; several together; rates q̇ and q̈
+    motion      q, q̇ and q̈ at any time: of points, of samples, of a tip
+    trajectory  the trajectory of a case, from CSV files too; several together; rates q̇ and q̈
 """

@@ -1,7 +1,4 @@
-"""q, q̇ and q̈ at any time of a trajectory, exactly; timing laws s(τ); samples from CSV files.
-
-s and rad (m for strokes) are meant where no unit is written; see `eigassign.case.table`. The
-columns of the tip that runs write (`tip x [m]`, …) are passed over without a note.
+"""q, q̇ and q̈ at any time of a trajectory, exactly; timing laws s(τ).
 
 Point to point, q(t) runs between joint coordinates, each segment by the same timing law.
 
@@ -17,17 +14,13 @@ Shapes: n times, m points, n_q coordinates, n_z entries of a state u. SI units, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.table import CsvColumn, read_table
-from eigassign.case.units import DIMENSIONS
-from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import Course, Curve, through
 from eigassign.mechanism.inverse_kinematics.follow import (
     Followed,
@@ -38,58 +31,15 @@ from eigassign.mechanism.inverse_kinematics.follow import (
 from eigassign.mechanism.inverse_kinematics.solver import TipProblem
 
 Floats = NDArray[np.float64]
-_KEY = "trajectory.file"
-TIME = "time"
-TIP_COLUMNS = ("tip x", "tip y", "tip z")
-_KINDS = {"rad": "angle", "m": "length"}
-
-
-class SampleTable(NamedTuple):
-    """Samples as a file gives them, in SI units, with notes on what was ignored."""
-
-    time_s: Floats  # (n,) strictly increasing
-    q: Floats  # (n, n_q) in rad or m
-    notes: tuple[str, ...]
-
-
-def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
-    """One for each coordinate; ``q_units`` are "rad" or "m", all rad if empty."""
-    units = q_units or ["rad"] * len(q_names)
-    return [
-        CsvColumn(name, (DIMENSIONS[_KINDS[unit]],))
-        for name, unit in zip(q_names, units, strict=True)
-    ]
-
-
-def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()) -> SampleTable:
-    """Samples of the coordinates ``q_names`` from a CSV file, in SI units.
-
-    ``q_units`` are those of the coordinates, "rad" or "m"; all rad if empty.
-
-    Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
-    TrajectoryError for a line that does not hold one finite number a column, or goes back in time;
-    both name the line.
-    """
-    columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
-    table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
-    if len(table.lines) < 2:
-        message = f"{file.name}: {len(table.lines)} samples; at least two are needed"
-        raise MechanismError(_KEY, message)
-    values = np.column_stack([table.numbers[column.name] for column in columns])
-    time_s = values[:, 0].copy()
-    for k in np.flatnonzero(np.diff(time_s) <= 0.0).tolist():
-        before, after = time_s[k : k + 2]
-        message = f"time must increase, and goes from {before:g} s to {after:g} s"
-        raise TrajectoryError(_KEY, f"{table.where(k + 1)}: {message}", k + 1)
-    return SampleTable(time_s, np.ascontiguousarray(values[:, 1:]), table.notes)
-
 
 # --- timing laws s(τ) on 0 ≤ τ ≤ 1
 
-_POLYNOMIALS = {
-    "linear": (0.0, 1.0),
-    "cubic": (0.0, 0.0, 3.0, -2.0),
-    "quintic": (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
+_THIRDS = [[0.0, 0.25, 0.75], [0.0, 1.5, 1.5], [2.25, 0.0, -2.25]]
+_LAWS: dict[str, tuple[list[float], list[list[float]]]] = {  # knots and coefficients
+    "linear": ([0.0, 1.0], [[0.0], [1.0]]),
+    "cubic": ([0.0, 1.0], [[0.0], [0.0], [3.0], [-2.0]]),
+    "quintic": ([0.0, 1.0], [[0.0], [0.0], [0.0], [10.0], [-15.0], [6.0]]),
+    "trapezoidal": ([0.0, 1 / 3, 2 / 3, 1.0], _THIRDS),
 }
 
 
@@ -97,16 +47,10 @@ def timing_law(name: str) -> Curve:
     """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
     trapezoidal: 9τ²/4 for a third of the time, then 1/4 + 3(τ − 1/3)/2, then braking alike.
 
-    All but linear start and stop at rest, quintic also without acceleration. UsageError for other
-    names.
+    All but linear start and stop at rest, quintic also without acceleration.
     """
-    if name in _POLYNOMIALS:
-        return Curve(np.array([0.0, 1.0]), np.array(_POLYNOMIALS[name])[:, None, None])
-    if name != "trapezoidal":
-        known = ", ".join((*_POLYNOMIALS, "trapezoidal"))
-        raise UsageError(f"unknown timing law {name!r}; there are {known}")
-    pieces = np.array([[0.0, 0.25, 0.75], [0.0, 1.5, 1.5], [2.25, 0.0, -2.25]])
-    return Curve(np.array([0.0, 1 / 3, 2 / 3, 1.0]), pieces[..., None])
+    knots, coefficients = (np.array(each) for each in _LAWS[name])
+    return Curve(knots, coefficients[..., None])
 
 
 # --- point to point

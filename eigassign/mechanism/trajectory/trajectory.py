@@ -29,7 +29,9 @@ from eigassign.case.schema.trajectory import (
     SampledTrajectory,
     TipTrajectory,
 )
-from eigassign.errors import TrajectoryError, UsageError
+from eigassign.case.table import CsvColumn, read_table
+from eigassign.case.units import DIMENSIONS
+from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Course,
     TipChain,
@@ -44,7 +46,6 @@ from eigassign.mechanism.trajectory.motion import (
     OfDesign,
     TipMotion,
     point_motion,
-    read_samples,
     sampled_motion,
     shared_times,
     timing_law,
@@ -52,6 +53,10 @@ from eigassign.mechanism.trajectory.motion import (
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+TIME = "time"
+TIP_COLUMNS = ("tip x", "tip y", "tip z")
+_KEY = "trajectory.file"
+_KINDS = {"rad": "angle", "m": "length"}
 # Steps of a motion at least, where what drives exert is known: of 12 random paths of a tip its peak
 # is missed by up to 6e-4, which what is looked at between them mends (`study.design.clearance`).
 FINELY = 200
@@ -126,6 +131,41 @@ class Trajectory(Brief):
         return Trajectory(time_s, q, self.notes, self.motion, self.given)
 
 
+def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
+    """One for each coordinate; ``q_units`` are "rad" or "m", all rad if empty."""
+    units = q_units or ["rad"] * len(q_names)
+    return [
+        CsvColumn(name, (DIMENSIONS[_KINDS[unit]],))
+        for name, unit in zip(q_names, units, strict=True)
+    ]
+
+
+def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()) -> Trajectory:
+    """Samples of the coordinates ``q_names`` from a CSV file, in SI units.
+
+    ``q_units`` are "rad" or "m", all rad if empty. s and rad (m for strokes) are meant where no
+    unit is written; see `eigassign.case.table`. The columns of the tip that runs write (`tip x
+    [m]`, …) are passed over without a note.
+
+    Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
+    TrajectoryError for a line that does not hold one finite number a column, or goes back in time;
+    both name the line.
+    """
+    columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
+    table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
+    if len(table.lines) < 2:
+        message = f"{file.name}: {len(table.lines)} samples; at least two are needed"
+        raise MechanismError(_KEY, message)
+    values = np.column_stack([table.numbers[column.name] for column in columns])
+    time_s = values[:, 0].copy()
+    for k in np.flatnonzero(np.diff(time_s) <= 0.0).tolist():
+        before, after = time_s[k : k + 2]
+        message = f"time must increase, and goes from {before:g} s to {after:g} s"
+        raise TrajectoryError(_KEY, f"{table.where(k + 1)}: {message}", k + 1)
+    q = np.ascontiguousarray(values[:, 1:])
+    return Trajectory(time_s, q, (*table.notes, *_jumps(q, q_names, q_units)))
+
+
 def build_trajectory(
     spec: SampledTrajectory | FileTrajectory | PointTrajectory | TipTrajectory,
     q_names: Sequence[str],
@@ -144,7 +184,7 @@ def build_trajectory(
     if isinstance(spec, TipTrajectory):
         return _from_tip_path(spec, tip_chain, moved)
     if isinstance(spec, FileTrajectory):
-        return _from_file(spec, q_names, q_units)
+        return read_samples(Path(spec.file), q_names, q_units)
     if isinstance(spec, PointTrajectory):
         return _from_points(spec)
     return _from_samples(spec, q_names, q_units)
@@ -174,11 +214,6 @@ def _from_tip_path(
         notes = (*notes, f"{said}; q is written for the initial design")
     motion = TipMotion(followed, course, law, follows)
     return Trajectory(course.time_s, followed.q, notes, motion)
-
-
-def _from_file(spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str]) -> Trajectory:
-    table = read_samples(Path(spec.file), q_names, q_units)
-    return Trajectory(table.time_s, table.q, (*table.notes, *_jumps(table.q, q_names, q_units)))
 
 
 def _from_samples(

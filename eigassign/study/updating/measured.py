@@ -21,8 +21,7 @@ from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, Measurem
 from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
-from eigassign.mechanism.trajectory.motion import TIME, coordinate_columns
-from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.mechanism.trajectory.trajectory import TIME, Trajectories, coordinate_columns
 from eigassign.study.built_case import BuiltCase
 
 Floats = NDArray[np.float64]

@@ -96,11 +96,6 @@ def test_laws_are_not_extrapolated(tau):
         position(timing_law("quintic"), [0.5, tau])
 
 
-def test_an_unknown_law_is_refused_with_those_there_are():
-    with pytest.raises(UsageError, match=r"'septic'.*linear, cubic, quintic, trapezoidal"):
-        timing_law("septic")
-
-
 # --- Point to point in the joints: from the case file to q(t)
 
 
