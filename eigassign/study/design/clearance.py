@@ -22,6 +22,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,10 @@ def check_band(
     try:
         e = _raised(model, path, own, band, above, q, y) if raised is None else raised
         sides = list(band.kept_clear(below, above, Margin(0.0, e if np.isfinite(e) else 0.0)))
-        room = least_along(_room(model, path, sides, y, own), q, within).room
+        room = np.inf
+        if sides:
+            solved = _solved(model, path, sides, y, own)
+            room = least_along(partial(_room, sides, solved), q, within).room
     except (LostModeError, TrajectoryError):
         return ClearanceRow(band.label, below, False, 0.0, False, None)
     edges = np.column_stack([band.lower, band.upper])
@@ -128,35 +132,17 @@ def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Flo
 Room = Callable[[Floats], Floats]
 
 
-def _room(
-    model: Model,
-    path: Trajectories,
-    parts: Sequence[Requirement],
-    y: Floats,
-    own: Sequence[Follower] = (),
-) -> Room:
-    """The least room (n,) that parts of targets on the same rows leave; endless of none.
-
-    ``own`` are the followers of the modes that these follow.
-    """
-    solved = _solved(model, path, parts, y, own) if parts else None
-
-    def room(at: Floats) -> Floats:
-        least = np.full(len(at), np.inf)
-        if solved is None:
-            return least
-        found = solved(at)
-        for part in parts:
-            edges = _between(at, np.column_stack([part.lower, part.upper]))
-            fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=())
-            fine = replace(fine, rows=slice(0, len(at)))
-            curve = fine.curve(found)
-            beyond = [rows.scale * (curve - rows.edge) for rows in fine.edge_rows()]
-            missed = np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0)
-            least = np.minimum(least, -missed)
-        return least
-
-    return room
+def _room(parts: Sequence[Requirement], solved: Callable[[Floats], Solved], at: Floats) -> Floats:
+    """The least room (n,) that parts of targets on the same rows leave."""
+    found, least = solved(at), np.full(len(at), np.inf)
+    for part in parts:
+        edges = _between(at, np.column_stack([part.lower, part.upper]))
+        fine = replace(part, lower=edges[:, 0], upper=edges[:, 1], along=())
+        fine = replace(fine, rows=slice(0, len(at)))
+        curve = fine.curve(found)
+        beyond = [rows.scale * (curve - rows.edge) for rows in fine.edge_rows()]
+        least = np.minimum(least, -np.max(np.abs(beyond) if fine.is_goal else beyond, axis=0))
+    return least
 
 
 def _solved(
@@ -164,9 +150,9 @@ def _solved(
     path: Trajectories,
     parts: Sequence[Requirement],
     y: Floats,
-    own: Sequence[Follower],
+    own: Sequence[Follower] = (),
 ) -> Callable[[Floats], Solved]:
-    """The modes that parts are on, solved at places along their rows, those followed too."""
+    """The modes that parts are on, solved at places along their rows; ``own`` are followed."""
     rows, top, named = parts[0].rows, max(one.top for one in parts), parts[0].followed
     poses, name = path.between(rows, y), path.name_of(rows.start)
 
@@ -186,28 +172,22 @@ def _solved(
     return with_followed if named else numbered
 
 
-def _drive_room(model: Model, asked: DriveLimit, trajectory: Trajectory, y: Floats) -> Room:
+def _drive_room(
+    model: Model, asked: DriveLimit, trajectory: Trajectory, y: Floats, at: Floats
+) -> Floats:
     """1 − |τ|/max (n,) of one drive."""
-
-    def room(at: Floats) -> Floats:
-        times = trajectory.time_s
-        time_s = np.interp(at, np.arange(len(times)), times)
-        tau = model.drives.exerted(trajectory, time_s, y)
-        return np.asarray(1.0 - np.abs(tau[:, asked.column]) / asked.allowed[1])
-
-    return room
+    times = trajectory.time_s
+    time_s = np.interp(at, np.arange(len(times)), times)
+    tau = model.drives.exerted(trajectory, time_s, y)
+    return np.asarray(1.0 - np.abs(tau[:, asked.column]) / asked.allowed[1])
 
 
-def _static_room(asked: StaticLimit, poses: Room, y: Floats) -> Room:
+def _static_room(asked: StaticLimit, poses: Room, y: Floats, at: Floats) -> Floats:
     """The room (n,) to a stiffness, a compliance or a sag."""
-
-    def room(at: Floats) -> Floats:
-        w, most = asked.way.at(poses(at), y), asked.upper[0]
-        if asked.way.target.limit == "at_least":  # of the stiffness, not of its inverse
-            return np.asarray(most / np.maximum(w, RIGID) - 1.0)
-        return np.asarray(1.0 - w / most)
-
-    return room
+    w, most = asked.way.at(poses(at), y), asked.upper[0]
+    if asked.way.target.limit == "at_least":  # of the stiffness, not of its inverse
+        return np.asarray(most / np.maximum(w, RIGID) - 1.0)
+    return np.asarray(1.0 - w / most)
 
 
 class Lowest(NamedTuple):
@@ -300,13 +280,12 @@ def lowest_room(
     each: list[tuple[slice, Room]] = []
     if isinstance(asked, DriveLimit):
         for one, rows in zip(path.parts, path.rows, strict=True):
-            each.append((rows, _drive_room(model, asked, one.trajectory, y)))
+            each.append((rows, partial(_drive_room, model, asked, one.trajectory, y)))
     for name, rows in asked.along:
         part = asked.part(name, rows)
+        room: Room = partial(_room, [part], _solved(model, path, [part], y, own))
         if isinstance(part, StaticLimit):
-            room = _static_room(part, path.between(part.rows, y), y)
-        else:
-            room = _room(model, path, [part], y, own)
+            room = partial(_static_room, part, path.between(part.rows, y), y)
         each.append((part.rows, room))
     for rows, room in each:
         try:
@@ -330,7 +309,7 @@ def finer_path(
         room = low.room
         if one.is_aim:  # what it has at samples is what counts
             here = np.arange(len(one.lower), dtype=np.float64)
-            own = _room(model, path, [one], y)(here)
+            own = _room([one], _solved(model, path, [one], y), here)
             room = low.room / float(own.min()) - 1.0
         if room < -LIMIT:
             k = int(low.at)
