@@ -10,9 +10,10 @@ as far as a search finds optima. At last random deviations are solved.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import monotonic
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,7 @@ AT = 6
 AT_ONCE = 100  # of these, solved together
 
 
-@dataclass(frozen=True)
-class WorstDeviation:
+class WorstDeviation(NamedTuple):
     """The worst found for one edge: what is missed, at which sample, with which design."""
 
     rows: EdgeRows
@@ -213,39 +213,32 @@ class _Deviations:
     def drawn(self, worst: Sequence[WorstDeviation]) -> dict[str, float]:
         """The worst of random deviations by name; of large models by reduced ones that hold there.
 
-        Many more of small ones are solved where the ``worst`` of what is asked of frequencies are.
-        Raises EigassignError where one has no answer.
+        Many more of small ones are solved where the ``worst`` of what is asked of frequencies have
+        least room. Raises EigassignError where one has no answer.
         """
         models = None if self.task.followers else reduced_models(self.scene)
         response = replace(self.response, models=models)
-        rng = np.random.default_rng(0)
+        rng, (model, path) = np.random.default_rng(0), (self.scene.model, self.scene.path)
         designs = rng.uniform(self.lower, self.upper, (DRAWS, len(self.y)))
-        missed = ((rows, self.worst_at(rows, y, response)) for y in designs for rows in self.edges)
-        all_along = ((rows.of.name, most) for rows, (most, *_) in missed)
-        return _by_name((*all_along, *self._drawn_where(worst, rng)))
-
-    def _drawn_where(
-        self, worst: Sequence[WorstDeviation], rng: np.random.Generator
-    ) -> Iterator[tuple[str, float]]:
-        """Yield what some random deviations miss at the samples where frequencies have least room.
-
-        Of followed modes, which are followed all along, and of large models none.
-        """
-        model, path, count = self.scene.model, self.scene.path, self.asked.modes
+        found = [
+            (rows.of.name, self.worst_at(rows, y, response)[0])
+            for y in designs
+            for rows in self.edges
+        ]
         least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
         at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
         designs = rng.uniform(self.lower, self.upper, (self.many, len(self.y)))
-        for k in range(0, self.many, AT_ONCE):
-            some = designs[k : k + AT_ONCE]
+        for some in np.split(designs, range(AT_ONCE, self.many, AT_ONCE)) if self.many else ():
             q = np.concatenate([path.at(y)[0][at] for y in some])
-            hz = np.full((len(some), len(path.q), count), np.nan)
-            solved = model.frequencies(q, np.repeat(some, len(at), axis=0), count)
-            hz[:, at] = solved.reshape(len(some), len(at), count)
+            hz = np.full((len(some), len(path.q), self.asked.modes), np.nan)
+            solved = model.frequencies(q, np.repeat(some, len(at), axis=0), self.asked.modes)
+            hz[:, at] = solved.reshape(len(some), len(at), -1)
             for rows in self.edges:
                 if terms := rows.of.mode_terms:
                     own = sum(c * hz[:, rows.of.rows, m - 1 if m > 0 else m] for m, c in terms)
                     missed, _ = self.missed(rows, rows.scale * (own - rows.edge))
-                    yield rows.of.name, float(np.nanmax(missed, initial=0.0))
+                    found.append((rows.of.name, float(np.nanmax(missed, initial=0.0))))
+        return _by_name(found)
 
     def rows(
         self,
