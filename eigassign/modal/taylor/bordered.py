@@ -1,4 +1,4 @@
-"""The pencil's power series, and the bordered system that yields every eigenvector coefficient.
+"""The pencil's power series, and the bordered system of eqs. (4)–(6) for every eigenvector.
 
     ⎡ K0 − λ0 M0   −M0 Φ0 ⎤ ⎡ φ_γ ⎤   ⎡ rhs_γ ⎤
     ⎣ −Φ0ᵀ M0        0    ⎦ ⎣ λ_γ ⎦ = ⎣   0   ⎦
