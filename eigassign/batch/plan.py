@@ -23,9 +23,8 @@ from pathlib import Path
 from eigassign._version import __version__
 from eigassign.batch.variants import AS_IT_STANDS, OPTION, Variants, variants_of
 from eigassign.case.case_file import Unchecked, read
-from eigassign.case.reader import dotted, key_path, short_keys
+from eigassign.case.reader import NUMBER, dotted, key_path, short_keys
 from eigassign.case.schema.study import text_of
-from eigassign.case.units import NUMBER
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, file_digest, folder_name
 from eigassign.modal.expansion import ALGORITHM

@@ -108,7 +108,7 @@ Finding = tuple[KeyPath, str]  # where, and what is wrong there
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INT = re.compile(r"[-+]?[0-9]+")
 _BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -170,7 +170,7 @@ def resolve(text: str) -> object:
         return _WORDS[text]
     if _INT.fullmatch(text):
         return int(text) if len(text) < 400 else float(text)
-    if _FLOAT.fullmatch(text):
+    if NUMBER.fullmatch(text):
         return float(text)
     if _BASED.fullmatch(text):
         return int(text, 0) if len(text) < 400 else float("inf")
@@ -383,20 +383,11 @@ def _plain(value: Any, path: KeyPath, found: list[Finding]) -> Any:
     return None
 
 
-# --- Looking into a tree: what is missing, or of another kind, is None or empty
-
-
-def at(node: object, *keys: str) -> object:
-    """Value below ``keys``, or None where there is no such key."""
+def entries(node: object, *keys: str) -> Mapping[str, object]:
+    """The mapping below ``keys`` of a tree; an empty one where there is none."""
     for key in keys:
         node = node.get(key) if isinstance(node, Mapping) else None
-    return node
-
-
-def items(node: object, *keys: str) -> list[tuple[str, object]]:
-    """Entries of the mapping below ``keys``; none if it is not a mapping."""
-    inner = at(node, *keys)
-    return list(inner.items()) if isinstance(inner, Mapping) else []
+    return node if isinstance(node, Mapping) else {}
 
 
 # --- Other values of some keys: a dotted key, `targets.0.frequency`, is a path into the file

@@ -18,10 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from eigassign.case.reader import listed, shown, suggestion
+from eigassign.case.reader import NUMBER, listed, shown, suggestion
 from eigassign.case.units import (
     DIMENSIONS,
-    NUMBER,
     ONE,
     TWO_TURNS,
     Dimension,

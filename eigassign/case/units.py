@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
-from eigassign.case.reader import shown, suggestion
+from eigassign.case.reader import NUMBER, shown, suggestion
 
 Exponents = tuple[int, ...]  # of kg, m, s, rad, cycle
 
@@ -180,7 +180,6 @@ for _unit, _prefixes, _own in (  # the µ of two: micro sign, Greek mu
 
 TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degrees
 
-NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _BETWEEN = re.compile(r"(?<!\*)\*(?!\*)|[\s·⋅]+")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")

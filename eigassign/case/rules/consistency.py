@@ -19,7 +19,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, items, listed, unknown
+from eigassign.case.reader import Finding, KeyPath, Tree, entries, listed, unknown
 from eigassign.case.rules import mechanism, properties
 from eigassign.case.rules.properties import coordinate_lists, followed_modes, freedoms, walk
 from eigassign.case.schema.design import Choices
@@ -75,7 +75,7 @@ def _limit(tree: Any, path: KeyPath) -> int:
     match path:
         case ("mechanism", "links", str(link), key, *_):
             keys = {"superelement": ("stiffness", "mass", "file", "nodes_file"), "solid": ("mesh",)}
-            kind = str(at(tree, "mechanism", "links", link, "type"))
+            kind = str(entries(tree, "mechanism", "links", link).get("type"))
             return (MESH if key == "mesh" else MATRIX) * (key in keys.get(kind, ()))
         case ("trajectory", *inner, "file"):
             motion: Any = reduce(lambda node, key: node[key], inner, tree["trajectory"])
@@ -415,10 +415,10 @@ _GROUPS = (
 def too_many(tree: Tree) -> Iterator[Finding]:
     """Groups so large that looking for further problems could take minutes."""
     for place in _GROUPS:
-        if len(items(tree, *place)) > _MOST:
+        if len(entries(tree, *place)) > _MOST:
             yield place, f"more than {_MOST} entries"
-    for name, _ in items(tree, "mechanism", "links"):
+    for name in entries(tree, "mechanism", "links"):
         for key in ("nodes", "beams"):
             place = ("mechanism", "links", name, key)
-            if len(items(tree, *place)) > _MOST_INSIDE:
+            if len(entries(tree, *place)) > _MOST_INSIDE:
                 yield place, f"more than {_MOST_INSIDE} entries: make it a superelement"
