@@ -91,6 +91,15 @@ def combinations() -> Image.Image:
     return as_image(plot)
 
 
+def levers() -> Image.Image:
+    """What 1 % more of each property does to mode 1 of the six-axis arm."""
+    made = json_of("modes", str(ROOT / "cases" / "arm_6r.yaml"), "--count", "1")
+    rows = made["levers"][:12][::-1]
+    plot, axes = plotted("Six-axis arm, mode 1: 1 % more of", "change of the frequency [%]", "")
+    axes.barh([one["property"] for one in rows], [one["percent_per_percent"] for one in rows])
+    return as_image(plot)
+
+
 def under_weight() -> Image.Image:
     """The first frequency of the crane boom over its angle, with and without gravity."""
     text = (ROOT / "cases" / "crane_boom.yaml").read_text()
@@ -134,6 +143,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "objective": figure("optimize", "camera_arm", "frequencies", *LIGHT),
     "imported-part": figure("modes", "superelement_arm", "mode_1", "--count", "1"),
     "solid-part": figure("modes", "casting_arm", "mode_1", "--count", "1"),
+    "what-would-help": levers,
     "static-stiffness": figure("optimize", "drilling_arm", "statics", *LIGHT),
     "keep-out-bands": figure("optimize", "milling_column", "frequencies", *LIGHT),
     "catalogue": combinations,

@@ -52,13 +52,15 @@ from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, im
 from eigassign.case.rules.properties import (
     below,
     followed_designs,
+    is_place,
     known_property,
+    properties_of,
     property_at,
     quantities,
     value_at,
     with_value,
 )
-from eigassign.case.schema.design import RESERVED, Design, Tolerance
+from eigassign.case.schema.design import RESERVED, Design, Parameter, Tolerance
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.mechanism import (
     Body,
@@ -359,6 +361,19 @@ class CaseFile:
                 else:
                     mechanism = with_value(mechanism, [head, *rest], factor * float(value))
         return replace(self, mechanism=mechanism, coordinates=coordinates)
+
+    def with_every_property(self, places: bool = True) -> CaseFile:
+        """The case with all numbers that may vary, and are not 0, as parameters at their values.
+
+        Without those that trajectories set, and where asked without lengths, places and angles.
+        """
+        entries = {
+            path: Parameter(parameter=path, min=value, max=value)
+            for path in properties_of(self)
+            if path not in self.loads and (places or not is_place(path))
+            if (value := self.value_at(path))
+        }
+        return replace(self, design=Design.model_construct(entries=FrozenDict(entries)))
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""

@@ -180,6 +180,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
         weight=answer.weight,
+        levers=answer.levers,
         note=". ".join(map(capital, (rounding_line(answer.round_off), *answer.notes))),
     )
     print_tables([found])

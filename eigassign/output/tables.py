@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,6 +28,7 @@ from eigassign.study.results import (
     Comparison,
     DesignRow,
     ErrorSummary,
+    LeverRow,
     RunResults,
     TargetStudy,
     ValidationRow,
@@ -34,6 +36,7 @@ from eigassign.study.results import (
 )
 
 Floats = NDArray[np.float64]
+MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 _RANGES = "label lowest_hz highest_hz error"
@@ -267,7 +270,7 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 
 
 def _depends(results: RunResults) -> Iterator[Table]:
-    """Slopes; what more room gains; what can be reached."""
+    """Slopes; what more room gains; what would help missed modes; what can be reached."""
     found = results.meaning
     caption = "How the exact frequency rises at the answer with one unit more of the parameter, "
     caption += "and in % with 1 % more: means over the samples."
@@ -276,6 +279,12 @@ def _depends(results: RunResults) -> Iterator[Table]:
     headings["percent_per_percent_largest"] = "% per % at most"
     yield facts_table("Sensitivity", found.sensitivity, names, caption, **headings)
     yield facts_table("Limits", found.relaxed, "words")
+    seen = Counter[str]()
+    helps = [row for row in found.levers if seen.update([row.mode]) or seen[row.mode] <= MOST_HELPS]
+    names = "mode property percent_per_percent percent_per_percent_largest"
+    caption = "By how many % the frequency rises for 1 % more of a property that is no parameter, "
+    caption += "the coordinates unchanged. The most effective ones, by exact slopes."
+    yield facts_table("What would help", helps, names, caption)
     caption = "All designs within the bounds, at any sample (proved)."
     if any(row.how == "bounded" for row in found.reach):
         caption += " Distances of two modes lie in between, but may not reach the ends."
@@ -383,13 +392,14 @@ def modes_table(
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
     weight: WeightRow | None = None,
+    levers: Sequence[LeverRow] = (),
     note: str = "",
 ) -> Table:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
     mesh and reduced links raise each frequency, about, relative; ``weight`` is what gravity
-    changes; ``note`` is below.
+    changes; ``levers`` what would help; ``note`` is below.
     """
     columns = {
         "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
@@ -405,6 +415,9 @@ def modes_table(
         columns["sag: changes it by" if weighed else "gravity: may change it by"] = [
             f"{100 * e:.2g} %" if math.isfinite(e) else "may buckle or fall" for e in weight.change
         ]
+    if levers:
+        first = {row.mode: str(row) for row in reversed(levers)}
+        columns["1 % more of"] = [first[f"mode {mode}"] for mode in columns["mode"]]
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
     caption += f" {capital(note)}." if note else ""
     rows = tuple(zip(*columns.values(), strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +21,7 @@ from eigassign.assignment.requirements.sampling import (
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
-from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.superelement import part_lines
@@ -42,8 +43,9 @@ from eigassign.study.checks import (
 )
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off, soft_drives
+from eigassign.study.meaning import levers
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
-from eigassign.study.results import WeightRow
+from eigassign.study.results import LeverRow, WeightRow
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -72,6 +74,7 @@ class ModesAnswer:
     discretisation_error: TooHigh = None  # of the mesh; infinite: too coarse
     truncation_error: TooHigh = None  # of reduced links
     weight: Annotated[WeightRow | None, Fact("what gravity changes", optional=True)] = None
+    levers: Annotated[tuple[LeverRow, ...], Fact("what would help each mode")] = ()
     notes: Words = ()  # of gravity
     warnings: Words = ()
 
@@ -171,6 +174,9 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     lost = model.truncation_error(q, y, every)[0] if model.is_reduced else None
     coarse = model.discretisation_error(q, y, every)[0] if model.is_meshed or model.solids else None
     weight = study_weight(file, model, every, q[None], y, GIVEN)
+    helped: tuple[LeverRow, ...] = ()
+    with suppress(EigassignError):  # the frequencies stand without
+        helped = tuple(levers(model, q[None], y, {f"mode {k}": np.array([k]) for k in every}))
     return ModesAnswer(
         model.n_rigid,
         hz.tolist(),
@@ -181,6 +187,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),
         weight.row,
+        helped,
         (*_between_nodes(case, q, y, len(hz)), *digits_lines(file), *weight.notes),
         (*_beyond_bounds(case, y), *weight.warnings),
     )

@@ -30,7 +30,7 @@ __all__, __getattr__, __dir__ = face(
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.search.variants": "Task variant_of",
         "pictures": "AMPLITUDE draw_modes draw_poses rest_pose",
-        "meaning": "Studies proved_ranges study_meaning unreachable",
+        "meaning": "Studies levers proved_ranges study_meaning unreachable",
         "planning": (
             "Plan at_corners automatic_elements central_sample corners joint_map "
             "farthest plan_expansion scattered "

@@ -12,11 +12,15 @@ relative errors, or the largest of them, so that the rms error falls from √F t
 
 How much is studied is the user's choice and changes no answer. What follows from slopes already
 known, or from two exact solves a pose of a small model, is cheap; `all` adds those of a large one.
+
+Of a mode that is missed it is said what would help: all properties that the mechanism is made of
+and that are not 0 become parameters of a model of their own, whose exact slopes are the levers, the
+coordinates as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from typing import TypeVar
@@ -33,6 +37,8 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.errors import EigassignError
+from eigassign.modal.model import Model
+from eigassign.study.built_case import build_model
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.followed import solve_design
@@ -40,6 +46,7 @@ from eigassign.study.design.search.optimum import Choices
 from eigassign.study.design.search.response import Designs, corners, effects
 from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
 from eigassign.study.results import (
+    LeverRow,
     Meaning,
     RangeRow,
     RelaxedRow,
@@ -48,6 +55,8 @@ from eigassign.study.results import (
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+FEW = 21  # samples of a trajectory at which levers are looked at
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
 STEPS, STARTS = 30, 3  # of a search at one sample
 COMBINED = 64  # combinations of catalogues, each searched there
@@ -322,6 +331,59 @@ def _room(variant: PosedProblem, row: ActiveLimit, amount: float, unit: str) -> 
     return f"{handy(amount, unit)} {more} at the {row.side} {named}"
 
 
+def levers(model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]) -> Iterator[LeverRow]:
+    """Yield what the properties do to each mode at poses q (n, n_q) of a design y, largest first.
+
+    ``numbers`` (n,) are by the mode's name those that it has there, 0 where it does not matter.
+    Without lengths, places and angles where loops cannot follow them. Raises EigassignError where
+    the model has no such modes.
+    """
+    case = model.poses.case
+    try:
+        every = case.with_design(y).with_every_property()
+        made = build_model(every)
+    except EigassignError:
+        every = case.with_design(y).with_every_property(places=False)
+        made = build_model(every)
+    x = made.x(q, np.array([every.value_at(path) for path in made.y_names]))
+    wanted = np.arange(x.shape[1]) >= made.pencil.n_joints
+    count = max(int(own.max()) for own in numbers.values())
+    lam, slopes = made.slopes(q, x[0, made.pencil.n_q :], count, wanted)
+    names = (*made.q_names, *made.y_names)
+    known = {path for column in case.design.parameters.values() for path in column.factors}
+    for name, own in numbers.items():
+        there, rows = np.flatnonzero(own), list[LeverRow]()
+        of = there, own[there] - 1
+        for k in np.flatnonzero(wanted):
+            if names[k] not in known:
+                share = 0.5 * x[there, k] * slopes[*of, k] / lam[of]
+                most = float(share[np.abs(share).argmax()])
+                rows.append(LeverRow(name, names[k], float(share.mean()), most))
+        # to six digits, so that round-off does not decide which of two alike stands first
+        yield from sorted(rows, key=lambda row: -float(f"{abs(row.percent_per_percent):.5e}"))
+
+
+def _of_missed(
+    scene: Scene, y: Floats, wanted: Sequence[Requirement], exact: Solved, max_error: float
+) -> Iterator[LeverRow]:
+    """The levers of the modes of targets that are missed, where they are asked for."""
+    samples, numbers = scene.path.spread(FEW), dict[str, Ints]()
+    for one in (w for w in wanted if misses(w, exact, max_error)):
+        worst = one.rows.start + int(np.abs(one.errors(exact)).argmax())
+        samples = np.union1d(samples, [worst])
+        modes = one.near(exact, exact) or one.modes
+        named = {f"mode {k}": np.full(len(exact.hz), k, dtype=np.intp) for k in modes}
+        if one.followed:
+            shapes = zip(one.followed, one.followed_numbers, strict=True)
+            named = {mode.name: exact.numbers[:, k] for mode, k in shapes}
+        for name, own in named.items():
+            known = numbers.setdefault(name, np.zeros(len(exact.hz), dtype=np.intp))
+            known[one.rows] = own[one.rows]
+    if numbers:
+        at = {name: own[samples] for name, own in numbers.items()}
+        yield from levers(scene.model, scene.path.at(y)[0][samples], y, at)
+
+
 class Studies(StrEnum):
     """The studies of an answer that the user asks for."""
 
@@ -361,6 +423,7 @@ def study_meaning(
     return Meaning(
         sensitivity=tuple(sensitivities(scene.file, variant.requirements, answer.y, seen)),
         relaxed=tuple(relaxed),
+        levers=tuple(_of_missed(scene, answer.y, wanted, exact, max_error)),
         reach=reach,
         unreachable=beyond,
         notes=tuple(deviations(scene, variant.requirements, answer.y, seen)),

@@ -731,6 +731,25 @@ class SensitivityRow:
 
 
 @dataclass(frozen=True)
+class LeverRow:
+    """The per cents by which a frequency rises for 1 % more of a property that is no parameter.
+
+    (p/f) ∂f/∂p at the poses looked at: its mean, and the one of largest magnitude.
+    """
+
+    mode: Key
+    property: str
+    percent_per_percent: Annotated[float, Fact(heading="mean", unit="% per %", digits=".3g")]
+    percent_per_percent_largest: Annotated[
+        float, Fact(heading="largest", unit="% per %", digits=".3g")
+    ]
+
+    def __str__(self) -> str:
+        """Property and mean, ``sections.rod.diameter +0.9 %``."""
+        return f"{self.property} {self.percent_per_percent:+.2g} %"
+
+
+@dataclass(frozen=True)
 class RelaxedRow:
     """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order."""
 
@@ -767,6 +786,7 @@ class Meaning(Brief):
 
     sensitivity: Annotated[tuple[SensitivityRow, ...], Fact("to each parameter")] = ()
     relaxed: Annotated[tuple[RelaxedRow, ...], Fact("what more room at limits gains")] = ()
+    levers: Annotated[tuple[LeverRow, ...], Fact("of missed modes, the largest first")] = ()
     reach: Annotated[tuple[RangeRow, ...], Fact("over all designs within the bounds")] = ()
     unreachable: Annotated[tuple[str, ...], Fact("what is out of reach, in words")] = ()
     notes: Unwritten[tuple[str, ...]] = ()

@@ -64,7 +64,7 @@ def test_modes_prints_the_reference_frequencies_as_json_and_nothing_else(
 ) -> None:
     args = ("--q", "1.817, 5.312", "--y", y, "--count", 3, "--json")
     found = json.loads(answer(capsys, "modes", TWO_LINK, *args))
-    beside = ["round_off", "discretisation_error", "weight"]
+    beside = ["round_off", "discretisation_error", "weight", "levers"]
     assert list(found) == ["rigid_modes", "frequencies_hz", *beside]
     assert 1e-15 < found["round_off"] < 1e-9
     assert found["rigid_modes"] == 2

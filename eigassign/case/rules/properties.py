@@ -128,6 +128,19 @@ def _numbers(case: Any, group: str, name: str) -> dict[str, Quantity]:
     return found
 
 
+def properties_of(case: Any) -> Iterator[str]:
+    """The paths of all numbers of a mechanism that can vary."""
+    for group in _GROUPS:
+        for name in _parts(case, group):
+            yield from (f"{group}.{name}.{key}" for key in _numbers(case, group, name))
+
+
+def is_place(path: str) -> bool:
+    """True where a property is a length, a place or an angle of the mechanism."""
+    group, _, key, *_ = path.split(".")
+    return key in ("length", "angle", *_VECTORS.get(group, ()))
+
+
 def quantities(model: type[Part]) -> dict[str, Quantity]:
     """The real-valued properties that a mechanism can be built with as variables."""
     found = {k: _quantity(f.annotation, f.metadata) for k, f in model.model_fields.items()}

@@ -141,13 +141,23 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
 
 
 def _helps(results: RunResults) -> Iterator[str]:
-    """What would help where something is missed: what limits cost."""
+    """What would help where something is missed: properties; what limits cost."""
     met = all(target.satisfied for target in results.targets)
     if met and all(one.satisfied for one in results.assignment.limits):  # type: ignore[union-attr]
         return
+    for mode in dict.fromkeys(row.mode for row in results.meaning.levers):
+        own = [str(row) for row in results.meaning.levers if row.mode == mode][:3]
+        told = re.sub(r"\b[a-z]+\.([^\s.]+)((?:\.\w+)+)", _plain, ", ".join(own))
+        yield f"1 % more of what is no parameter changes {mode}: {told.replace(' -', ' −')}."
     for row in results.meaning.relaxed[:2]:
         if f"{row.before:.3g}" != f"{row.after:.3g}":
             yield f"{capital(row.words)}."
+
+
+def _plain(path: re.Match[str]) -> str:
+    """A property as people say it: ``length of forearm`` for ``links.forearm.length``."""
+    what = path[2].replace(".", " ").replace("_", " ").replace("youngs", "Young's").strip()
+    return f"{what} of {path[1]}"
 
 
 def _finding(target: TargetStudy, accepted: float) -> Finding:
