@@ -2,7 +2,7 @@
 
 Reading order:
 
-    program       programs with linear limits by an active-set method; limits that contradict
+    program       programs with linear limits by OSQP and active sets; limits that contradict
     requirements  what a case asks for: one type from the case file to the report
     one_shot      the program of eqs. (13)–(14), in its units, its optimum and residuals
     exact         the optimum of the exact problem, and parameters from measurements
