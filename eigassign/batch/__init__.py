@@ -4,7 +4,8 @@ Reading order:
 
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
-    workers   what a worker does, and where: in this process, or in processes beside it
+    work      what a worker does: check a variant, run it
+    workers   where tasks run: in this process, or in processes beside it
     runner    all of it together, and what of a batch is done: start there
 """
 
@@ -16,6 +17,7 @@ __all__, __getattr__, __dir__ = face(
         "plan": "Variant cases_in folder_names plan_of variant_problem",
         "runner": "Batch run",
         "variants": "Variants variants_of",
-        "workers": "CaseOptions Workers outcome_of process_pool run_case this_machine",
+        "work": "CaseOptions outcome_of run_case",
+        "workers": "Workers process_pool this_machine",
     },
 )

@@ -24,15 +24,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from eigassign.batch.plan import BatchPlan, Variant, variant_problem
-from eigassign.batch.workers import (
-    CaseOptions,
-    Workers,
-    check_cases,
-    outcome_of,
-    run_all,
-    run_case,
-    this_machine,
-)
+from eigassign.batch.work import CaseOptions, check_cases, outcome_of, run_case
+from eigassign.batch.workers import Workers, run_all, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.index import write_files
 from eigassign.output.batch.summary import CaseOutcome, from_plain

@@ -83,7 +83,7 @@ def batch(
 
 def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
     from eigassign.batch.runner import Batch
-    from eigassign.batch.workers import CaseOptions
+    from eigassign.batch.work import CaseOptions
 
     options = CaseOptions(
         out=str(folder),

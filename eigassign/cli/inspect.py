@@ -78,7 +78,7 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
 def _sweep(case: Path, allow_outside: bool) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
     from eigassign.batch.plan import plan_of, variant_problem
-    from eigassign.batch.workers import CaseOptions, check_cases
+    from eigassign.batch.work import CaseOptions, check_cases
 
     plan = plan_of([case])
     if not plan.is_swept:
