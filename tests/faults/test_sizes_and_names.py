@@ -18,12 +18,8 @@ LENGTH = "mechanism.links.arm.length: {min: 0.4, max: 0.6"
 MASS = "mechanism.bodies.tool.mass: {min: 0, max: 1"
 SWEEPS = {
     "grid": f"parameters: {{{LENGTH}, count: 3000}}, {MASS}, count: 3000}}}}",
-    "range": f"parameters: {{{LENGTH}, count: 9999999}}}}",
-    "list": f"sample: list, parameters: {{{LENGTH}, count: 9999999}}, {MASS}, count: 9999999}}}}",
-    **{
-        sample: f"sample: {sample}, count: 5000000, parameters: {{{LENGTH}}}, {MASS}}}}}"
-        for sample in ("latin_hypercube", "sobol")
-    },
+    "range": f"parameters: {{{LENGTH}, count: 100000}}}}",
+    "list": f"sample: list, parameters: {{{LENGTH}, count: 100000}}, {MASS}, count: 100000}}}}",
 }
 NAMES = (
     *(b"plain", b"\xff\xfe", b"lat\xe9n", b"a\nb", b"a\x1b[2Jb", b"CON", b"aux", b"nul.x"),
@@ -37,13 +33,11 @@ def worker() -> Iterator[Worker]:
         yield running
 
 
-@pytest.mark.parametrize(
-    "name", [n if n != "sobol" else pytest.param(n, marks=pytest.mark.slow) for n in SWEEPS]
-)
+@pytest.mark.parametrize("name", SWEEPS)
 def test_sweeps_of_millions_are_checked_within_limits(name: str, worker: Worker) -> None:
     outcome = worker.run("check", f"{TEXT}sweep: {{{SWEEPS[name]}}}\n")
     assert (outcome.code, outcome.faults()) == (0, []), outcome.err
-    assert "000 variants" in outcome.out or "9999999 variants" in outcome.out
+    assert "000 variants" in outcome.out
     assert "the first 100 of them valid: eigassign batch" in outcome.out
 
 
