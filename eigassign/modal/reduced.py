@@ -66,8 +66,8 @@ class ReducedModel:
     program: Program
     to_program: Floats
     shift: Floats
-    stiffness: Terms  # of (k, k)
-    mass: Terms  # of (k + f, k + f)
+    stiffness: SymmetricTerms  # of (k, k)
+    mass: SymmetricTerms  # of (k + f, k + f)
 
     def __repr__(self) -> str:
         return (
@@ -79,7 +79,7 @@ class ReducedModel:
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
-        return int(self.stiffness.matrices.shape[1])
+        return len(self.stiffness.place)
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n_samples, n_modes) in Hz.
@@ -92,7 +92,7 @@ class ReducedModel:
         parts = [
             ritz_values(*self._at(theta[:, part])[:2])
             for theta in map(self._theta, chunks(x, 1))
-            for part in chunks(np.arange(theta.shape[1]), self.mass.matrices[0].size)
+            for part in chunks(np.arange(theta.shape[1]), self.mass.place.size)
         ]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
@@ -108,15 +108,17 @@ class ReducedModel:
         x, columns = samples(q, y, self.n_q, self.n_y), np.array(self.modes) - 1
         along = np.flatnonzero(np.ones(x.shape[1]) if wanted is None else wanted)
         rates = theta_slopes(self.program, self.to_program, self.shift, x, along)
+        moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
+        stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in (self.stiffness, self.mass))
         theta = self._theta(x)
         lam, slopes = [], []
-        for part in chunks(np.arange(len(x)), self.mass.matrices[0].size):
+        for part in chunks(np.arange(len(x)), self.mass.place.size):
             K, M_c, coupling = self._at(theta[:, part])
             mu, z = (a[..., columns] for a in ritz_pairs(K, M_c))
             phi = z / np.sqrt(mu)[:, None, :]
             whole = np.concatenate([phi, -coupling @ phi], axis=1)
-            forms = self.stiffness.forms(phi, rates[:, :, part])
-            forms = forms - self.mass.forms(whole, rates[:, :, part]) / mu[..., None]
+            forms = stiff.forms(phi, rates[:, :, part])
+            forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
             lam.append(1.0 / mu)
             whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
             whole_slopes[..., along] = forms
@@ -132,31 +134,55 @@ class ReducedModel:
 
     def _at(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k) at θ (n_theta, n)."""
-        K, M, k = self.stiffness(theta), self.mass(theta), self.size
-        coupling, M_c = condense_blocks(M[:, :k, :k], M[:, k:, :k], M[:, k:, k:])
-        return K, M_c, coupling
+        stiff, heavy = self.stiffness, self.mass
+        E, F = slice(0, self.size), slice(self.size, None)
+        K, M = stiff(theta), heavy(theta)
+        blocks = [heavy.block(M, rows, columns) for rows, columns in ((E, E), (F, E), (F, F))]
+        coupling, M_c = condense_blocks(*blocks)
+        return stiff.block(K, E, E), M_c, coupling
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
-    """Sums Σ θ_j A_j of small symmetric matrices A_j (n_terms, k, k)."""
+class SymmetricTerms:
+    """Sums Σ θ_j A_j of small symmetric matrices from their lower triangles: half the work.
+
+    ``triangles`` (n_terms, k(k + 1)/2) are those of A_j; ``place`` (k, k) is where in them each
+    entry is.
+    """
 
     terms: Ints  # indices j of θ
-    matrices: Floats
+    triangles: Floats
+    place: Ints
 
     def __call__(self, theta: Floats) -> Floats:
-        """The sums (n, k, k) at θ (n_theta, n)."""
-        flat = self.matrices.reshape(len(self.terms), -1)
-        return (theta[self.terms].T @ flat).reshape(-1, *self.matrices.shape[1:])
+        """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
+        return np.asarray(theta[self.terms].T @ self.triangles)
+
+    def chosen(self, terms: NDArray[np.bool_]) -> SymmetricTerms:
+        """The marked terms alone."""
+        return SymmetricTerms(self.terms[terms], self.triangles[terms], self.place)
 
     def forms(self, phi: Floats, rates: Floats) -> Floats:
         """Σ_j (φᵀA_jφ) r_ij (n, m, n_x) of modes φ (n, k, m) with ``rates`` r (n_x, n_theta, n)."""
-        own = rates[:, self.terms]
-        moving = np.abs(own).max(axis=(0, 2), initial=0.0) > 0.0
-        i, j = np.tril_indices(phi.shape[1])
-        products = phi[:, i] * phi[:, j] * np.where(i == j, 1.0, 2.0)[None, :, None]
-        each = np.einsum("npm,tp->nmt", products, self.matrices[moving][:, i, j], optimize=True)
-        return np.asarray(np.einsum("nmt,xtn->nmx", each, own[:, moving], optimize=True))
+        i, j = np.tril_indices(len(self.place))
+        twice = np.where(i == j, 1.0, 2.0)[None, :, None]
+        products = phi[:, i] * phi[:, j] * twice
+        each = np.einsum("npm,tp->nmt", products, self.triangles, optimize=True)
+        return np.asarray(np.einsum("nmt,xtn->nmx", each, rates[:, self.terms], optimize=True))
+
+    def block(self, triangles: Floats, rows: slice, columns: slice) -> Floats:
+        """Rows and columns of whole matrices, (n, …, …), from their triangles."""
+        place = self.place[rows, columns]
+        return triangles.take(place.ravel(), axis=1).reshape(len(triangles), *place.shape)
+
+
+def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
+    """Terms from whole matrices (n_terms, k, k), of which the lower triangle is read."""
+    k = matrices.shape[1]
+    i, j = np.tril_indices(k)
+    place = np.empty((k, k), dtype=np.intp)
+    place[i, j] = place[j, i] = np.arange(len(i))
+    return SymmetricTerms(terms, np.ascontiguousarray(matrices[:, i, j]), place)
 
 
 # --- Ritz values and pairs
@@ -215,8 +241,8 @@ def reduce(
         program=pencil.program,
         to_program=pencil.to_program,
         shift=pencil.shift,
-        stiffness=Terms(k_terms, stiffness[k_terms, :k, :k]),
-        mass=Terms(m_terms, mass[m_terms]),
+        stiffness=symmetric_terms(k_terms, stiffness[k_terms, :k, :k]),
+        mass=symmetric_terms(m_terms, mass[m_terms]),
     )
 
 
