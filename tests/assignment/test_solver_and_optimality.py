@@ -14,7 +14,7 @@ from eigassign.assignment import (
     solve_assignment,
     solve_program,
 )
-from eigassign.errors import UsageError
+from eigassign.errors import AccuracyError, UsageError
 
 # ½ (0.2 − 0.5 x)² with 0 ≤ x ≤ 0.1, x ≤ 5
 SMALL = Program(
@@ -105,6 +105,20 @@ def test_a_start_that_misses_limits_a_little_ends_at_round_off(offset):
     program = Program(rows, 4.0 * rows.sum(axis=1), np.eye(n), -np.ones(n), np.ones(n), np.zeros(n))
     x, mu, *_ = solve_program(program, -np.ones(n) + offset)
     assert max(judge(program, x, mu)) <= 1e-12
+
+
+def test_an_answer_whose_residuals_are_too_large_is_withheld(monkeypatch):
+    exact, bounded = np.linalg.lstsq, random_problem(0, n_y=4)
+    assert solve_assignment(*bounded.arguments).active
+
+    def disturbed(size):
+        return lambda A, b, rcond: (exact(A, b, rcond)[0] + size,)
+
+    monkeypatch.setattr(np.linalg, "lstsq", disturbed(1e-11))
+    solve_assignment(*bounded.arguments)
+    monkeypatch.setattr(np.linalg, "lstsq", disturbed(1e-6))
+    with pytest.raises(AccuracyError, match=r"to 1e-08: primal .*e.*, dual .*e.*, gap .*e"):
+        solve_assignment(*bounded.arguments)
 
 
 # ---- OSQP
