@@ -69,7 +69,8 @@ def _exerted(results: RunResults) -> Iterator[Column]:
     """What each drive exerts before and after."""
     for row in results.drives:
         for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
-            yield f"{row.name} {row.quantity} {when} [{row.unit}]", curve.tolist()
+            quantity = "force" if row.unit == "N" else "torque"
+            yield f"{row.name} {quantity} {when} [{row.unit}]", curve.tolist()
 
 
 def _given(results: RunResults) -> Iterator[Column]:

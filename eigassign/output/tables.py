@@ -352,7 +352,7 @@ def _approximation(results: RunResults) -> Table:
         if study.over_time is not None:
             places.append((f"along {results.along}, initial design", study.over_time))
         for where, values in places:
-            worst = (percent(values.worst_taylor), percent(values.worst_linearised))
+            worst = (percent(values.worst["taylor"]), percent(values.worst["linearised"]))
             rows.append((f"mode {study.mode}", where, str(study.order), *worst))
         if study.stated is not None:
             worst = (percent(study.stated["taylor"]), percent(study.stated["linearised"]))

@@ -25,7 +25,7 @@ __all__, __getattr__, __dir__ = face(
         "design.answer": "Answer find_answer",
         "design.clearance": "check_band",
         "design.followed": "followers named_design named_pose require_one_shape solve_design",
-        "design.judgement": "Facts Verdict crossing_warnings verdict",
+        "design.judgement": "Facts Verdict verdict",
         "design.search.optimum": "Found find_optimum",
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.search.variants": "Task variant_of",

@@ -17,7 +17,6 @@ from eigassign.study.checks import Accuracy, MotionStudy, study_motion
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
 from eigassign.study.design.answer import solver_row
 from eigassign.study.design.judgement import (
-    crossing_warnings,
     far_off,
     judged_modes,
     mode_rows,
@@ -28,9 +27,7 @@ from eigassign.study.given import given
 from eigassign.study.pictures import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
-    AssignmentRow,
     CaseRow,
-    DrawnPoses,
     DriveLoad,
     DriveRow,
     MassRow,
@@ -58,11 +55,15 @@ def collect_results(
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
-    along = [(s.over_time.worst_taylor, s.mode) for s in studies.rows if s.over_time is not None]
+    along = [(s.over_time.worst["taylor"], s.mode) for s in studies.rows if s.over_time is not None]
     reach, n, weight = reach_warnings(scene, along), len(file.coordinates), accuracy.weight
     warnings = [*scene.warnings, *reach, *weight.warnings]
     notes = [*scene.notes, *studies.notes, *accuracy.notes]
     answer, targets = dict[str, Any](), tuple[TargetStudy, ...]()
+    if trajectory is None:
+        poses = rest_pose(file, scene.model, scene.q0, scene.initial)
+    else:
+        poses = draw_poses(file, scene.model, trajectory, scene.initial)
     if assigned is not None:
         solved, targets = assigned.solved, assigned.targets
         judged = judged_modes(file, targets)
@@ -71,7 +72,8 @@ def collect_results(
         # the reach of expansions matters to an answer that they gave
         reach = reach if assigned.answer.found is None else ()
         warnings = [*scene.warnings, *_warnings(scene, assigned), *reach, *weight.warnings]
-        notes += [*solved.notes, *_notes(scene, assigned, answer["assignment"])]
+        notes += [*solved.notes, *assigned.answer.notes]
+        notes += limit_notes(assigned.answer, answer["assignment"], targets)
         if motion is not None:
             warnings += filter(None, [motion.warning])
             notes += filter(None, [motion.note])
@@ -86,7 +88,7 @@ def collect_results(
         time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
         q=np.zeros((0, n)) if trajectory is None else trajectory.q[:, :n],
         trajectories=tuple(_trajectories(file, trajectory, targets)),
-        poses=_poses(scene),
+        poses=poses,
         studies=studies.rows,
         warnings=tuple(warnings),
         notes=tuple(notes),
@@ -104,7 +106,8 @@ def _answer(
     """The fields of results that an answer has."""
     answer, targets, solved = assigned.answer, assigned.targets, assigned.solved
     row = assignment_row(scene, assigned, accuracy, motion)
-    rows = design_rows(scene, answer.y)
+    rows, limits, mass = design_rows(scene, answer.y), scene.file.design.mass, scene.model.mass
+    asked = (None, None) if limits is None else (limits.min, limits.max, limits.price)
     on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}
     return {
         "design": tuple(replace(one, lies_on=on.get(one.name, "")) for one in rows),
@@ -115,16 +118,10 @@ def _answer(
         "solver": None if answer.one_shot is None else solver_row(answer.one_shot),
         "assignment": row,
         "meaning": assigned.meaning,
-        "mass": _mass(scene, answer.y),
+        "mass": MassRow(mass(scene.initial), mass(answer.y), *asked),
         "drives": _drives(scene, answer.y),
         "statics": tuple(_statics(scene, answer.y)),
     }
-
-
-def _mass(scene: Scene, y: Floats) -> MassRow:
-    limits, mass = scene.file.design.mass, scene.model.mass
-    asked = () if limits is None else (limits.min, limits.max, limits.price)
-    return MassRow(mass(scene.initial), mass(y), *(asked or (None, None)))
 
 
 def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
@@ -172,13 +169,6 @@ def _statics(scene: Scene, y: Floats) -> Iterator[StaticRow]:
         yield StaticRow(one.label, one.unit, limit, *curves)
 
 
-def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tuple[str, ...]:
-    """Notes on the choices on the way to the answer, and on the limits that hold it back."""
-    missed = [target.label for target in assigned.targets if not target.satisfied]
-    missed += [limit.name for limit in row.limits if not limit.satisfied]
-    return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed))
-
-
 def _trajectories(
     file: CaseFile, path: Trajectories | None, targets: tuple[TargetStudy, ...]
 ) -> Iterator[TrajectoryRow]:
@@ -197,12 +187,6 @@ def _trajectories(
         )
 
 
-def _poses(scene: Scene) -> DrawnPoses:
-    if scene.trajectory is None:
-        return rest_pose(scene.file, scene.model, scene.q0, scene.initial)
-    return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)
-
-
 def _others(scene: Scene, assigned: VerifiedAssignment) -> list[int]:
     """Modes without a target: the expanded ones, and three above the lowest assigned one."""
     targets = {mode for target in assigned.targets for mode in target.numbers}
@@ -218,14 +202,6 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
         yield from () if target.asked.is_aim else far_off(target.asked, target.initial_hz)
     for place, doubt in soft_drives(scene.file, scene.model, scene.path.q[:1]):
         yield f"{place}: {doubt}"
-    modes = tuple(
-        sorted({mode for target in assigned.targets for mode in target.asked.modes if mode > 0})
-    )
-    for solved, design in (
-        (assigned.solved.initial, "initial"),
-        (assigned.solved.exact, "optimal"),
-    ):
-        yield from crossing_warnings(solved.hz, modes, scene.path.where, design)
     if assigned.answer.found is None:
         yield from _accuracy_warnings(scene, assigned)
 

@@ -90,29 +90,15 @@ class Comparison(Brief):
     linearised_hz: Floats
 
     @property
-    def taylor_error(self) -> Floats:
-        """Relative error in frequency of the full expansion, point by point."""
-        return np.asarray(self.taylor_hz / self.exact_hz - 1.0)
-
-    @property
-    def linearised_error(self) -> Floats:
-        """Relative error in frequency of the partially linearised expansion."""
-        return np.asarray(self.linearised_hz / self.exact_hz - 1.0)
-
-    @property
-    def worst_taylor(self) -> float:
-        """Largest magnitude of ``taylor_error``."""
-        return _worst(self.taylor_error)
-
-    @property
-    def worst_linearised(self) -> float:
-        """Largest magnitude of ``linearised_error``."""
-        return _worst(self.linearised_error)
+    def errors(self) -> dict[str, Floats]:
+        """Relative errors in frequency of both expansions, point by point."""
+        both = {"taylor": self.taylor_hz, "linearised": self.linearised_hz}
+        return {name: np.asarray(hz / self.exact_hz - 1.0) for name, hz in both.items()}
 
     @property
     def worst(self) -> dict[str, float]:
-        """Both by name."""
-        return {"taylor": self.worst_taylor, "linearised": self.worst_linearised}
+        """The largest magnitude of each."""
+        return {name: _worst(errors) for name, errors in self.errors.items()}
 
 
 def _worst(errors: Floats) -> float:
@@ -266,16 +252,6 @@ class DriveRow(Brief):
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
         """The unit that people read it in, and the size of that in SI."""
         return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
-
-    @property
-    def is_asked(self) -> bool:
-        """True where the case says something of it: gravity, or its limit."""
-        return self.of == WEIGHED or self.limit is not None
-
-    @property
-    def quantity(self) -> str:
-        """Torque or force."""
-        return "force" if self.unit == "N" else "torque"
 
 
 @dataclass(frozen=True, repr=False)

@@ -268,8 +268,8 @@ def expansion_lines(scene: Scene, found: tuple[Comparison, ...]) -> tuple[str, .
     """`study_expansions` in words, one line a mode."""
     where = "between the samples and all over the bounds"
     return tuple(
-        f"mode {mode}: the full expansion is about {percent(MARGIN * one.worst_taylor)} off at "
-        f"worst, the linearised one {percent(MARGIN * one.worst_linearised)}, measured by exact "
+        f"mode {mode}: the full expansion is about {percent(MARGIN * one.worst['taylor'])} off at "
+        f"worst, the linearised one {percent(MARGIN * one.worst['linearised'])}, measured by exact "
         f"solves at {len(one.exact_hz)} poses and designs {where}"
         for mode, one in zip(scene.modes, found, strict=True)
     )
@@ -363,20 +363,20 @@ def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
     expansions, limit = scene.expansions, scene.file.validation.max_error
     counts = expansions.full_order == expansions.order
     margin = MARGIN if where == BETWEEN else 1.0
-    worst_taylor, worst_linearised = margin * values.worst_taylor, margin * values.worst_linearised
-    counted = [values.worst_linearised, *([values.worst_taylor] if counts else [])]
+    worst, errors = values.worst, values.errors
+    counted = [worst["linearised"], *([worst["taylor"]] if counts else [])]
     if where == BETWEEN and counts:  # so far out the linearised one is a guide of the one shot only
-        counted = [values.worst_taylor]
+        counted = [worst["taylor"]]
     return ValidationRow(
         case=scene.file.path.stem,
         mode=expansions.modes[k],
         order=expansions.order,
         where=where,
         points=values.exact_hz.size,
-        worst_taylor=worst_taylor,
-        worst_linearised=worst_linearised,
-        rms_taylor=_rms(values.taylor_error),
-        rms_linearised=_rms(values.linearised_error),
+        worst_taylor=margin * worst["taylor"],
+        worst_linearised=margin * worst["linearised"],
+        rms_taylor=_rms(errors["taylor"]),
+        rms_linearised=_rms(errors["linearised"]),
         limit=limit,
         passed=max(counted) <= limit,
         lowest_hz=float(values.exact_hz.min()),

@@ -66,7 +66,7 @@ def test_where_one_point_cannot_do_several_share_the_trajectory(tmp_path: Path) 
     result = solve_case(load_case(path))
     study = result.results.studies[0].over_time
     assert study is not None
-    assert study.worst_taylor <= 1e-5
+    assert study.worst["taylor"] <= 1e-5
 
 
 def test_python_is_handed_all_of_several_points(tmp_path: Path) -> None:

@@ -286,7 +286,7 @@ def test_automatic_orders_look_at_every_trajectory_and_name_its_samples(tmp_path
     assert any("of trajectory 'return'" in line or "of trajectory 'pick'" in line for line in lines)
     (study,) = result.results.studies
     assert study.over_time is not None
-    assert study.over_time.worst_taylor < 0.005
+    assert study.over_time.worst["taylor"] < 0.005
 
 
 def test_validation_has_a_row_for_each_trajectory(tmp_path: Path) -> None:

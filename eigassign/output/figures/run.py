@@ -18,6 +18,7 @@ from eigassign.output.figures.graph import (
     Shade,
 )
 from eigassign.study.results import (
+    WEIGHED,
     Comparison,
     ModeStudy,
     RangeRow,
@@ -35,7 +36,10 @@ LINEARISED = Look(graph.BLUE, 1.4, "dashed")
 def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> FigurePlan:
     """Exact, Taylor and linearised frequency along the trajectory, and the magnitudes of errors."""
     title = f"Mode {study.mode}: expansion against exact along {results.along}, initial design"
-    taylor, linearised = percent(comparison.worst_taylor), percent(comparison.worst_linearised)
+    taylor, linearised = (
+        percent(comparison.worst["taylor"]),
+        percent(comparison.worst["linearised"]),
+    )
     frequencies = (
         Curve(comparison.exact_hz, EXACT, "exact"),
         Curve(comparison.taylor_hz, TAYLOR, f"Taylor, order {study.order} (worst {taylor})"),
@@ -44,8 +48,8 @@ def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> 
     errors = tuple(
         Curve(100.0 * np.where(np.isfinite(error), np.abs(error), np.nan), look)
         for error, look in (
-            (comparison.taylor_error, TAYLOR),
-            (comparison.linearised_error, LINEARISED),
+            (comparison.errors["taylor"], TAYLOR),
+            (comparison.errors["linearised"], LINEARISED),
         )
     )
     panels = (
@@ -115,7 +119,8 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
             yield curves.overview(one, one.spectrum)
     if any(results.poses.lines):
         yield mechanism.poses(results.case.title, results.poses)
-    asked = any(drive.is_asked for drive in results.drives)  # else 0.15 s that nobody asked for
+    # else 0.15 s that nobody asked for
+    asked = any(d.of == WEIGHED or d.limit is not None for d in results.drives)
     yield from (curves.exerted(one, "statics") for one in each if one.statics)
     yield from reach_figures(results)
     yield from (curves.exerted(one, "drives") for one in each if asked)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
@@ -469,21 +469,21 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveLimit]:
         yield ActiveLimit(name, "target", side, multiplier)
 
 
-def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:
-    """What holds the answer back, and what the one shot's program does not depend on.
-
-    ``missed`` are the labels of the targets and limits that the answer does not meet.
-    """
+def limit_notes(
+    answer: Answer, row: AssignmentRow, targets: Sequence[TargetStudy]
+) -> Iterator[str]:
+    """What holds the answer back, and what the one shot's program does not depend on."""
+    missed = {target.label for target in targets if not target.satisfied}
+    missed |= {limit.name for limit in row.limits if not limit.satisfied}
     grouped: dict[str, list[str]] = {}
     for limit in row.active:
         on = f"lies on its {limit.side} {limit.kind} of"
         if limit.kind == "target":
             on = "misses, by the least that was found," if limit.name in missed else "just meets"
         grouped.setdefault(on, []).append(limit.name)
-    notes = [f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items()]
+    yield from (f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items())
     if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
-        notes.append(
+        yield (
             f"{answer.one_shot.undetermined} direction(s) of the design change no target: along "
             "them the initial design is kept as far as the limits allow"
         )
-    return notes

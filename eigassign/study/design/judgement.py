@@ -16,7 +16,7 @@ In this order, the first that holds:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -184,34 +184,6 @@ def soft_drives(file: CaseFile, model: Model, q: Floats) -> Iterator[tuple[str, 
             f"mode 1 has {100 * shares[name]:.2f} % of its strain in this drive, the links hardly "
             f"bend: check the stiffness (a bare number is in {'N/m' if sliding else 'N m/rad'})",
         )
-
-
-# --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers
-
-NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
-
-
-def crossing_warnings(
-    hz: Floats, modes: tuple[int, ...], where: Callable[[int], str], design: str
-) -> Iterator[str]:
-    """A warning for each of ``modes`` whose neighbour comes within 1 % along the trajectory.
-
-    ``hz`` (n_t, at least the highest mode) are exact frequencies at the design named ``design``;
-    ``where`` says in words which sample k is.
-    Modes are numbered by size at every sample: where two curves cross, their numbers swap.
-    """
-    pairs = {(low, low + 1) for mode in modes for low in (mode - 1, mode) if low >= 1}
-    for low, high in sorted(pairs):
-        if high > hz.shape[1]:
-            continue
-        gap = hz[:, high - 1] / hz[:, low - 1] - 1.0
-        k = int(np.argmin(gap))
-        if gap[k] < NEAR:
-            yield (
-                f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
-                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design. If they "
-                "cross, each number goes on with the motion of the other: name a mode by its shape"
-            )
 
 
 # --- The verdict

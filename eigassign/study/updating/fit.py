@@ -30,7 +30,6 @@ from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
-from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.search.response import spread_designs
 from eigassign.study.results import CaseRow, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
@@ -38,6 +37,7 @@ from eigassign.study.updating.measured import PosedMeasurement, read_measurement
 Floats = NDArray[np.float64]
 STARTS = 100  # at most
 OUTLIER = 3.0  # standard deviations
+NEAR = 0.01  # of a frequency: modes so near may have been measured for each other
 
 # --- Results
 
