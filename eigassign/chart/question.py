@@ -170,12 +170,13 @@ def build_question(bench: Bench) -> Question:
         max(4, int(share * count)) for count in (effort.random_points, effort.samples_per_design)
     )
     case = scene.file, scene.trajectory, scene.q0, np.clip(scene.initial, *scene.bounds)
-    found = scattered(*case[:3], n_random).joined(at_corners(*case, designs, along))
-    points = bench.points(found.samples, found.x[:, len(scene.q0) :])
+    within, outer = scattered(*case[:3], n_random), at_corners(*case, designs, along)
+    x, where = np.vstack([within[0], outer[0]]), np.append(within[1], outer[1])
+    points = bench.points(where, x[:, len(scene.q0) :])
     n, modes = len(scene.path.spread(along)), scene.expansions.modes
     runs = tuple(slice(k, k + n) for k in range(n_random, len(points), n))
     exact_hz, samples = bench.exact(points), len(scene.path.q)
-    floor = max(rounding_error(scene.model.pencil, x, max(modes)) for x in found.x[[0, -1]])
+    floor = max(rounding_error(scene.model.pencil, each, max(modes)) for each in x[[0, -1]])
     asked = Asked(
         modes=modes, n_dof=scene.model.n_dof, random_points=n_random, designs=len(runs),
         samples_per_design=n, trajectory_samples=samples,

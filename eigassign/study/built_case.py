@@ -246,24 +246,24 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
         beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
     ends = corners(len(y))
     seen, every = (
-        at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends)))) for poses in LOOKS
+        at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends))))[0] for poses in LOOKS
     )
-    every = every.joined(scattered(file, path, q0, LOOKS[0]))
+    every = np.vstack([every, scattered(file, path, q0, LOOKS[0])[0]])
     seen, every = standing(seen, trial), standing(every, trial)
     share = 1.0 - SERIES - TRUNCATION * bool(reduced_to(file))
     accuracy, reasons, count = share * asked_accuracy(file), list[str](), FEWEST
     while True:
         model = meshed(count, beyond)
-        lost = rounding_error(model.pencil, seen.x[0], max(modes_at(model, seen.x)))
+        lost = rounding_error(model.pencil, seen[0], max(modes_at(model, seen)))
         if lost > accuracy:
             raise AccuracyError(
                 f"round-off is {lost:.1e} with {count} elements, above the accuracy "
                 f"{accuracy:.1e}, and a finer mesh makes it larger: ask for less"
             )
         judge = partial(_mesh_error, model, modes_at)
-        errors = judge(seen.x)
+        errors = judge(seen)
         if errors.max() <= accuracy:
-            errors = judge(every.x)
+            errors = judge(every)
         worst = float(errors.max())
         said = f"about {100.0 * worst:.2g} % too high" if worst < np.inf else "not resolved"
         reasons.append(f"{count} elements: {said}, at {len(errors)} poses and designs")
@@ -297,7 +297,7 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
         upright = build_model(with_reduction(file, at_nodes), links)
     path, q0 = _path(file, upright)
     few = POSES if whole.pencil.is_dense else FEW_POSES
-    x = spread(standing(at_corners(file, path, q0, initial_design(file)), upright).x, few)
+    x = spread(standing(at_corners(file, path, q0, initial_design(file))[0], upright), few)
     modes = modes_that_matter(file, _bands_hz(file, path))(whole, x)
     exact, pick = standing_frequencies(whole.pencil, x, max(modes)), np.array(modes) - 1
     reasons, size = list[str](), 0

@@ -74,7 +74,7 @@ def plan_expansion(
     y0, y_note = _y0(file, model, q0)
     chosen, modes_note = _modes(file, modes)
     _check_modes(file, model, chosen)
-    notes = [q_note, y_note, modes_note, *_outside(file, q0, y0, model, trajectory)]
+    notes = [q_note, y_note, modes_note]
     wanted: int | str = file.expansion.order if order is None else order
     if isinstance(wanted, int):
         _require_affordable(file, model, wanted, given=order is None)
@@ -192,23 +192,6 @@ def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
             raise _wrong(file, where, message)
 
 
-def _outside(
-    file: CaseFile, q0: Floats, y0: Floats, model: Model, trajectory: Trajectories | None
-) -> list[str]:
-    """Notes on an expansion point that lies outside what it is meant to stand for."""
-    notes = [
-        f"the expansion design has {name} = {value:g}, outside its bounds {p.min:g} to {p.max:g}"
-        for (name, p), value in zip(file.design.parameters.items(), y0, strict=True)
-        if not p.min <= value <= p.max
-    ]
-    if trajectory is not None:
-        s, s0 = trajectory.q @ joint_map(model).T, joint_map(model) @ q0
-        reach = np.ptp(s, axis=0)
-        if np.any((s0 < s.min(axis=0) - reach) | (s0 > s.max(axis=0) + reach)):
-            notes.append("the expansion point is farther from the trajectory than that is long")
-    return notes
-
-
 def shown_point(
     names: Sequence[str], values: Floats, units: Iterable[str] = (), in_degrees: bool = False
 ) -> str:
@@ -308,12 +291,9 @@ def choose_order(
     order is then 0.
     """
     try:
-        at = unseen(file, model, trajectory, q0[None], y0)
-        found = raise_order(
-            *(model.pencil, at.x, np.concatenate([q0, y0]), SERIES * asked_accuracy(file), modes),
-            place=at.place,
-            most=np.inf if needed else GIVEN_UP,
-        )
+        x = unseen(file, model, trajectory, q0[None], y0)
+        accuracy, most = SERIES * asked_accuracy(file), np.inf if needed else GIVEN_UP
+        found = raise_order(model.pencil, x, np.append(q0, y0), accuracy, modes, most=most)
     except EigassignError as error:  # an accuracy that is not met, or a design without a pose
         if needed:
             raise
@@ -331,35 +311,10 @@ SCATTERED = 128  # points between the samples and all over the bounds
 MOST_CORNERS = 64  # of the bounds, with so many poses in all
 
 
-@dataclass(frozen=True, eq=False)
-class DesignSamples:
-    """Poses and designs x (n, n_x), and which of the trajectory's samples each row is at.
-
-    Between two of them where that is no whole number.
-    """
-
-    x: Floats
-    samples: Floats
-    trajectory: Trajectories | None
-
-    def place(self, row: int) -> str:
-        """A row in words: the nearest sample, whatever the design."""
-        if self.trajectory is None:
-            return "the expansion point"
-        at = float(self.samples[row])
-        return ("" if at.is_integer() else "a pose near ") + self.trajectory.sample(round(at))
-
-    def joined(self, other: DesignSamples) -> DesignSamples:
-        """The same samples with the rows of another at the end."""
-        x, samples = np.vstack([self.x, other.x]), np.append(self.samples, other.samples)
-        return replace(self, x=x, samples=samples)
-
-
-def standing(samples: DesignSamples, model: Model) -> DesignSamples:
-    """Those `far_from_buckling`; all where none is."""
-    kept = far_from_buckling(model, samples.x)
-    some = kept if kept.any() else slice(None)
-    return replace(samples, x=samples.x[some], samples=samples.samples[some])
+def standing(x: Floats, model: Model) -> Floats:
+    """The samples of x (n, n_x) that are `far_from_buckling`; all where none is."""
+    kept = far_from_buckling(model, x)
+    return x[kept] if kept.any() else x
 
 
 def far_from_buckling(model: Model, x: Floats, most: float = STANDS) -> NDArray[np.bool_]:
@@ -381,10 +336,10 @@ def at_corners(
     y0: Floats,
     at_upper: ArrayLike = ENDS,
     samples: int | Ints = SAMPLES,
-) -> DesignSamples:
-    """At y0 and corners of the bounds, one for each row of ``at_upper`` (k, n_y or 1).
+) -> tuple[Floats, Floats]:
+    """x (n, n_x) at y0 and corners of the bounds, a row of ``at_upper`` (k, n_y or 1) each.
 
-    Each at these ``samples`` of the trajectory, or at up to so many.
+    Each at these ``samples`` of the trajectory, or at up to so many; and which (n,) they are.
     """
     lower, upper = _bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
@@ -394,7 +349,7 @@ def at_corners(
         rows = trajectory.spread(samples) if isinstance(samples, int) else samples
     q = [q0[None] if trajectory is None else poses_at(trajectory, y)[rows] for y in designs]
     x = np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
-    return DesignSamples(x, np.tile(rows, len(designs)).astype(np.float64), trajectory)
+    return x, np.tile(rows, len(designs)).astype(np.float64)
 
 
 def unseen(
@@ -404,8 +359,8 @@ def unseen(
     about: Floats,
     y0: Floats,
     first: int = 1,
-) -> DesignSamples:
-    """Where answers about poses ``about`` (k, n_q) and design y0 are judged: never there.
+) -> Floats:
+    """x (n, n_x) where answers about poses ``about`` (k, n_q) and y0 are judged: never there.
 
     At corners of the bounds, at the poses that are farthest from these, and `scattered`.
     """
@@ -415,8 +370,8 @@ def unseen(
     if trajectory is not None:
         S = joint_map(model)
         rows = farthest(trajectory.q @ S.T, about @ S.T, MOST_CORNERS // len(at_upper))
-    outer = at_corners(file, trajectory, about[0], y0, at_upper, rows)
-    return outer.joined(scattered(file, trajectory, about[0], SCATTERED, first))
+    outer = at_corners(file, trajectory, about[0], y0, at_upper, rows)[0]
+    return np.vstack([outer, scattered(file, trajectory, about[0], SCATTERED, first)[0]])
 
 
 def farthest(points: Floats, about: Floats, count: int) -> Ints:
@@ -434,42 +389,26 @@ def farthest(points: Floats, about: Floats, count: int) -> Ints:
 
 def scattered(
     file: CaseFile, trajectory: Trajectories | None, q0: Floats, count: int, first: int = 1
-) -> DesignSamples:
+) -> tuple[Floats, Floats]:
     """Points ``first``, … of a fixed sequence (`kronecker`) between samples and within the bounds.
 
-    SciPy's sequences would do as well, at half a second for their import.
+    x (count, n_x), and where (count,) along the samples of the initial design. SciPy's sequences
+    would do as well, at half a second for their import.
     """
     lower, upper = _bounds(file)
     u = kronecker(first + count, 1 + len(lower))[first:]
     y = lower + u[:, 1:] * (upper - lower)
     if trajectory is None:
-        return DesignSamples(np.hstack([np.tile(q0, (count, 1)), y]), np.zeros(count), None)
-    q, n = travelled(file, trajectory), len(trajectory.q)
-    starts = [np.arange(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows]
-    k, share = np.divmod(u[:, 0] * sum(map(len, starts)) * (len(q) // n), 1.0)
-    start = np.add.outer(np.arange(0, len(q), n), np.concatenate(starts)).ravel()[k.astype(int)]
-    ends = np.concatenate([np.full(r.stop - r.start, r.stop - 1) for r in trajectory.rows])
-    end = start - start % n + np.minimum(start % n + 1, ends[start % n])
+        return np.hstack([np.tile(q0, (count, 1)), y]), np.zeros(count)
+    starts = np.concatenate(
+        [np.arange(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows]
+    )
+    last = np.concatenate([np.full(r.stop - r.start, r.stop - 1) for r in trajectory.rows])
+    k, share = np.divmod(u[:, 0] * len(starts), 1.0)
+    start = starts[k.astype(int)]
+    end, q = np.minimum(start + 1, last[start]), trajectory.q
     between = q[start] + share[:, None] * (q[end] - q[start])
-    return DesignSamples(np.hstack([between, y]), start % n + share * (end - start), trajectory)
-
-
-def travelled(file: CaseFile, trajectory: Trajectories) -> Floats:
-    """Poses q (m, n_q) along the trajectory: at the initial design, all samples in their order.
-
-    Where they follow the design, then at the corners of the bounds of what moves the tip, as far as
-    these can follow it.
-    """
-    if not trajectory.follows_design:
-        return trajectory.q
-    y, (lower, upper) = initial_design(file), _bounds(file)
-    moving = np.flatnonzero(np.abs(trajectory.at(y)[1]).max(axis=(0, 1)))
-    found = [trajectory.q]
-    for at_upper in corners(len(moving)):
-        corner = y.copy()
-        corner[moving] = np.where(at_upper, upper[moving], lower[moving])
-        found.append(poses_at(trajectory, corner))
-    return np.concatenate(found)
+    return np.hstack([between, y]), start + share * (end - start)
 
 
 def poses_at(trajectory: Trajectories, y: Floats) -> Floats:

@@ -236,7 +236,7 @@ def unseen_points(scene: Scene) -> Floats:
     """x (n, n_x) where the scene's expansions are judged; `auto` has looked at other ones."""
     about = np.array([part.q0 for part in scene.expansions.fulls.parts])
     y0, first = scene.expansions.full.y0, 1 + SCATTERED
-    return unseen(scene.file, scene.model, scene.trajectory, about, y0, first).x
+    return unseen(scene.file, scene.model, scene.trajectory, about, y0, first)
 
 
 def compare(
@@ -353,8 +353,8 @@ def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     lower, upper = scene.bounds
     if np.any(upper > lower):
         ends = corners(len(lower), MOST_CORNERS)
-        outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)
-        yield DESIGN_BOX, outer.joined(scattered(file, None, scene.q0, SCATTERED)).x
+        outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)[0]
+        yield DESIGN_BOX, np.vstack([outer, scattered(file, None, scene.q0, SCATTERED)[0]])
     if scene.trajectory is not None:
         yield BETWEEN, unseen_points(scene)
 

@@ -98,10 +98,3 @@ def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:
     assert plan.y0.shape == (0,)
     assert (plan.order, plan.modes) == (3, (1,))
     assert any("because no target names a mode" in note for note in plan.notes)
-
-
-def test_a_point_outside_what_it_stands_for_is_noted(tmp_path: Path) -> None:
-    text = changed(("y: [0.125, 0.125]", "y: [0.5, 0.125]"), ("q: [1.817, 5.312]", "q: [1.8, 7]"))
-    notes = " / ".join(plan_of(tmp_path, text).notes)
-    assert "m1 = 0.5, outside its bounds 0 to 0.25" in notes
-    assert "farther from the trajectory than that is long" in notes
