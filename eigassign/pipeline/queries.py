@@ -236,8 +236,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = part_lines(file)
-    notes += () if case.mesh is None else case.mesh.reasons
-    notes += () if case.reduction is None else case.reduction.reasons
+    notes += case.settled.reasons
     notes += () if trajectory is None else trajectory.notes
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)

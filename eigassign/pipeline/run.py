@@ -228,10 +228,8 @@ def prepare(
         plan = plan_expansion(file, model, path, order, modes, needed)
         expansions, notes = expand_plan(model, plan, cache) if plan.order else (None, [])
     moving = () if path is None else path.notes
-    mesh = () if case.mesh is None else case.mesh.reasons
-    smaller = () if case.reduction is None else case.reduction.reasons
     variant = (f"variant: {key} = {shown(value)}" for key, value in file.variant.items())
-    notes = [*variant, *mesh, *smaller, *moving, *plan.notes, *notes]
+    notes = [*variant, *case.settled.reasons, *moving, *plan.notes, *notes]
     path = with_instants(file, path) if assigned and path is not None else path
     if path is not None and (count := int(path.inserted.sum())):
         instants = f"{counted(count, 'instant')} between samples, of which something is asked"

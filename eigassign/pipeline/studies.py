@@ -117,6 +117,6 @@ def chart_case(
         with stages("mesh", "charting meshes"):
             poses = scene.path.q[scene.path.spread(5)]
             x = scene.model.x(poses, scene.initial)
-            mesh = chart_meshes(case.settled, x, scene.expansions.modes, effort)
+            mesh = chart_meshes(case.settled.file, x, scene.expansions.modes, effort)
     notes = (*made.notes, *truncation_notes(scene))
     return replace(made, mesh=mesh, notes=notes, seconds=stages.total_s)

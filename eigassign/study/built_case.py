@@ -9,12 +9,12 @@ expansion points are settled later, from the model that is built here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,6 @@ from eigassign.modal.model import Model
 from eigassign.study.planning import (
     SERIES,
     TRUNCATION,
-    ModesAt,
     asked_accuracy,
     at_corners,
     automatic_elements,
@@ -173,29 +172,25 @@ def _followed(
 # Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
 # these where they are large half a second
 POSES, FEW_POSES = 6, 2
-FEWEST, MAX_ELEMENTS = 2, 256  # of a link; with more round-off, which grows as n⁴, is larger
-LOOKS = 20, 60  # poses and designs that a mesh is chosen at, and confirmed at
+ELEMENTS = tuple(2**k for k in range(1, 9))  # of a link; with more round-off, as n⁴, is larger
+LOOKS = 60  # poses and designs at corners of the bounds that a mesh is chosen at; a third between
 # Times the highest frequency that matters: where elements are chosen imported parts with
 # `reduce_to: auto` are reduced to that, far beyond what is chosen for them then
 BEYOND = 8.0
 
 
 @dataclass(frozen=True)
-class MeshChoice:
-    """Elements of each link, by how much they raise frequencies, about, and all that was tried."""
+class Choice:
+    """A number for each link, None where it stays whole; how far that is off, about; the tries."""
 
-    elements: Mapping[str, int]
+    values: Mapping[str, Any]
     error: float
     reasons: tuple[str, ...]
 
-
-@dataclass(frozen=True)
-class ReductionChoice:
-    """The frequency in Hz for each link, None where it stays whole; its error; what was tried."""
-
-    frequencies: Mapping[str, float | None]
-    error: float
-    reasons: tuple[str, ...]
+    @property
+    def elements(self) -> Mapping[str, int]:
+        """The values, of a mesh: the elements of each link."""
+        return self.values
 
 
 @dataclass(frozen=True)
@@ -204,8 +199,13 @@ class SettledModel:
 
     file: CaseFile
     model: Model
-    mesh: MeshChoice | None  # the elements chosen; None where all are given
-    reduction: ReductionChoice | None  # the frequencies chosen; None without ``reduce_to: auto``
+    mesh: Choice | None  # the elements chosen; None where all are given
+    reduction: Choice | None  # the frequencies chosen, in Hz; None without ``reduce_to: auto``
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """All that was tried for both, in words."""
+        return tuple(line for one in (self.mesh, self.reduction) if one for line in one.reasons)
 
 
 def settle_model(file: CaseFile) -> SettledModel:
@@ -214,82 +214,73 @@ def settle_model(file: CaseFile) -> SettledModel:
     Raises AccuracyError where no mesh meets ``expansion.accuracy``, CaseError at the line of what
     cannot be modelled.
     """
-    mesh = _chosen_elements(file)
-    meshed = file if mesh is None else with_elements(file, mesh.elements)
-    links = build_links(meshed)
-    reduction = _chosen_reduction(meshed, links)
-    settled = meshed if reduction is None else with_reduction(meshed, reduction.frequencies)
+    mesh = reduction = None
+    asked, names, meshed = asked_accuracy(file), _left_to_auto(file), file
+    if None in automatic_elements(file).values():
+        share = 1.0 - SERIES - TRUNCATION * bool(reduced_to(file))
+        mesh = first_within(share * asked, _finer_meshes(file, share * asked))
+        meshed = with_elements(file, mesh.values)
+    links, settled = build_links(meshed), meshed
+    if names:
+        reduction = first_within(TRUNCATION * asked, _less_reduced(meshed, links, names))
+        settled = with_reduction(meshed, reduction.values)
     return SettledModel(settled, build_model(settled, links), mesh, reduction)
 
 
-def _chosen_elements(file: CaseFile) -> MeshChoice | None:
-    """More elements for the links that leave them to ``auto``, twice at most, until the error fits.
+Try: TypeAlias = tuple[Mapping[str, Any], str, float]  # values, words, error
 
-    At poses of the initial design and corners of the bounds, then at more and at random designs.
+
+def first_within(accuracy: float, tries: Iterator[Try]) -> Choice:
+    """The first of ``tries`` with an error within the accuracy; raises AccuracyError for none."""
+    reasons = list[str]()
+    for values, words, error in tries:
+        reasons.append(words)
+        if error <= accuracy:
+            return Choice(values, error, tuple(reasons))
+    raise AccuracyError(f"no mesh meets the accuracy {accuracy:.1e}: {reasons[-1]}")
+
+
+def _finer_meshes(file: CaseFile, accuracy: float) -> Iterator[Try]:
+    """Twice and twice as many elements for the links that leave them to ``auto``.
+
+    At poses of the initial design, at corners of the bounds, and between all of these. Raises
+    AccuracyError where round-off is above the accuracy.
     """
-    elements = automatic_elements(file)
-    if None not in elements.values():
-        return None
+    elements, y = automatic_elements(file), initial_design(file)
     parts = [name for name in _left_to_auto(file) if is_imported(file, name)]
 
     def meshed(count: int, to_hz: float = LOWEST) -> Model:
         meshed = with_elements(file, {name: n or count for name, n in elements.items()})
         return build_model(with_reduction(meshed, dict.fromkeys(parts, to_hz)))
 
-    trial, y = meshed(FEWEST), initial_design(file)
+    trial, beyond = meshed(ELEMENTS[0]), LOWEST
     path, q0 = _path(file, trial)
     modes_at = modes_that_matter(file, _bands_hz(file, path))
-    beyond = LOWEST
     if parts:
         q = q0 if path is None else path.q[0]
         highest = max(modes_at(trial, trial.x(q, y)))
         beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
     ends = corners(len(y))
-    seen, every = (
-        at_corners(file, path, q0, y, ends, max(1, poses // (1 + len(ends))))[0] for poses in LOOKS
-    )
-    every = np.vstack([every, scattered(file, path, q0, LOOKS[0])[0]])
-    seen, every = standing(seen, trial), standing(every, trial)
-    share = 1.0 - SERIES - TRUNCATION * bool(reduced_to(file))
-    accuracy, reasons, count = share * asked_accuracy(file), list[str](), FEWEST
-    while True:
+    x = at_corners(file, path, q0, y, ends, max(1, LOOKS // (1 + len(ends))))[0]
+    x = standing(np.vstack([x, scattered(file, path, q0, LOOKS // 3)[0]]), trial)
+    for count in ELEMENTS:
         model = meshed(count, beyond)
-        lost = rounding_error(model.pencil, seen[0], max(modes_at(model, seen)))
+        lost = rounding_error(model.pencil, x[0], max(modes_at(model, x)))
         if lost > accuracy:
             raise AccuracyError(
                 f"round-off is {lost:.1e} with {count} elements, above the accuracy "
                 f"{accuracy:.1e}, and a finer mesh makes it larger: ask for less"
             )
-        judge = partial(_mesh_error, model, modes_at)
-        errors = judge(seen)
-        if errors.max() <= accuracy:
-            errors = judge(every)
-        worst = float(errors.max())
+        kept, (q, y) = far_from_buckling(model, x), np.split(x, [len(q0)], axis=1)
+        modes = modes_at(model, x[kept]) if kept.any() else ()
+        worst = float(model.beam_error(q[kept], y[kept], modes).max()) if modes else 0.0
         said = f"about {100.0 * worst:.2g} % too high" if worst < np.inf else "not resolved"
-        reasons.append(f"{count} elements: {said}, at {len(errors)} poses and designs")
-        if worst <= accuracy:
-            chosen = {name: n or count for name, n in elements.items()}
-            return MeshChoice(chosen, worst, tuple(reasons))
-        if count == MAX_ELEMENTS:
-            raise AccuracyError(f"no mesh meets the accuracy {accuracy:.1e}: {reasons[-1]}")
-        most = 2.0 if worst == np.inf else (worst / accuracy) ** 0.25  # the order of bending
-        count = min(max(count + 1, int(np.ceil(count * min(most, 2.0)))), MAX_ELEMENTS)
+        words = f"{count} elements: {said}, at {len(x)} poses and designs"
+        yield {name: n or count for name, n in elements.items()}, words, worst
 
 
-def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
-    """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
-    n_q, error, kept = len(model.q_names), np.zeros(len(x)), far_from_buckling(model, x)
-    if kept.any():
-        x, modes = x[kept], modes_at(model, x[kept])
-        error[kept] = model.beam_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1)
-    return error
-
-
-def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
-    """Higher and higher frequencies to reduce to, until the error against whole links fits."""
-    names = _left_to_auto(file)
-    if not names:
-        return None
+def _less_reduced(file: CaseFile, links: WholeLinks, names: Sequence[str]) -> Iterator[Try]:
+    """Twice and twice as high frequencies to reduce to, judged by whole links; then these."""
     whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
     upright = whole
     if whole.pencil.weight is not None:  # inside imported parts it changes little
@@ -300,24 +291,17 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
     x = spread(standing(at_corners(file, path, q0, initial_design(file))[0], upright), few)
     modes = modes_that_matter(file, _bands_hz(file, path))(whole, x)
     exact, pick = standing_frequencies(whole.pencil, x, max(modes)), np.array(modes) - 1
-    reasons, size = list[str](), 0
-    for frequency in exact[0].max() / np.pi * 1.5 ** np.arange(16):
+    for frequency in exact[0].max() / np.pi * 2.0 ** np.arange(10):
         to_hz = dict.fromkeys(names, float(frequency))
         model = build_model(with_reduction(file, to_hz), links)
-        tried = f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs"
         if not model.is_reduced or model.n_dof > 0.5 * whole.n_dof:
-            reasons.append(tried)
             break
-        if model.n_dof == size:  # no mode in between
-            continue
-        size = model.n_dof
         hz = standing_frequencies(model.pencil, x, max(modes))
         worst = float(np.abs(hz / exact - 1.0)[:, pick].max())
-        reasons.append(f"{tried}, {100 * worst:.2g} % too high")
-        if worst <= TRUNCATION * asked_accuracy(file):
-            return ReductionChoice(to_hz, worst, tuple(reasons))
-    reasons.append(f"not reduced, because it saves too little: {', '.join(names)}")
-    return ReductionChoice(dict.fromkeys(names), 0.0, tuple(reasons))
+        tried = f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs"
+        yield to_hz, f"{tried}, {100 * worst:.2g} % too high", worst
+    words = f"not reduced, because it saves too little: {', '.join(names)}"
+    yield dict.fromkeys(names), words, 0.0
 
 
 def _left_to_auto(file: CaseFile) -> list[str]:
@@ -360,26 +344,17 @@ class BuiltCase:
         Raises CaseError for a mechanism that cannot be modelled, AccuracyError where elements are
         left to ``auto`` and no mesh meets ``expansion.accuracy``.
         """
-        return self._settled.model
+        return self.settled.model
 
     @cached_property
-    def _settled(self) -> SettledModel:
+    def settled(self) -> SettledModel:
+        """The model with what was chosen for links that leave it to ``auto``; raises as `model`."""
         return settle_model(self.file)
 
     @property
-    def settled(self) -> CaseFile:
-        """The file with numbers in place of ``auto`` for its links; raises as `model` does."""
-        return self._settled.file
-
-    @property
-    def mesh(self) -> MeshChoice | None:
+    def mesh(self) -> Choice | None:
         """The elements chosen for links that leave them to ``auto``; None where none does."""
-        return self._settled.mesh
-
-    @property
-    def reduction(self) -> ReductionChoice | None:
-        """The frequencies that links with ``reduce_to: auto`` are reduced to; None without any."""
-        return self._settled.reduction
+        return self.settled.mesh
 
     @cached_property
     def initial_design(self) -> Floats:

@@ -32,7 +32,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
 
 def charted(case: Case, *factors: float, most_dof: int = 10_000) -> tuple[MeshRow, ...]:
     effort = replace(TINY, factors=factors, most_dof=most_dof)
-    return chart_meshes(case.settled, X, (1,), effort)
+    return chart_meshes(case.settled.file, X, (1,), effort)
 
 
 def test_links_are_refined_together_and_keep_an_element(case: Case) -> None:
@@ -53,16 +53,16 @@ def test_links_left_to_auto_are_refined_from_the_elements_that_were_chosen(tmp_p
     (tmp_path / "auto.yaml").write_text(text)
     case = load_case(tmp_path / "auto.yaml")
     assert case.mesh is not None
-    assert case.reduction is not None
+    assert case.settled.reduction is not None
     own = (case.mesh.elements["upper_arm"], case.mesh.elements["forearm"], 2, 3)
-    (same, counts), (finer, doubled) = (refined(case.settled, k) for k in (1.0, 2.0))
+    (same, counts), (finer, doubled) = (refined(case.settled.file, k) for k in (1.0, 2.0))
     assert counts == own
     assert doubled == tuple(2 * n for n in own)
     hz, hz_finer = (build_model(f).frequencies(X[:, :2], X[:, 2:], 1) for f in (same, finer))
     assert hz == pytest.approx(case.model().frequencies(X[:, :2], X[:, 2:], 1), rel=1e-12)
     assert 0.0 < abs(hz_finer / hz - 1.0) < 0.01
-    reduced = case.settled.mechanism.links["upper_arm"].reduce_to
-    assert reduced == case.reduction.frequencies["upper_arm"]
+    reduced = case.settled.file.mechanism.links["upper_arm"].reduce_to
+    assert reduced == case.settled.reduction.values["upper_arm"]
 
 
 def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(case: Case) -> None:

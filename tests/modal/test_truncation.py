@@ -66,7 +66,7 @@ def automatic(tmp_path: Path, elements: int = 24, **more: Any) -> Case:
 
 def test_auto_is_within_its_share_of_the_accuracy_and_no_finer_than_that(tmp_path: Path) -> None:
     case = automatic(tmp_path)
-    model, choice = case.model(), case.reduction
+    model, choice = case.model(), case.settled.reduction
     assert choice is not None
     assert choice.error <= 0.25e-4
     full = Case(with_reduction(case.file, {"one": None, "two": None})).model()
@@ -75,7 +75,7 @@ def test_auto_is_within_its_share_of_the_accuracy_and_no_finer_than_that(tmp_pat
     true = model.frequencies(q, y, 2) / full.frequencies(q, y, 2) - 1.0
     assert 0 < true.max() < 1.1 * choice.error
     assert model.n_dof < 0.5 * full.n_dof
-    assert choice.reasons[-1].startswith(f"reduced to {choice.frequencies['one']:.4g} Hz: ")
+    assert choice.reasons[-1].startswith(f"reduced to {choice.values['one']:.4g} Hz: ")
     assert choice.reasons[-1].endswith("% too high")
     rough = automatic(tmp_path).model()
     assert automatic(tmp_path, accuracy=1e-2).model().n_dof < rough.n_dof
@@ -86,8 +86,10 @@ def test_auto_leaves_small_links_whole_and_says_so(tmp_path: Path) -> None:
     few = with_elements(case.file, {"one": 2, "two": 2})
     small = Case(few)
     assert not small.model().is_reduced
-    assert small.reduction is not None
-    assert small.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
+    assert small.settled.reduction is not None
+    assert (
+        small.settled.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
+    )
 
 
 def test_a_run_states_what_its_reduced_links_leave_out(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def mixed() -> Tree:
 
 def test_the_mesh_is_good_enough_at_every_corner_of_the_design() -> None:
     case = case_of(mixed())
-    fine = build_model(refined(case.settled, 8.0)[0])
+    fine = build_model(refined(case.settled.file, 8.0)[0])
     error = [
         case.model().frequencies([], y, 2)[0, 1] / fine.frequencies([], y, 2)[0, 1] - 1.0
         for y in itertools.product((0.004, 0.04), repeat=2)
