@@ -179,7 +179,7 @@ def time_in_words(value: float) -> str:
 
 
 def positive_percent(fraction: float) -> str:
-    """The same of what counts above round-off, 1e-8, only: a violation, or room."""
+    """Per cents of what counts above round-off, 1e-8, only: a violation, or room."""
     return percent(fraction if fraction > 1e-8 else 0.0)
 
 

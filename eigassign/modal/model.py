@@ -162,7 +162,7 @@ class Model:
         return samples(q, y, len(self.q_names), len(self.y_names))
 
     def one(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """The same of one sample, (1, n_q + n_y); raises UsageError for several."""
+        """x of one sample, (1, n_q + n_y); raises UsageError for several."""
         x = self.x(q, y)
         if len(x) != 1:
             raise UsageError(f"this is for one sample of q and y, not {len(x)}")
@@ -286,7 +286,7 @@ class Model:
         return self.shapes_along(q, y, count)[0]
 
     def shapes_along(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[ModeShapes, ...]:
-        """The same at each of several samples, for a picture that moves."""
+        """The shapes at each of several samples, for a picture that moves."""
         hz, phi = self.modes(q, y, count)
         found = shapes(self.poses, self.x(q, y), phi)
         return tuple(

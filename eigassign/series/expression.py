@@ -157,7 +157,7 @@ class Expression:
         return other * self**-1.0
 
     def _recorded(self) -> Expression:
-        """The same value as one atom of factor 1."""
+        """The value as one atom of factor 1."""
         factor, atom = self.single()
         return self.recorder._atom(("linear", 0.0, ((atom, factor),)))
 
@@ -267,7 +267,7 @@ def atom_of(x: Scalar, atom: int) -> Scalar:
 
 
 def one_atom(x: Scalar) -> Scalar:
-    """The same scalar as factor × atom, a sum being recorded as an atom of its own."""
+    """The scalar as factor × atom, a sum being recorded as an atom of its own."""
     if not isinstance(x, Expression):
         return x
     factor, atom = x.single()

@@ -196,7 +196,7 @@ def _least(J: Floats, F: Floats) -> Floats:
 
 
 def _solved(J: Floats, F: Floats) -> Floats:
-    """The same from the neighbourhood of a regular J: without its singular values."""
+    """The solution near a regular J, without its singular values."""
     turned = np.swapaxes(J, 1, 2)
     try:
         if J.shape[1] == J.shape[2]:

@@ -56,7 +56,7 @@ Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_u
 
 
 def frozen(array: Floats) -> Floats:
-    """The same numbers, contiguous, in an array that cannot be written to."""
+    """The numbers, contiguous, in an array that cannot be written to."""
     array = np.ascontiguousarray(array)
     array.setflags(write=False)
     return array
@@ -1143,7 +1143,7 @@ _OF_SAMPLES = (Comparison, ModeRow, FollowedRow, DriveRow, StaticRow, TargetStud
 
 
 def _part(row: Row, rows: slice) -> Row:
-    """The same at some of the samples: of each array of rows of samples those."""
+    """What holds at some of the samples: of each array of rows of samples those."""
     if isinstance(row, np.ndarray):
         return row[rows]  # type: ignore[return-value]
     if isinstance(row, tuple):

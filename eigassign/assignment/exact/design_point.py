@@ -96,7 +96,7 @@ class DesignPoint:
         return len(self.seen.residual)
 
     def shifted(self, by: Floats) -> DesignPoint:
-        """The same with ``by`` (m + k,) added to what is expected."""
+        """What is expected with ``by`` (m + k,) added to it."""
         pairs = replace(self.pairs, other=self.pairs.other + by[self.pairs.row])
         return replace(self, values=self.values + by, pairs=pairs)
 
@@ -257,7 +257,7 @@ def _box_normals(box: UnitBox, z: Floats) -> Iterator[_Held]:
 
 
 def _unbalanced_violation(held: Sequence[_Held], place: DesignPoint) -> float:
-    """The same of the largest excess: 0 where no direction within the limits lowers it."""
+    """What is left of the slope of the largest excess: 0 where no direction lowers it."""
     excess = place.seen.excess
     _, steepest = _with_branches(place, place.m + np.flatnonzero(excess >= excess.max() - ON))
     together = np.zeros(len(steepest), dtype=np.intp)

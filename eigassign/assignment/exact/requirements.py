@@ -143,7 +143,7 @@ class Requirements:
         return tuple(dict.fromkeys(one.name for one in self.limits))
 
     def with_limits(self, names: Collection[str]) -> Requirements:
-        """The same with those limits only that are named."""
+        """The requirements without the limits that are not named."""
         kept = (one for one in self.asked if one.is_goal or one.name in names)
         return replace(self, asked=tuple(kept))
 

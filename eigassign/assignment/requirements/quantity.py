@@ -67,7 +67,7 @@ class LimitedQuantity(Requirement):
 
     @property
     def constraint(self) -> LinearConstraint | None:
-        """The same as a row of the program, kept exactly by each step; None of most."""
+        """Its row of the program, kept exactly by each step; None of most."""
         row, (low, high) = self.quantity, self.allowed
         return replace(row, lower=low, upper=high) if isinstance(row, LinearConstraint) else None
 

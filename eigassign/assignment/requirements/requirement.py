@@ -69,7 +69,7 @@ class NeighbourPairs:
         return cls(rows.astype(np.intp), rows, slopes, slopes, rows, rows.astype(bool))
 
     def scaled(self, free: list[int], width: Floats) -> NeighbourPairs:
-        """The same with slopes in units ``width`` of the design parameters ``free``."""
+        """The rows with slopes in units ``width`` of the design parameters ``free``."""
         return replace(self, others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
 
     def chosen(self, mask: NDArray[np.bool_]) -> NeighbourPairs:
@@ -226,7 +226,7 @@ class Requirement(Brief):
         return of_all[self.rows] if self.seconds is None else self.seconds
 
     def part(self, name: str, own: slice) -> Self:
-        """The same along one trajectory only, at these of its own samples."""
+        """What holds along one trajectory, at these of its own samples."""
         first, n = self.rows.start + own.start, own.stop - own.start
         return replace(
             self,
@@ -298,7 +298,7 @@ class Requirement(Brief):
 
     @property
     def constraint(self) -> LinearConstraint | None:
-        """The same as a limit that is linear in the design; None where it is not."""
+        """The limit as one that is linear in the design; None where it is not."""
         return None
 
     @property

@@ -65,7 +65,7 @@ class Highest(Part):
 
     @property
     def target(self) -> HighestTarget:
-        """The same as a target."""
+        """The mode as a target."""
         if isinstance(self.highest, HighestMode):
             return HighestTarget(mode=self.highest.mode, trajectory=self.highest.trajectory)
         return HighestTarget(mode=self.highest)

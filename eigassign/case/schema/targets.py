@@ -215,7 +215,7 @@ class ModeTarget(SomeModes):
 
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """The same with its key."""
+        """Frequencies with their key."""
         return (((self.kind,), self.curve),)
 
     @property
@@ -435,7 +435,7 @@ class StiffnessTarget(StaticTarget):
 
 
 class ComplianceTarget(StaticTarget):
-    """The same by its inverse.
+    """Stiffness by its inverse.
 
     Keys:
         compliance: where, and along which direction

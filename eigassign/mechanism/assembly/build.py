@@ -106,7 +106,7 @@ def build_pencil(
 
 
 def _in_few_elements(scene: Loaded, parameters: ModelParameters) -> Loaded:
-    """The same mechanism in as few elements as may be."""
+    """The mechanism in as few elements as may be."""
     links, nodes = local_links(in_few_elements(scene.case), parameters, scene.motion)
     return replace(scene, links=by_name(scene.motion, links), nodes=nodes)
 
@@ -139,7 +139,7 @@ def in_few_elements(case: CaseFile) -> CaseFile:
 
 
 def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
-    """The same case with ``factor`` times the elements in every beam, and their numbers.
+    """The case with ``factor`` times the elements in every beam, and their numbers.
 
     A beam keeps at least one. Every number of elements must be given or settled.
     """

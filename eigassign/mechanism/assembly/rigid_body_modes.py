@@ -280,7 +280,7 @@ def _null_space(A: Floats) -> Floats:
 
 
 def _echelon(W: Floats) -> tuple[Floats, list[int]]:
-    """The same space with the identity on pivot rows; round-off beside whole numbers removed."""
+    """The space with the identity on pivot rows; round-off beside whole numbers removed."""
     W = W / np.abs(W).max(axis=0, initial=0.0)
     pivots = []
     for column in range(W.shape[1]):

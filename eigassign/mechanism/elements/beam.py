@@ -129,7 +129,7 @@ def element_mass(profile: Profile, h: Scalar) -> list[ElementTerm]:
 
 
 def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
-    """The same sum, with all constant coefficients in one matrix: most elements have no others."""
+    """The sum with all constant coefficients in one matrix: most elements have no others."""
     varying: list[ElementTerm] = []
     total = np.zeros((12, 12))
     for term in terms:

@@ -405,7 +405,7 @@ def bent_link(
 
 
 def _atom_by_atom(terms: Sequence[ElementTerm]) -> list[ElementTerm]:
-    """The same sum without sums in its coefficients: those of a taper's elements are alike."""
+    """The sum without sums in its coefficients: those of a taper's elements are alike."""
     return [
         ElementTerm(atom_of(c, atom) * factor, matrix)
         for c, matrix in terms

@@ -208,7 +208,7 @@ def _off(ik: TipProblem, course: Course, u: Floats, tolerance: float) -> Bools:
 
 
 def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
-    """The same with the passive freedoms as the model has them; TrajectoryError if others."""
+    """The path with the passive freedoms as the model has them; TrajectoryError if others."""
     own = _own(ik, u)
     other = _off(ik, course, own, 100.0 * RESIDUAL)
     if other.any():
@@ -317,7 +317,7 @@ def _distinct(ik: TipProblem, u: Floats) -> list[Floats]:
 
 
 def _normalised(ik: TipProblem, u: Floats, turns: Bools) -> Floats:
-    """The same pose within π of the start, else in [0, 2π), where round-off below 0 stays 0."""
+    """The pose within π of the start, else in [0, 2π), where round-off below 0 stays 0."""
     if ik.start is not None:
         return np.where(turns, ik.start + wrapped(u - ik.start), u)
     turned = np.mod(u, 2.0 * np.pi)

@@ -47,7 +47,7 @@ def closed_kinematics(
 
 
 def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> Kinematics:
-    """The same motion with every coordinate among the columns, locked ones too."""
+    """The motion with every coordinate among the columns, locked ones too."""
     c = motion.coordinates
     n = len(c.relative)
     rates = np.zeros((len(motion.tree.freedoms), n))
@@ -425,7 +425,7 @@ def kronecker(count: int, n: int) -> Floats:
 
 
 def wrapped(angles: Floats) -> Floats:
-    """The same angles in [−π, π)."""
+    """Angles in [−π, π)."""
     return np.asarray(np.mod(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 

@@ -118,11 +118,11 @@ class ModelParameters:
         return self.recorder.variable(k) if k < n_q else self.passive[k - n_q]
 
     def with_passive(self, values: Sequence[Scalar]) -> ModelParameters:
-        """The same with the passive freedoms known."""
+        """The parameters with the passive freedoms known."""
         return replace(self, passive=tuple(values))
 
     def rerecorded(self, recorder: Recorder, n_passive: int) -> ModelParameters:
-        """The same on another recorder, the passive freedoms being its last variables."""
+        """The parameters on another recorder, the passive freedoms being its last variables."""
         moved = _properties(recorder, len(self.coordinates), self.sums, self.scales)
         passive = tuple(recorder.variable(self.count + k) for k in range(n_passive))
         return replace(self, recorder=recorder, by_path=moved, passive=passive)

@@ -37,12 +37,12 @@ class JointEdge:
     turned: bool = False
 
     def reversed(self) -> JointEdge:
-        """The same joint walked the other way."""
+        """The joint walked the other way."""
         return JointEdge(self.joint, self.follower, self.base, not self.turned)
 
     @property
     def written(self) -> JointEdge:
-        """The same joint as the file has it."""
+        """The joint as the file has it."""
         return self.reversed() if self.turned else self
 
 

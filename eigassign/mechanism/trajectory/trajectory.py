@@ -102,7 +102,7 @@ class Trajectory(Brief):
         return self.of_design(y)
 
     def joined(self, loads: Floats) -> Trajectory:
-        """The same with ``loads`` (n_loads,), which neither time nor design change, behind q."""
+        """It with ``loads`` (n_loads,), which neither time nor design change, behind q."""
         known = self.known and self.known.joined(loads)
         return replace(self, q=behind(self.q, loads), known=known)
 
@@ -122,7 +122,7 @@ class Trajectory(Brief):
         return ~np.isin(self.time_s, self.given.time_s)
 
     def with_instants(self, times_s: ArrayLike) -> Trajectory:
-        """The same with instants between its samples."""
+        """The trajectory with instants between its samples."""
         time_s = np.union1d(self.time_s, times_s)
         if len(time_s) == len(self.time_s):
             return self
@@ -417,7 +417,7 @@ class Trajectories(Brief):
         return f"{said} of trajectory {part.name!r}" if self.several else said
 
     def where(self, k: int) -> str:
-        """The same with its time."""
+        """The sample in words with its time."""
         return f"{self.sample(k)} (t = {self.time_s[k]:.4g} s)"
 
     def name_of(self, k: int) -> str:
@@ -454,7 +454,7 @@ class Trajectories(Brief):
         return np.concatenate([part.trajectory.inserted for part in self.parts])
 
     def with_instants(self, times_s: Sequence[ArrayLike]) -> Trajectories:
-        """The same with instants between the samples of each trajectory, at these of its times."""
+        """The trajectories with instants between their samples, at these of its times."""
         return Trajectories(
             tuple(
                 part._replace(trajectory=part.trajectory.with_instants(times))
@@ -464,7 +464,7 @@ class Trajectories(Brief):
 
     @cached_property
     def finely(self) -> Trajectories:
-        """The same with each trajectory divided evenly into `FINELY` steps at least."""
+        """The trajectories, each divided evenly into `FINELY` steps at least."""
         return self.with_instants([_divided(part.trajectory.time_s) for part in self.parts])
 
     def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:

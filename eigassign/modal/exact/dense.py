@@ -61,7 +61,7 @@ def condense(
 
 
 def condense_blocks(M_EE: Floats, M_FE: Floats, M_FF: Floats) -> tuple[Floats, Floats]:
-    """The same from its blocks."""
+    """M_FF⁻¹ M_FE and M_c from the blocks of M."""
     if not M_FF.size:
         return M_FE, M_EE
     try:

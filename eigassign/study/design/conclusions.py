@@ -312,7 +312,7 @@ def _null_space(J: Floats) -> Floats:
 
 
 def least_changed(found: Found, initial: Floats) -> Found:
-    """The same answer with undetermined directions pulled back to the initial design.
+    """The answer with undetermined directions pulled back to the initial design.
 
     Only where the merit is not worse than 1e-9 of itself.
     """

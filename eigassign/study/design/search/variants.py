@@ -122,7 +122,7 @@ class Task:
 
 
 def thinned(whole: Task, few: int) -> Task | None:
-    """The same on few samples; None where there are few, or a target would have none of them."""
+    """The problem on few samples; None where there are few, or a target would have none of them."""
     path = whole.scene.path
     if len(path.q) < 2 * few:
         return None
@@ -291,7 +291,7 @@ class Searched:
         return self.optima[0]
 
     def with_best(self, best: Optimum) -> Self:
-        """The same with another best design."""
+        """The choice with another best design."""
         return replace(self, optima=(best, *self.optima[1:]))
 
 
