@@ -118,7 +118,7 @@ def test_several_points_reach_over_it():
     exact = model.frequencies(UNFOLDING, [0.1], 2)
     assert np.abs(chosen.frequencies(UNFOLDING, [0.1]) / exact - 1.0).max() <= 1e-3
     assert len(chosen.parts) > 1
-    with pytest.raises(AccuracyError, match="at sample"):
+    with pytest.raises(AccuracyError, match=r"off at \(q, y\) = "):
         raise_order(model.pencil, X, X[30], 1e-7, (1, 2), orders=(2,))
 
 
