@@ -31,7 +31,7 @@ from references import oracle
 from scipy.sparse import linalg
 
 import eigassign as ea
-from eigassign.assignment import Optimum, minimise, requirements_of
+from eigassign.assignment import Optimum, minimise
 from eigassign.pipeline import Stages, prepare
 from eigassign.study import DesignResponse, Task, find_optimum, variant_of
 
@@ -155,9 +155,8 @@ class FirstSolve:
 def our_search(case: ea.Case) -> dict[str, Any]:
     """The search of `optimize`, and how far it was before it solved anything exactly."""
     scene = prepare(case, Stages(lambda line: None), None)
-    wanted = requirements_of(case.file, scene.path)
     with FirstSolve() as first:
-        found = find_optimum(scene, wanted, (), lambda line: None)
+        found = find_optimum(scene, (), lambda line: None)
         seconds = time.process_time() - first.begun
     problem = oracle.of_case(case)
     return {
@@ -216,7 +215,7 @@ def same_start() -> Iterator[common.Row]:
         if len(problem.C):
             continue
         scene = prepare(case, Stages(lambda line: None), None)
-        task = Task(scene, requirements_of(case.file, scene.path))
+        task = Task(scene, scene.wanted)
         search = partial(_sequential, task)
         found = search()
         y = scipy_search(Timed, case)

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.one_shot import Assignment
-from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.sampling import requirements_of, with_instants
+from eigassign.assignment.requirements.sampling import with_instants
 from eigassign.brief import counted
 from eigassign.case.reader import shown
 from eigassign.errors import EigassignError
@@ -144,35 +143,31 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     file, stages = case.file, Stages(options.progress)
     require_assignable(file)
     with case.located():
-        scene = prepare(case, stages, _cache(options), assigned=True)
-        wanted = requirements_of(file, scene.path)
+        prepared = prepare(case, stages, _cache(options), assigned=True)
         with stages("assignment", "assigning the frequencies"):
-            answer = find_answer(scene, wanted, options.progress)
-        if answer.found is not None:  # on instants between the samples too
-            scene, wanted = answer.found.task.scene, answer.found.task.wanted
-        solved = _solved(scene, wanted, answer, stages)
+            answer = find_answer(prepared, options.progress)
+        scene, solved = answer.scene, _solved(answer, stages)
         accepted = file.assignment.max_error or MAX_ERROR
-        targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
+        targets = study_targets(scene.path, scene.wanted, solved, answer.predicted, accepted)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, solved.initial.hz)
             accuracy = study_accuracy(scene, answer.y, judged_modes(file, targets))
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
-            meaning = study_meaning(scene, answer, wanted, solved.exact, accepted, asked)
+            meaning = study_meaning(scene, answer, scene.wanted, solved.exact, accepted, asked)
             bound = None
             if answer.found is not None and asked is not Studies.NONE:
                 bound = proof(scene, answer.found, thorough=asked is Studies.ALL)
-    found = VerifiedAssignment(answer, tuple(wanted), targets, solved, meaning, bound)
+    found = VerifiedAssignment(answer, targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
     results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s)
     return _result(results, scene.expanded, answer.one_shot)
 
 
-def _solved(
-    scene: Scene, wanted: Sequence[Requirement], answer: Answer, stages: Stages
-) -> SolvedDesigns:
+def _solved(answer: Answer, stages: Stages) -> SolvedDesigns:
     """The initial design, the answer and the paper's one shot, solved exactly at every sample."""
-    own, count = followers(scene, wanted), scene.shown_modes(answer.modes)
+    scene, count = answer.scene, answer.scene.shown_modes(answer.modes)
+    own = followers(scene, scene.wanted)
     with stages("initial", "solving the initial design exactly"):
         initial = solve_design(scene, own, scene.initial, count, stages.advance)
     with stages("verification", "solving the optimal design exactly"):

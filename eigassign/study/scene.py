@@ -34,7 +34,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.requirements import Tolerances
 from eigassign.assignment.program import LinearConstraint
 from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity, StaticLimit
-from eigassign.assignment.requirements.sampling import design_limits
+from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import design_limits, requirements_of
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, EigassignError, MissingMassError
@@ -174,6 +175,11 @@ class Scene:
         )
         quantities = self.file.design_quantities
         return Tolerances(share, amount, np.array([0 in (q.at_least, q.above) for q in quantities]))
+
+    @cached_property
+    def wanted(self) -> tuple[Requirement, ...]:
+        """What the targets ask of frequencies, at all samples of the trajectories."""
+        return requirements_of(self.file, self.path)
 
     @cached_property
     def limits(self) -> tuple[LimitedQuantity, ...]:

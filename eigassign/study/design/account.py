@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.one_shot import ActiveLimit
-from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.requirements.requirement import Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
 from eigassign.facts import capital
@@ -61,7 +61,6 @@ class VerifiedAssignment:
     """An answer with exact frequencies before and after, and what it means."""
 
     answer: Answer
-    wanted: tuple[Requirement, ...]
     targets: tuple[TargetStudy, ...]
     solved: SolvedDesigns
     meaning: Meaning
@@ -79,7 +78,7 @@ def assignment_row(
     merits = _merits(answer, targets, worst)
     of_model = model_errors(scene, accuracy.mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
-    aim = None if found is None else aim_row(scene, found, own.wanted, of_model, worst)
+    aim = None if found is None else aim_row(found, of_model, worst)
     deviated = tuple(_deviated(answer.robust, targets, limits, largest))
     met = all(one.satisfied for one in targets) and all(row.satisfied for row in limits)
     conflict = None if met and not deviated else _decided(scene, answer)
@@ -240,7 +239,7 @@ def _missed_between(
 
     The first of the designs is the answer, others are deviations.
     """
-    y, own = designs[0], followers(scene, [target.asked for target in targets])
+    y, own = designs[0], followers(scene, scene.wanted)
     statics = [one for one in scene.followed_limits if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
         try:

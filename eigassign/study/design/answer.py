@@ -21,8 +21,7 @@ from eigassign.assignment.one_shot import (
     hz_from_lam,
     solve_assignment,
 )
-from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.sampling import requirements_of, time_weights
+from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError
@@ -62,10 +61,12 @@ def require_assignable(file: CaseFile) -> None:
 class Answer:
     """The design to be verified, and how it was found.
 
-    ``predicted`` has for each target what the model said of it before the last step, (n,) in Hz;
-    None of limits. ``one_shot`` is the paper's answer where it could be had.
+    ``scene`` has the instants between samples that were added. ``predicted`` has for each target
+    what the model said of it before the last step, (n,) in Hz; None of limits. ``one_shot`` is the
+    paper's answer where it could be had.
     """
 
+    scene: Scene
     y: Floats
     predicted: tuple[Floats | None, ...]
     one_shot: Assignment | None
@@ -80,20 +81,20 @@ class Answer:
         return 1 if self.found is None else self.found.variant.requirements.modes
 
 
-def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress) -> Answer:
+def find_answer(scene: Scene, progress: Progress) -> Answer:
     """The design asked for by the case's method.
 
     Raises CaseError where a mode to be followed has no shape of its own; under `method: one_shot`
     InfeasibleError where bounds and linear constraints contradict each other, AccuracyError
     where it cannot be vouched for.
     """
-    require_one_shape(scene, wanted)
+    require_one_shape(scene)
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
-    plain = all(one.in_one_shot for one in (*wanted, *scene.limits))
-    if wanted and plain and not scene.file.design.catalogues and scene.expanded is not None:
+    plain = all(one.in_one_shot for one in (*scene.wanted, *scene.limits))
+    if scene.wanted and plain and not scene.file.design.catalogues and scene.expanded is not None:
         try:
-            one_shot = assign_design(scene, wanted)
+            one_shot = assign_design(scene)
         except EigassignError as error:  # also where its design cannot follow the path of a tip
             if not sequential:
                 raise
@@ -102,20 +103,20 @@ def find_answer(scene: Scene, wanted: Sequence[Requirement], progress: Progress)
         if one_shot is None:
             raise AccuracyError("the one-shot program has no answer")
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
-        return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
+        return Answer(scene, one_shot.y, lam, one_shot, None, tuple(notes))
     starts = [] if one_shot is None else [one_shot.y]
-    found, robust, more = _between_samples(scene, wanted, starts, progress)
+    found, robust, more = _between_samples(scene, starts, progress)
     notes += more
-    steps = scene.file.assignment.steps
-    contradiction = conflict(found, steps, found.task.scene.limits)
+    finer, steps = found.task.scene, scene.file.assignment.steps
+    contradiction = conflict(found, steps, finer.limits)
     notes += _choice_notes(found)
     if found.lost:
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
-    predicted = tuple(_predicted(found, wanted))
-    return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction, robust)
+    predicted, y = tuple(_predicted(found)), found.best.y
+    return Answer(finer, y, predicted, one_shot, found, tuple(notes), contradiction, robust)
 
 
-def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
+def assign_design(scene: Scene) -> Assignment:
     """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
@@ -126,7 +127,7 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
     column = scene.expansions.column
     goals = [
         (own, LinearModel(l0[own.rows, k], slope[own.rows, k]))
-        for own in targets
+        for own in scene.wanted
         for k in [column(own.mode)]
     ]
     return solve_assignment(
@@ -165,36 +166,40 @@ def solver_row(assignment: Assignment) -> SolverRow:
 
 
 def _between_samples(
-    scene: Scene, wanted: Sequence[Requirement], starts: Sequence[Floats], progress: Progress
+    scene: Scene, starts: Sequence[Floats], progress: Progress
 ) -> tuple[Found, RobustRow | None, list[str]]:
     """The optimum for samples, and for instants between them where its limits would be missed.
 
     Each optimum is looked at between the samples; where a limit that it keeps at samples is missed
-    there, or what shall be high is lower, these instants are samples too, and it is sought anew.
+    there, or what shall be high is lower, these instants are samples of one more scene, in which it
+    is sought anew.
     """
-    deadline, count = deadline_of(scene.file), len(scene.path.q)
-    robust, notes = None, list[str]()
-    for finer in range(FINER + 1):
-        if scene.file.assignment.robust:
-            found, robust = robust_optimum(scene, wanted, starts, progress, deadline)
-        else:
-            found = find_optimum(scene, wanted, starts, progress, deadline=deadline)
-            found = least_changed(found, scene.initial)
-        missed = found.best.seen.violation > ON
-        if finer == FINER or missed or found.best.end in (End.SECONDS, End.INTERRUPTED):
+    more = (progress, deadline_of(scene.file))
+    (found, robust), notes = _optimum(scene, starts, *more), list[str]()
+    for _ in range(FINER):
+        if found.best.seen.violation > ON or found.best.end in (End.SECONDS, End.INTERRUPTED):
             break
-        limits = [one for one in (*wanted, *scene.followed_limits) if not one.is_goal]
-        path = finer_path(scene.path, scene.model, limits, found.task.designs(found.best.y))
-        if len(path.q) == len(scene.path.q):
+        last = found.task.scene
+        limits = [one for one in (*last.wanted, *last.followed_limits) if not one.is_goal]
+        path = finer_path(last.path, last.model, limits, found.task.designs(found.best.y))
+        if len(path.q) == len(last.path.q):
             break
-        scene, starts = replace(scene, trajectory=path), [found.best.y]
-        wanted = requirements_of(scene.file, path)
-        more = (
-            f"{counted(len(path.q) - count, 'instant')} between samples, where limits are nearest"
-        )
-        notes = [f"{more}, were looked at like samples"]
-        progress(f"with {more}")
+        count = counted(len(path.q) - len(scene.path.q), "instant")
+        instants = f"{count} between samples, where limits are nearest"
+        notes = [f"{instants}, were looked at like samples"]
+        progress(f"with {instants}")
+        found, robust = _optimum(replace(last, trajectory=path), [found.best.y], *more)
     return found, robust, notes
+
+
+def _optimum(
+    scene: Scene, starts: Sequence[Floats], progress: Progress, deadline: float
+) -> tuple[Found, RobustRow | None]:
+    """The optimum at the samples, and what it costs to keep what is asked within tolerances."""
+    if scene.file.assignment.robust:
+        return robust_optimum(scene, starts, progress, deadline)
+    found = find_optimum(scene, starts, progress, deadline=deadline)
+    return least_changed(found, scene.initial), None
 
 
 def _choice_notes(found: Found) -> Iterator[str]:
@@ -219,10 +224,10 @@ def _choice_notes(found: Found) -> Iterator[str]:
         yield f"{choice}: {how}"
 
 
-def _predicted(found: Found, wanted: Sequence[Requirement]) -> Iterator[Floats | None]:
+def _predicted(found: Found) -> Iterator[Floats | None]:
     """Frequencies that the last program promised; where no step was taken those of the design."""
     best, asked = found.best, found.variant.requirements
     residual = best.seen.residual if best.predicted is None else best.predicted
     curves = iter(asked.promised(residual))
-    for one in wanted:
+    for one in found.task.wanted:
         yield next(curves) if one.is_goal else None

@@ -155,18 +155,15 @@ def _rounded(value: float) -> float:
 
 
 def aim_row(
-    scene: Scene,
-    found: Found,
-    wanted: Sequence[Requirement],
-    of_model: Mapping[int, float],
-    worst: ViolationRow | None,
+    found: Found, of_model: Mapping[int, float], worst: ViolationRow | None
 ) -> AimRow | None:
     """What is light, high or wide before and after; None where the objective is an error.
 
     ``of_model`` is how much too high mesh and reduced links put modes at most, relative; ``worst``
     what limits are violated by.
     """
-    aim, kept = scene.file.assignment.named_objective, ")"
+    scene = found.task.scene
+    aim, kept, wanted = scene.file.assignment.named_objective, ")", scene.wanted
     designs = scene.initial, found.best.y
     if worst is not None:
         met = worst.exact == 0.0 and found.best.seen.violation <= ON

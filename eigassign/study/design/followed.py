@@ -187,16 +187,16 @@ def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[st
         yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
 
 
-def require_one_shape(scene: Scene, wanted: Sequence[Requirement]) -> None:
+def require_one_shape(scene: Scene) -> None:
     """Raise CaseError where a mode coincides with another at the pose that names it by chance.
 
     Modes that coincide everywhere, by symmetry, have a common frequency that can be followed.
     """
-    for follower in followers(scene, wanted):
+    for follower in followers(scene, scene.wanted):
         like, lam = follower.mode.like, follower.start.at.lam
         twins = np.flatnonzero(_alike(lam, lam[like - 1])) + 1
         if len(twins) > 1 and not _always(scene, follower, len(twins)):
-            own = [one for one in wanted if follower.mode in one.followed]
+            own = [one for one in scene.wanted if follower.mode in one.followed]
             keys = ("gap.between" if len(one.terms) > 1 else "mode" for one in own)
             places = (f"{one.place}.{key}" for one, key in zip(own, keys, strict=True))
             message = (

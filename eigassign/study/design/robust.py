@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.sequential import End, minimise
 from eigassign.assignment.requirements.quantity import LimitedQuantity
-from eigassign.assignment.requirements.requirement import EdgeRows, Requirement
+from eigassign.assignment.requirements.requirement import EdgeRows
 from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
@@ -58,7 +58,6 @@ class WorstDeviation(NamedTuple):
 
 def robust_optimum(
     scene: Scene,
-    wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
     deadline: float,
@@ -67,7 +66,7 @@ def robust_optimum(
 
     Raises AccuracyError where a deviation of an optimum has no answer.
     """
-    search = (scene, wanted, starts, progress)
+    search = (scene, starts, progress)
     scenarios: list[Floats] = []
     seen: list[tuple[Found, tuple[WorstDeviation, ...]]] = []
     near, solves = list[Floats](), 0

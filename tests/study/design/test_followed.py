@@ -10,7 +10,7 @@ from redesigned_arms import extrapolated
 from scipy.optimize import brentq
 
 from eigassign import Case
-from eigassign.assignment import Requirement, Solved, requirements_of
+from eigassign.assignment import Solved
 from eigassign.case import parse
 from eigassign.errors import CaseError, LostModeError
 from eigassign.pipeline import Stages, prepare
@@ -34,12 +34,8 @@ def scene_of(given: Case) -> Scene:
     return prepare(given, Stages(lambda line: None), None)
 
 
-def asked(scene: Scene) -> tuple[Requirement, ...]:
-    return requirements_of(scene.file, scene.path)
-
-
 def solved(scene: Scene, y: tuple[float, ...] | np.ndarray) -> Solved:
-    return solve_design(scene, followers(scene, asked(scene)), np.array(y))
+    return solve_design(scene, followers(scene, scene.wanted), np.array(y))
 
 
 def halves(q: np.ndarray, y: tuple[float, ...] | np.ndarray) -> np.ndarray:
@@ -91,7 +87,7 @@ def test_slopes_are_those_of_the_shape_even_where_modes_cross() -> None:
     rail = RAIL.frequencies(scene.path.q[[k]], [height], 1)[0, 0]
     lamp = brentq(lambda m: MAST.frequencies([], [m], 1)[0, 0] - rail, 0.2, 3.0, xtol=1e-15)
     y = np.array([height, lamp])
-    response = response_of(scene, 1, followers(scene, asked(scene)))
+    response = response_of(scene, 1, followers(scene, scene.wanted))
     found = response(y)
     beside = extrapolated(lambda v: halves(scene.path.q, v), y, 1e-3)
     np.testing.assert_allclose(found.slopes[:, -2:], beside, rtol=1e-7, atol=1e-7)
@@ -138,7 +134,7 @@ def test_a_mode_that_coincides_with_another_has_no_shape_to_name() -> None:
         case([{"mode": mode, "frequency": 25.0}], design={"height": HEIGHT, "lamp": LAMP})
     )
     with pytest.raises(CaseError, match="modes 1 and 2 coincide there") as caught:
-        require_one_shape(scene, asked(scene))
+        require_one_shape(scene)
     assert caught.value.problems[0].path == "targets[0].mode"
 
 
@@ -153,14 +149,14 @@ def test_modes_that_coincide_by_symmetry_are_followed_together() -> None:
         return scene_of(Case(parse(new.encode(), "case.yaml")))
 
     scene = with_target("0.2")
-    require_one_shape(scene, asked(scene))
+    require_one_shape(scene)
     found = solved(scene, scene.initial)
     hz = scene.model.frequencies(scene.path.q, scene.initial, 20)
     for k, number in enumerate(found.numbers[:, 0]):
         np.testing.assert_allclose(hz[k, number - 1 : number + 1], found.followed[k, 0], rtol=1e-8)
     halfway = with_target("0.5")
     with pytest.raises(CaseError, match="modes 3 and 4 and 5 and 6 coincide there"):
-        require_one_shape(halfway, asked(halfway))
+        require_one_shape(halfway)
 
 
 def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
@@ -169,7 +165,7 @@ def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
     rail = {"mode": RAIL_LIKE, "frequency": 25.0}
     for lamp in (0.4, 1.5, 3.0):
         scene = scene_of(case([rail, band], design={"lamp": {**LAMP, "max": 3.0}}))
-        wanted = asked(scene)
+        wanted = scene.wanted
         y = np.array([lamp])
         one = wanted[1]
         found = solve_design(scene, followers(scene, wanted), y)
@@ -177,7 +173,7 @@ def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
         np.testing.assert_allclose(one.curve(found), mast, rtol=1e-9)
         off = np.minimum(mast / 18.0 - 1.0, 1.0 - mast / 40.0)
         assert one.errors(found).max() == pytest.approx(max(0.0, off.max()), rel=1e-8, abs=1e-15)
-    best = find_answer(scene, wanted, lambda line: None)
+    best = find_answer(scene, lambda line: None)
     assert best.found is not None
     (row,) = best.found.clearances
     mast = float(MAST.frequencies([], best.y, 1)[0, 0])
@@ -189,9 +185,9 @@ def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
 def test_the_gap_between_followed_modes_is_that_of_their_halves() -> None:
     gap = {"gap": {"between": [RAIL_LIKE, MAST_LIKE], "at_least": 4.0}}
     scene = scene_of(case([gap]))
-    (one,), y = asked(scene), (0.03, 0.9)
+    (one,), y = scene.wanted, (0.03, 0.9)
     rail, mast = halves(scene.path.q, y).T
     np.testing.assert_allclose(one.curve(solved(scene, y)), mast - rail, rtol=1e-8)
-    answer = find_answer(scene, asked(scene), lambda line: None)
+    answer = find_answer(scene, lambda line: None)
     rail, mast = halves(scene.path.q, answer.y).T
     assert (mast - rail).min() >= 4.0 - 1e-6

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, automatic, scene_of
 
-from eigassign.assignment import End, requirements_of
+from eigassign.assignment import End
 from eigassign.modal import Model
 from eigassign.study import Found, find_optimum
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:
     scene = scene_of(folder, text)
-    wanted = requirements_of(scene.file, scene.path)
-    return find_optimum(scene, wanted, [], starts.append)
+    return find_optimum(scene, [], starts.append)
 
 
 class PressedModel:
@@ -44,8 +43,7 @@ class PressedModel:
 def test_ctrl_c_ends_the_whole_search_and_not_one_start_of_it(call: int, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
     pressed, starts = PressedModel(scene.model, call), []
-    wanted = requirements_of(scene.file, scene.path)
-    found = find_optimum(replace(scene, model=pressed), wanted, [], starts.append)
+    found = find_optimum(replace(scene, model=pressed), [], starts.append)
     assert found.best.end is End.INTERRUPTED
     assert len(starts) <= 3
     assert pressed.calls <= call + 4  # what is known is judged on all samples, no step is made
@@ -54,8 +52,8 @@ def test_ctrl_c_ends_the_whole_search_and_not_one_start_of_it(call: int, tmp_pat
 
 def test_exact_solves_are_those_of_the_search_and_of_the_answer(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
-    counting, wanted = PressedModel(scene.model, 0), requirements_of(scene.file, scene.path)
-    found = find_optimum(replace(scene, model=counting), wanted, [], lambda line: None)
+    counting = PressedModel(scene.model, 0)
+    found = find_optimum(replace(scene, model=counting), [], lambda line: None)
     assert found.exact_solves == counting.samples + len(scene.path.q)
 
 

@@ -8,7 +8,6 @@ import pytest
 from scenes import changed, scene_of
 
 from eigassign import load_case
-from eigassign.assignment import requirements_of
 from eigassign.pipeline import Options, solve_case
 from eigassign.study import (
     Scene,
@@ -26,9 +25,8 @@ def grid(lower: np.ndarray, upper: np.ndarray, n: int = 4) -> list[np.ndarray]:
 
 
 def said(scene: Scene, y: np.ndarray) -> list[str]:
-    wanted = requirements_of(scene.file, scene.path)
     return list(
-        unreachable(scene, wanted, y, solve_design(scene, (), y), 0.02, proved_ranges(scene))
+        unreachable(scene, scene.wanted, y, solve_design(scene, (), y), 0.02, proved_ranges(scene))
     )
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
-from eigassign.assignment import requirements_of
 from eigassign.study import (
     Answer,
     Meaning,
@@ -22,10 +21,9 @@ def answered(
     folder: Path, text: str, studies: Studies = Studies.CHEAP
 ) -> tuple[Scene, Answer, Meaning]:
     scene = scene_of(folder, text)
-    wanted = requirements_of(scene.file, scene.path)
-    answer = find_answer(scene, wanted, lambda line: None)
+    answer = find_answer(scene, lambda line: None)
     exact = solve_design(scene, (), answer.y)
-    return scene, answer, study_meaning(scene, answer, wanted, exact, 0.02, studies)
+    return scene, answer, study_meaning(scene, answer, scene.wanted, exact, 0.02, studies)
 
 
 LIMITS = """

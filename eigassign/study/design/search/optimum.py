@@ -30,7 +30,6 @@ from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import STOPPED, End, minimise, worth
 from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
-from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
@@ -87,7 +86,6 @@ class Found(Searched):
 
 def find_optimum(
     scene: Scene,
-    wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
     near: Sequence[Floats] = (),
@@ -104,8 +102,8 @@ def find_optimum(
     """
     deadline = deadline_of(scene.file) if deadline is None else deadline
     designs = [*near, scene.initial, *starts][: most_starts(scene.file)]
-    bands = sum(len(one.bands) for one in wanted)
-    task = Task(scene, tuple(wanted), (Margin(MARGIN),) * bands, scenarios=tuple(scenarios))
+    bands = sum(len(one.bands) for one in scene.wanted)
+    task = Task(scene, scene.wanted, (Margin(MARGIN),) * bands, scenarios=tuple(scenarios))
     return _Search(task, designs, deadline, progress).found()
 
 

@@ -46,7 +46,7 @@ from eigassign.assignment.exact.sequential import (
 from eigassign.assignment.program import constraints_agree
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeGap
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
-from eigassign.assignment.requirements.sampling import requirements_of, time_weights
+from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import mode_above
@@ -128,7 +128,7 @@ def thinned(whole: Task, few: int) -> Task | None:
         return None
     scene = replace(whole.scene, trajectory=path.chosen(_few(whole, few)))
     try:
-        task = replace(whole, scene=scene, wanted=requirements_of(scene.file, scene.path))
+        task = replace(whole, scene=scene, wanted=scene.wanted)
     except CaseError:
         return None
     return task if len(task.bands) == len(whole.bands) else None
