@@ -90,7 +90,8 @@ class Expression:
             ((atom, factor),) = self.terms.items()
             return factor, atom
         ordered = sorted(self.terms.items())
-        factor = ordered[0][1]  # normalised so that proportional sums are one atom
+        # proportional sums are one atom; by the largest, for others may be nothing but round-off
+        factor = max((self.constant, *(value for _, value in ordered)), key=abs)
         scaled = tuple((atom, value / factor) for atom, value in ordered)
         node = self.recorder._atom(("linear", self.constant / factor, scaled))
         return factor, next(iter(node.terms))
@@ -129,7 +130,7 @@ class Expression:
             return self._build(self.constant * factor, terms)
         (a, j), (b, k) = self.single(), other.single()
         product = self.recorder._atom(("product", min(j, k), max(j, k)))
-        return Expression(self.recorder, 0.0, {next(iter(product.terms)): a * b})
+        return product * (a * b)
 
     __rmul__ = __mul__
 
@@ -146,7 +147,7 @@ class Expression:
         if factor < 0.0 and exponent != int(exponent):
             return self._recorded() ** exponent
         power = self.recorder._atom(("power", atom, float(exponent)))
-        return Expression(self.recorder, 0.0, {next(iter(power.terms)): factor**exponent})
+        return power * factor**exponent
 
     def __truediv__(self, other: Scalar) -> Scalar:
         if isinstance(other, Expression):

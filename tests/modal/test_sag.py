@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from corotational_oracle import Frame
 
 import eigassign as ea
@@ -130,3 +131,12 @@ def test_a_hanging_beam_bends_less_the_more_it_is_pulled() -> None:
     said = sag_changes(case.model(), [-1.1], case.initial_design, (1, 2), [0.0, -9.81])
     assert said is not None
     np.testing.assert_allclose(said[0] / 1.1, [0.017005, 0.026233], rtol=0.03)
+
+
+@pytest.mark.parametrize("zero", [0.0, 1e-48, 1e-160, 1e-300])
+def test_a_coordinate_is_zero_up_to_round_off(zero: float) -> None:
+    tree = yaml.safe_load((Path(__file__).parents[2] / "cases" / "arm_6r.yaml").read_text())
+    tree["mechanism"]["gravity"] = g = [0.0, 0.0, -9.81]
+    case, q = ea.load_case(tree), np.array([zero, 0.8, -1.3, zero, -0.7, zero])
+    said = sag_changes(case.model(), q, case.initial_design, (1, 2), np.array(g))
+    np.testing.assert_allclose(said, [[1.22685562e-04, 9.66055487e-05]], rtol=1e-6)

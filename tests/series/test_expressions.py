@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from series_operators import PowerSeries
 
@@ -196,6 +196,34 @@ def test_a_sum_has_the_faces_of_its_terms_and_a_function_of_it_has_one() -> None
         [False, True, False],
         [False, False, True],
     ]
+
+
+decades = st.builds(
+    lambda sign, e: sign * 10.0**e, st.sampled_from([-1, 1]), st.integers(-320, 300)
+)
+linear = st.lists(st.one_of(st.just(0.0), decades), min_size=N + 1, max_size=N + 1)
+
+
+@given(linear, linear)
+def test_coefficients_are_decades_apart(first: list[float], second: list[float]) -> None:
+    """One of a linear form may be zero, or nothing but round-off."""
+
+    def composed(x: list[Any], absolute: Callable[[float], float]) -> Any:
+        f, g = (
+            sum(absolute(c) * a for c, a in zip(k, [*x, 1.0], strict=True)) for k in (first, second)
+        )
+        return f * g + g + (1.25 + f * f) ** -1.0
+
+    a, b = (max(map(abs, k)) for k in (first, second))
+    assume(max(a, b) * max(a, 1.0) < 1e299)
+    recorder, x = Recorder(), AT[0].tolist()
+    recorded = composed([recorder.variable(i) for i in range(N)], float)
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        found = compile_table(recorder, [recorded], N).evaluate(Samples(), np.array(x)[:, None])
+    size = composed([abs(each) for each in x], abs)
+    assert np.broadcast_to(found, (1, 1))[0, 0] == pytest.approx(
+        composed(x, float), rel=0.0, abs=1e-12 * size
+    )
 
 
 def test_constants_fold_away_as_they_are_written() -> None:
