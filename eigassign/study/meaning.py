@@ -358,7 +358,8 @@ def levers(model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]) -> I
             if names[k] not in known:
                 share = 0.5 * x[there, k] * slopes[*of, k] / lam[of]
                 most = float(share[np.abs(share).argmax()])
-                rows.append(LeverRow(name, names[k], float(share.mean()), most))
+                if most:
+                    rows.append(LeverRow(name, names[k], float(share.mean()), most))
         # to six digits, so that round-off does not decide which of two alike stands first
         yield from sorted(rows, key=lambda row: -float(f"{abs(row.percent_per_percent):.5e}"))
 
@@ -420,11 +421,17 @@ def study_meaning(
     if found is not None and found.best.seen.violation <= MET:  # else limits are no price
         active = tuple(active_rows(scene, answer))
         relaxed = relaxed_limits(scene.file, variant, found.best.objective, active)
+    notes = list(deviations(scene, variant.requirements, answer.y, seen))
+    helping: tuple[LeverRow, ...] = ()
+    try:
+        helping = tuple(_of_missed(scene, answer.y, wanted, exact, max_error))
+    except EigassignError as error:
+        notes.append(f"missed modes are not explained: {error}")
     return Meaning(
         sensitivity=tuple(sensitivities(scene.file, variant.requirements, answer.y, seen)),
         relaxed=tuple(relaxed),
-        levers=tuple(_of_missed(scene, answer.y, wanted, exact, max_error)),
+        levers=helping,
         reach=reach,
         unreachable=beyond,
-        notes=tuple(deviations(scene, variant.requirements, answer.y, seen)),
+        notes=tuple(notes),
     )

@@ -713,7 +713,7 @@ class LeverRow:
     (p/f) ∂f/∂p at the poses looked at: its mean, and the one of largest magnitude.
     """
 
-    mode: Key
+    mode: Annotated[str, Fact("its name")]
     property: str
     percent_per_percent: Annotated[float, Fact(heading="mean", unit="% per %", digits=".3g")]
     percent_per_percent_largest: Annotated[

@@ -1,5 +1,6 @@
 """What properties do to frequencies, against mechanisms with other values of them."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -107,7 +108,22 @@ def test_a_missed_target_is_told_what_would_help() -> None:
     assert card is not None
     assert card.helps[0].startswith("1 % more of what is no parameter changes mode 1: ")
     assert "length of forearm −" in card.helps[0]
-    assert b'"levers"' in to_json(result.results)
+    rows = json.loads(to_json(result.results))["levers"]
+    assert {row["mode"] for row in rows} == {"mode 1"}
+    assert all(row["percent_per_percent_largest"] for row in rows)
+
+
+def test_a_run_does_without_what_would_help(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> CaseFile:
+        raise EigassignError("such a mechanism cannot be made")
+
+    monkeypatch.setattr(CaseFile, "with_every_property", refused)
+    result = solve_case(BuiltCase(parse(MISSED.encode(), "case.yaml"))).results
+    assert result.meaning.levers == ()
+    assert any(
+        note.endswith("not explained: such a mechanism cannot be made")
+        for note in result.meaning.notes
+    )
 
 
 def test_nothing_is_told_of_modes_where_nothing_is_missed() -> None:
