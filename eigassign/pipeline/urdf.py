@@ -161,6 +161,8 @@ def _parsed(path: Path) -> tuple[str, dict[str, Inertial | None], list[_Joint]]:
     """Name, links and joints of a file without its meshes; raises UsageError, StorageError."""
     try:
         data = read_bytes(path, CASE)
+    except (FileNotFoundError, NotADirectoryError):
+        raise UsageError(f"{path}: no such URDF file") from None
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: cannot be read: {error}") from error
     parser = ElementTree.XMLParser(target=_Tree())

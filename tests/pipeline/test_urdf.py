@@ -142,8 +142,10 @@ def test_what_is_no_such_robot_is_refused(crane: Path, old: str, new: str, said:
 def test_wrong_arguments_are_refused(crane: Path) -> None:
     with pytest.raises(UsageError, match="no stiffness is given for joint pitch"):
         ea.urdf_mapping(crane, {"yaw": 1.0})
-    with pytest.raises(StorageError, match="cannot be read"):
+    with pytest.raises(UsageError, match="no such URDF file"):
         ea.urdf_mapping(crane.with_name("none.urdf"), 1e4)
+    with pytest.raises(StorageError, match="cannot be read"):
+        ea.urdf_mapping(crane.parent, 1e4)
     with pytest.raises(CaseError, match=r"case: coordinates\.yaw\.drive\.stiffness"):
         ea.load_case(ea.urdf_mapping(crane, "4 kg"))
 
