@@ -139,13 +139,13 @@ def must(hold: Callable[[Any], object], message: str) -> AfterValidator:
 
 
 def one_of(*keys: str, needed: bool = True) -> Any:
-    """Validator of a part that has one of two ``keys``, and not both; where not ``needed`` none."""
+    """Validator of a part that has one of two ``keys``; where not ``needed`` none will do."""
     either = " or ".join(keys)
 
     def has_one(part: P) -> P:
         given = [key for key in keys if getattr(part, key) is not None]
         if needed and len(given) != 1:
-            raise wrong(f"give either {either}, and not both")
+            raise wrong(f"give either {either}" + ", and not both" * bool(given))
         if len(given) > 1:
             raise wrong(f"give {either}, not both", given[-1])
         return part

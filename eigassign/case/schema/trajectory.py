@@ -111,7 +111,7 @@ class SampledTrajectory(AnyTrajectory):
                 raise wrong("one sample is a pose at rest: leave the time out", key)
             return self
         if (self.time is None) == (self.duration is None):
-            raise wrong("give either time or duration, and not both")
+            raise wrong("give either time or duration" + ", and not both" * (self.time is not None))
         if self.time is not None and len(self.time) != len(self.q):
             raise wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
         return self

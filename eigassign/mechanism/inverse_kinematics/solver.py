@@ -169,9 +169,9 @@ def prepare(
     rank = int((singular_values > _STRUCTURAL * lever).sum(axis=1).max())
     if rank < n_q:
         idle = np.flatnonzero(np.abs(J).max(axis=(0, 1)) <= _STRUCTURAL * lever)
-        numbers = ", ".join(str(i + 1) for i in idle)
+        names = ", ".join(chain.joints[i] for i in idle)
         message = f"fixes {rank} of {n_q} coordinates"
-        message += f", and coordinate {numbers} (counted from 1) not at all" * bool(numbers)
+        message += f", and what drives {names} not at all" * bool(names)
         message += ": ask for its angle or orientation too, or give points or samples of q"
         raise MechanismError("trajectory.tip", message)
     first = None if near is None else near / scale

@@ -242,8 +242,10 @@ def said(rows: Sequence[CaseOutcome]) -> str:
     """``58 meet what is asked, 2 do not, 1 failed``: what failed could not be run."""
     count = Counter[str](row.status for row in rows)
     met, failed = count["ok"], count["error"]
-    others = ((len(rows) - met - failed, "do not"), (failed, "failed"))
-    words = [f"{met} meet what is asked", *(f"{n} {what}" for n, what in others if n)]
+    missed = len(rows) - met - failed
+    words = [f"{met} meet{'s' * (met == 1)} what is asked"]
+    words += [f"{missed} do{'es' * (missed == 1)} not"] * bool(missed)
+    words += [f"{failed} failed"] * bool(failed)
     return ", ".join(words) if rows else ""
 
 
