@@ -147,7 +147,7 @@ class Expression:
         if factor < 0.0 and exponent != int(exponent):
             return self._recorded() ** exponent
         power = self.recorder._atom(("power", atom, float(exponent)))
-        return power * factor**exponent
+        return power * float(factor**exponent)
 
     def __truediv__(self, other: Scalar) -> Scalar:
         if isinstance(other, Expression):
