@@ -37,7 +37,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
+from scipy.linalg import expm
 
 from eigassign.case.schema.mechanism import RIDING, Assembly
 from eigassign.case.schema.parts import FrozenDict
@@ -392,7 +392,7 @@ def _elements(strand: Strand, own: Beams, v: Floats) -> Iterator[_Element]:
     profiles = each_element(own.profile, len(d))
     for pair, h, each, profile in zip(ends, own.h, d, profiles, strict=True):
         step = h * X + each[6:9] - each[:3] - np.cross(each[3:6], h * X)
-        turn = Rotation.from_rotvec(each[9:] - each[3:6]).as_matrix()
+        turn = expm(np.cross(np.eye(3), each[9:] - each[3:6]))
         yield _Element(pair, axes, step, turn, profile)
 
 

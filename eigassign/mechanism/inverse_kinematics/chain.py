@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_banded
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import ADVANCING, FREEDOMS
@@ -94,12 +94,27 @@ def through(knots: Floats, values: Floats, kind: str) -> Curve:
     continuous at the second and at the last but one knot); the parabola through three values, the
     line through two.
     """
-    if kind == "spline":
-        from scipy.interpolate import CubicSpline  # takes 0.1 s, which only splines wait for
-
-        return Curve(knots, CubicSpline(knots, values).c[::-1].copy())
-    chords = np.diff(values, axis=0) / np.diff(knots)[:, None]
-    return Curve(knots, np.stack([values[:-1], chords]))
+    h, last = np.diff(knots)[:, None], len(knots) - 1
+    chords = np.diff(values, axis=0) / h
+    if kind != "spline" or last == 1:
+        return Curve(knots, np.stack([values[:-1], chords]))
+    if last == 2:  # the slopes of the parabola
+        bent = (chords[1] - chords[0]) / h.sum()
+        slopes = chords[[0, 0, 1]] + np.array([-h[0], h[0], h[1]]) * bent
+    else:  # continuous second derivatives: h_k s_k-1 + 2(h_k-1 + h_k) s_k + h_k-1 s_k+1 = ...
+        ends, both = knots[[2, -1]] - knots[[0, -3]], h[:-1] + h[1:]
+        band = np.zeros((3, last + 1))
+        band[0, 2:], band[1, 1:-1], band[2, :-2] = h[:-1, 0], 2.0 * both[:, 0], h[1:, 0]
+        band[1, [0, -1]], band[0, 1], band[2, -2] = h[[1, -2], 0], ends[0], ends[1]
+        right = np.zeros(values.shape)
+        right[1:-1] = 3.0 * (h[1:] * chords[:-1] + h[:-1] * chords[1:])
+        for row, (a, b), d in ((0, (0, 1), ends[0]), (-1, (-1, -2), ends[1])):
+            right[row] = ((h[a] + 2.0 * d) * h[b] * chords[a] + h[a] ** 2 * chords[b]) / d
+        slopes = solve_banded((1, 1), band, right)
+    curl = (slopes[:-1] + slopes[1:] - 2.0 * chords) / h
+    return Curve(
+        knots, np.stack([values[:-1], slopes[:-1], (chords - slopes[:-1]) / h - curl, curl / h])
+    )
 
 
 def tip_path(waypoints: ArrayLike, kind: str) -> Curve:
