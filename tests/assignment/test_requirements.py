@@ -3,6 +3,8 @@
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from eigassign.assignment import (
     requirements_of,
 )
 from eigassign.case import load
-from eigassign.errors import CaseError
+from eigassign.errors import CaseError, UsageError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 from eigassign.study import named_design, named_pose
 
@@ -56,6 +58,15 @@ def wanted(folder: Path, path: Trajectories) -> Callable[[str], tuple[Requiremen
 
 
 Read = Callable[[str], tuple[Requirement, ...]]
+
+
+def test_a_kind_that_has_no_words_is_refused(path: Trajectories) -> None:
+    fields = {"during": None, "trajectory": None, "frequencies": ()}
+    file: Any = SimpleNamespace(
+        asked=[("targets[0]", SimpleNamespace(kind="at_least", **fields))], targets=()
+    )
+    with pytest.raises(UsageError, match="at_least: its words"):
+        requirements_of(file, path)
 
 
 def test_a_frequency_is_both_limits_and_a_limit_is_one(wanted: Read) -> None:

@@ -33,6 +33,7 @@ from eigassign.case.schema.targets import (
     HighestTarget,
     KeepOutTarget,
 )
+from eigassign.errors import UsageError
 
 
 class AssignedFrequency(Requirement):
@@ -241,7 +242,8 @@ KINDS: dict[str, type[Requirement]] = {
 def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
     """What is asked of modes in words, and both edges where its frequencies are ``hz``, each (n,).
 
-    Those of a band are as they are given, or about a multiple of a frequency.
+    Those of a band are as they are given, or about a multiple of a frequency. Raises UsageError
+    for a kind that is not among the cases.
     """
     endless = np.array(np.inf)
     match target:
@@ -260,7 +262,9 @@ def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
             return words, middle * (1.0 - band.margin), middle * (1.0 + band.margin)
         case KeepOutTarget():
             return "clear of {:g} … {:g} Hz".format(*target.keep_out), hz[0], hz[1]
-    return "as high as can be", np.array(0.0), endless
+        case HighestTarget():
+            return "as high as can be", np.array(0.0), endless
+    raise UsageError(f"{target.kind}: its words and edges stand in no case of `asked_of`")
 
 
 def _in_hz(curve: float | FrequencyProfile) -> str:
