@@ -58,8 +58,8 @@ class Expansion:
         λ(x) ≈ Σ_γ λ_γ (x − x0)^γ,  x = (q, y), q in rad or m, y in SI units
 
     ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s², with ∂λ/∂x
-    ``slopes(q, y)``; ``indices`` γ (N, n_q + n_y), ``coefficients`` λ_γ (n_modes, N);
-    ``last_degree_share(q, y)`` is a guide to the error; ``linear_in_design(q)`` is eq. (9),
+    ``slopes(q, y)``, at y0 the l_0 and l of eq. (9); ``indices`` γ (N, n_q + n_y),
+    ``coefficients`` λ_γ (n_modes, N); ``last_degree_share(q, y)`` is a guide to the error;
     ``inverse`` the same with the series of 1/λ. Neighbouring modes are expanded together, as the
     matrices of ``clusters``.
     """
@@ -143,14 +143,6 @@ class Expansion:
             for c in self.clusters
         )
         return replace(self, clusters=turned, inverted=not self.inverted)
-
-    def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
-
-        λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
-        """
-        l0, slopes = self.slopes(q, self.y0)
-        return l0, slopes[:, :, len(self.q0) :]
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) over units of x."""
@@ -338,11 +330,6 @@ class NearestExpansion:
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """f (n_samples, n_modes) in Hz; see `Expansion.frequencies`."""
         return self.pick(q, [part.frequencies(q, y) for part in self.parts])
-
-    def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """l_0 and l of eq. (9); see `Expansion.linear_in_design`."""
-        l0, slopes = self.slopes(q, self.parts[0].y0)
-        return l0, slopes[:, :, len(self.parts[0].q0) :]
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ and ∂λ/∂x; see `Expansion.slopes`."""

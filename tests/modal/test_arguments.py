@@ -105,6 +105,7 @@ def test_samples_that_are_none_are_refused(model, wrong, words):
         series.frequencies,
         series.eigenvalues,
         series.last_degree_share,
+        series.slopes,
         reduced.frequencies,
         lambda q, y: expand(model, q, y),
         lambda q, y: reduce(model, q, y),
@@ -113,8 +114,6 @@ def test_samples_that_are_none_are_refused(model, wrong, words):
             ask(wrong, Y0)
         with pytest.raises(UsageError, match=words):
             ask(Q0, wrong)
-    with pytest.raises(UsageError, match=words):
-        series.linear_in_design(wrong)
 
 
 def test_an_expansion_has_one_point(model):

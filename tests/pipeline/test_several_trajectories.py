@@ -73,12 +73,12 @@ def hand_rows(pair: Result, weights: tuple[float, float] = (1.0, 1.0)) -> tuple[
     """The rows of the least squares, written out by hand trajectory by trajectory."""
     rows, right = [], []
     for q, duration, weight in ((PICK, 1.0, weights[0]), (BACK, 0.5, weights[1])):
-        l0, slope = (part[:, 0] for part in pair.linearised.linear_in_design(q))
+        l0, slope = (part[:, 0] for part in pair.linearised.slopes(q, [0.125, 0.125]))
         step, lam_d = duration / 20, (2 * np.pi * 194) ** 2
         for k in range(21):
             root = np.sqrt(weight * step * (0.5 if k in (0, 20) else 1.0)) / lam_d
-            rows.append(root * slope[k])
-            right.append(root * (lam_d - l0[k] + slope[k] @ [0.125, 0.125]))
+            rows.append(root * slope[k, 2:])
+            right.append(root * (lam_d - l0[k] + slope[k, 2:] @ [0.125, 0.125]))
     return np.array(rows), np.array(right)
 
 
@@ -188,13 +188,13 @@ def test_targets_of_trajectories_with_other_numbers_of_samples_are_each_solved_o
         (short, 0.5, 1, 194, 1.0),
         (PICK, 1.0, 2, 470, 2.0),
     ):
-        l0, slope = (p[:, mode - 1] for p in both.linearised.linear_in_design(q))
+        l0, slope = (p[:, mode - 1] for p in both.linearised.slopes(q, [0.125, 0.125]))
         step, lam_d = duration / (len(q) - 1), (2 * np.pi * hz) ** 2
         share = np.full(len(q), weight * step)
         share[[0, -1]] /= 2
         root = np.sqrt(share)[:, None] / lam_d
-        rows.append(root * slope)
-        right.append(root[:, 0] * (lam_d - l0 + slope @ [0.125, 0.125]))
+        rows.append(root * slope[:, 2:])
+        right.append(root[:, 0] * (lam_d - l0 + slope[:, 2:] @ [0.125, 0.125]))
     found = lsq_linear(np.vstack(rows), np.concatenate(right), (0, 0.25), method="bvls", tol=1e-15)
     y = np.array(list(both.design.values()))
     np.testing.assert_allclose(y, found.x, rtol=1e-9, atol=1e-12)
