@@ -25,6 +25,7 @@ from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName,
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model, ModeShapes
+from eigassign.study.planning import shown_point
 from eigassign.study.results import (
     DrawnBody,
     DrawnJoint,
@@ -78,16 +79,13 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     Raises what `Model.shapes` raises.
     """
     shapes, x = model.shapes(q, y, count), model.one(q, y)
-    n_q = len(model.q_names)
+    names, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
     scales = AMPLITUDE * extent_of(shapes) / largest_of(shapes) * _phase(shapes)
-    coordinates = zip(model.q_names, x[0, :n_q], file.q_units, strict=True)
-    design = zip(model.y_names, x[0, n_q:], file.design_units, strict=True)
     return ModePictures(
         title=file.title,
         rigid_modes=model.n_rigid,
         frequencies_hz=tuple(float(hz) for hz in shapes.frequencies),
-        q=tuple((name, float(value), unit) for name, value, unit in coordinates),
-        y=tuple((name, float(value), unit) for name, value, unit in design),
+        where=shown_point(names, x[0], units, file.in_degrees),
         amplitude=AMPLITUDE,
         rest=displaced(file, model, x, [shapes], np.zeros((1, count))),
         deformed=displaced(file, model, np.repeat(x, count, 0), [shapes] * count, np.diag(scales)),

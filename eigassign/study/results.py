@@ -831,8 +831,7 @@ class ModePictures(Brief):
     title: str
     rigid_modes: int
     frequencies_hz: tuple[float, ...]
-    q: tuple[tuple[str, float, str], ...]  # name, value, SI unit
-    y: tuple[tuple[str, float, str], ...]
+    where: str  # q and y in words
     amplitude: float
     rest: DrawnPoses  # one pose
     deformed: DrawnPoses  # a pose a mode

@@ -70,7 +70,8 @@ def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it()
     for drawn, rest, moved in zip(other, found.rest.lines[0], found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn.get_xydata(), 2.0 * rest - moved)
     assert figure.axes[0].get_aspect() == 1.0
-    assert f"{found.q[0][0]} = " in figure.axes[0].get_xlabel()
+    assert found.where == "crank_angle = 120 deg, coupler = 4 mm, follower = 4 mm"
+    assert figure.axes[0].get_xlabel() == found.where
 
 
 def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> None:

@@ -59,9 +59,8 @@ def pictures(name: str, count: int = 2) -> tuple[ea.Case, ModePictures]:
 @pytest.mark.parametrize("name", ALL)
 def test_modes_are_drawn_with_the_stated_amplitude_over_the_links_at_rest(name: str) -> None:
     case, found = pictures(name)
-    rest = rest_pose(
-        case.file, case.model(), np.array([v for _, v, _ in found.q]), case.initial_design
-    )
+    q = with_middle_loads(case.file, case.file.expansion.q)
+    rest = rest_pose(case.file, case.model(), np.array(q), case.initial_design)
     for line, straight in zip(found.rest.lines[0], rest.lines[0], strict=True):
         np.testing.assert_allclose(line[[0, -1]], straight, atol=1e-12)
     extent = np.linalg.norm(np.ptp(np.concatenate(found.rest.lines[0]), axis=0))

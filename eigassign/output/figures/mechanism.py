@@ -15,7 +15,6 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.facts import number
 from eigassign.output.figures import graph, scene
 from eigassign.output.figures.graph import (
     BLACK,
@@ -301,10 +300,6 @@ def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
     still, moving = parts(rest), [part for part in parts(deformed) if part.role != "ground"]
     below = [*drawn(held, of_roles(still, "ground"), 0, GREY)]
     below += drawn(held, of_roles(still, "link", "rigid", "slide", "pivot"), 0, _REST)
-    values = ", ".join(
-        f"{short(name, 16)} = {number(value)} {unit}".rstrip()
-        for name, value, unit in (*pictures.q, *pictures.y)
-    )
     caption = (
         "Grey: the rigid links. Blue: the mode, its largest displacement drawn as "
         f"{100 * pictures.amplitude:.0f} % of the mechanism's extent; light: half a period later. "
@@ -320,7 +315,7 @@ def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
             f"Mode {k + 1}: {hz:.5g} Hz",
             caption,
             f"Mode {k + 1} of the mechanism at {hz:.5g} Hz, deformed over undeformed.",
-            held.graph(title, marks, note=short(values, 100)),
+            held.graph(title, marks, note=short(pictures.where, 100)),
         )
 
     return tuple(figure(k, hz) for k, hz in enumerate(pictures.frequencies_hz))
