@@ -374,6 +374,22 @@ def unseen(
     return np.vstack([outer, scattered(file, trajectory, about[0], SCATTERED, first)[0]])
 
 
+def nearest_rows(rows: Floats, values: Floats) -> Ints:
+    """Of rows (n, k) the nearest (...) to values (..., k), in shares of the columns' ranges."""
+    width = np.ptp(rows, axis=0)
+    away = (rows - values[..., None, :]) / np.where(width > 0.0, width, 1.0)
+    return np.asarray(np.linalg.norm(away, axis=-1).argmin(axis=-1))
+
+
+def as_listed(file: CaseFile, x: Floats) -> Floats:
+    """x (n, n_x) with the nearest listed values: what is not listed may be no mechanism."""
+    x, n_y = x.copy(), len(file.design.parameters)
+    for own in file.design.catalogues:
+        rows, columns = np.array(own.rows), np.array(own.columns) - n_y
+        x[:, columns] = rows[nearest_rows(rows, x[:, columns])]
+    return x
+
+
 def farthest(points: Floats, about: Floats, count: int) -> Ints:
     """Rows of ``points`` (n, d): each is the farthest from ``about`` (k, d) and those before it."""
     width = np.ptp(points, axis=0)

@@ -49,6 +49,7 @@ from eigassign.study.planning import (
     MOST_CORNERS,
     SCATTERED,
     Plan,
+    as_listed,
     at_corners,
     corners,
     scattered,
@@ -242,7 +243,8 @@ def unseen_points(scene: Scene) -> Floats:
     """x (n, n_x) where the scene's expansions are judged; `auto` has looked at other ones."""
     about = np.array([part.q0 for part in scene.expansions.fulls.parts])
     y0, first = scene.expansions.full.y0, 1 + SCATTERED
-    return unseen(scene.file, scene.model, scene.trajectory, about, y0, first)
+    x = unseen(scene.file, scene.model, scene.trajectory, about, y0, first)
+    return as_listed(scene.file, x)
 
 
 def compare(
@@ -360,7 +362,8 @@ def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     if np.any(upper > lower):
         ends = corners(len(lower), MOST_CORNERS)
         outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)[0]
-        yield DESIGN_BOX, np.vstack([outer, scattered(file, None, scene.q0, SCATTERED)[0]])
+        inner = scattered(file, None, scene.q0, SCATTERED)[0]
+        yield DESIGN_BOX, as_listed(file, np.vstack([outer, inner]))
     if scene.trajectory is not None:
         yield BETWEEN, unseen_points(scene)
 

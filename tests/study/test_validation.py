@@ -16,6 +16,7 @@ from eigassign.study import (
     validate_expansions,
 )
 
+CASES = Path(__file__).parents[2] / "cases"
 MODE_ONLY_AT_A_POINT = HEAD + "expansion: {q: [1.8, 5.2]}\n"
 
 
@@ -58,6 +59,25 @@ def test_it_is_judged_at_corners_and_between_samples_all_over_the_bounds(tmp_pat
     assert not any(pose.tobytes() in sampled for pose in others)
     assert others.min() >= scene.path.q.min()
     assert others.max() <= scene.path.q.max()
+
+
+def test_of_lists_only_listed_designs_are_looked_at(tmp_path: Path) -> None:
+    """A tube of the least diameter and the thickest wall of these would be none."""
+    tubes = """
+  tube:
+    choices:
+      wide: {sections.upper.outer_diameter: 110 mm, sections.upper.thickness: 5 mm}
+      narrow: {sections.upper.outer_diameter: 40 mm, sections.upper.thickness: 2 mm}
+      thick: {sections.upper.outer_diameter: 120 mm, sections.upper.thickness: 40 mm}
+
+expansion: {order: 2}
+"""
+    text = (CASES / "arm_6r.yaml").read_text().replace("samples: 101", "samples: 9")
+    start, rest = text.split("design:")
+    scene = scene_of(tmp_path, start + "design:" + tubes + "targets:" + rest.split("targets:")[1])
+    designs = {tuple(y) for y in unseen_points(scene)[:, 6:]}
+    assert designs == {(0.11, 0.005), (0.04, 0.002), (0.12, 0.04)}
+    assert {row.where for row in validate_expansions(scene)} == {TRAJECTORY, DESIGN_BOX, BETWEEN}
 
 
 def test_the_same_points_are_looked_at_every_time(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.program import Floats
 from eigassign.case.case_file import CaseFile
+from eigassign.study.planning import nearest_rows
 from eigassign.study.results import DesignRow
 from eigassign.study.scene import Scene
 
@@ -44,10 +45,7 @@ class ListedValues:
 
     def nearest(self, y: Floats) -> Ints:
         """The rows (...) nearest to designs (..., n_y), in shares of the columns' ranges."""
-        width = np.ptp(self.rows, axis=0)
-        unit = np.where(width > 0.0, width, 1.0)
-        away = (self.rows - y[..., None, list(self.columns)]) / unit
-        return np.asarray(np.linalg.norm(away, axis=-1).argmin(axis=-1))
+        return nearest_rows(self.rows, y[..., list(self.columns)])
 
     def price(self, y: Floats) -> Floats | float:
         """The prices (...) of the rows nearest to designs (..., n_y)."""
