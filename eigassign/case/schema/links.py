@@ -274,11 +274,11 @@ class BeamLink(Part):
         material: its name
         section: its name; or two of a taper, stiffness and mass of which are integrated over each
             element
-        elements: their number; `auto` looks for the fewest that meet `expansion.accuracy`
+        elements: their number; `auto` doubles it until it meets `expansion.accuracy`
         shear: whether shear bends it too, as a Timoshenko beam
         roll: by which the section is turned about the beam's axis
         reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
-            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
+            (Craig–Bampton); `auto` doubles it until it meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["beam"] = "beam"
@@ -342,7 +342,7 @@ class FrameLink(Part):
         nodes: places by name, in the link's axes; one is called `start`
         beams: by name
         reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
-            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
+            (Craig–Bampton); `auto` doubles it until it meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["frame"]
@@ -395,7 +395,7 @@ class SuperelementLink(Part):
             other program's input with *NODE or GRID) or whose the rows are (.dof, .mapping)
         nodes: by name
         reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
-            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
+            (Craig–Bampton); `auto` doubles it until it meets a quarter of `expansion.accuracy`
     """
 
     model_config = needs_one_of(("stiffness", "mass"), ("file",))
@@ -445,7 +445,7 @@ class SolidLink(Part):
         material: its name
         nodes: by name
         reduce_to: the mesh is replaced by the link's own modes up to this frequency
-            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
+            (Craig–Bampton); `auto` doubles it until it meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["solid"]

@@ -110,7 +110,7 @@ class ExpansionKeys(Part):
     """Order of the power series, its point, and the modes expanded.
 
     Keys:
-        order: `auto` looks for the fewest coefficients that meet `accuracy`
+        order: `auto` doubles it until it meets `accuracy`
         accuracy: relative error in Hz that `order`, `elements` and `reduce_to` meet where they are
             `auto`
         q: the point; `auto` takes the most central sample of the trajectory
