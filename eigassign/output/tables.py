@@ -94,7 +94,7 @@ def _value(row: Any, name: str, one: Fact) -> Any:
 
 
 def run_tables(results: RunResults) -> tuple[Table, ...]:
-    """What there is something to show of, section by section of `SECTIONS`."""
+    """What there is something to show of, section by section of `_KINDS`."""
     made = (
         replace(table, section=section)
         for section, kinds in _KINDS.items()

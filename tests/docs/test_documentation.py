@@ -1,6 +1,8 @@
 """README and manual, held to what they describe."""
 
+import ast
 import importlib.util
+import keyword
 import re
 import sys
 from collections.abc import Iterator
@@ -166,17 +168,61 @@ def names_code(name: str) -> bool:
     )
 
 
+def case_keys() -> set[str]:
+    listed = re.findall(r"^`([\w.]+)`", read(MANUAL / "reference" / "keys.md"), re.MULTILINE)
+    return {
+        *listed,
+        *(f"mechanism.{key}" for key in json_schema()["$defs"]["Mechanism"]["properties"]),
+    }
+
+
+def wrong_places(text: list[str]) -> list[str]:
+    """Dotted names that begin as a module or package of ours, and are neither code nor a key."""
+    parts = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")}
+    names = [name.removeprefix("eigassign.") for name in text]
+    keys = case_keys()
+    return [
+        name
+        for name in names
+        if re.fullmatch(r"[a-z_]+(\.\w+)+", name)
+        and name.split(".")[0] in parts
+        and not name.endswith((".py", ".json", ".yaml", ".png", ".csv"))
+        and not keys & {name, ".".join(name.split(".")[:2])}
+        and not names_code(name)
+    ]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_every_module_and_file_named_exists(page: Path) -> None:
-    parts = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")}
-    keys = re.findall(r"^`([\w.]+)`", read(MANUAL / "reference" / "keys.md"), re.MULTILINE)
+    assert wrong_places(quoted(page)) == []
     for text in quoted(page):
-        name = text.removeprefix("eigassign.")
-        is_file = name.endswith((".py", ".json", ".yaml", ".png", ".csv"))
-        if re.fullmatch(r"[a-z_]+(\.[A-Za-z_]+)+", name) and not is_file:
-            assert name.split(".")[0] not in parts or name in keys or names_code(name), text
         for path in re.findall(r"\b(?:eigassign|tests|benchmarks|cases)/[\w./-]*", text):
             assert (ROOT / path).exists(), path
+        if re.fullmatch(r"[a-z_]+(/\w+)+\.py", text):
+            assert (ROOT / text).exists() or (PACKAGE / text).exists(), text
+
+
+def test_names_of_docstrings_and_of_the_pages_on_the_code_exist() -> None:
+    """Single words in backticks are names in the code, or values there: whole strings."""
+    known = {word for key in case_keys() for word in key.split(".")} | {*keyword.kwlist, "no"}
+    known |= {"chromium", "mypy"}
+    pages = (MANUAL / f"{name}.md" for name in ("architecture", "theory", "contributing"))
+    said = {page.name: quoted(page) for page in pages}
+    for path in PACKAGE.rglob("*.py"):
+        known |= {*path.relative_to(PACKAGE).with_suffix("").parts}
+        said[str(path)] = []
+        for node in ast.walk(ast.parse(read(path))):
+            names = [getattr(node, field, None) for field in ("name", "id", "arg", "attr", "value")]
+            known |= {name for name in names if isinstance(name, str)}
+            if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module):
+                text = ast.get_docstring(node) or ""
+                said[str(path)] += re.findall(r"(?<!`)`([\w.]+)`(?!`)", text)
+    wrong = {
+        place: wrong_places(texts)
+        + [one for one in texts if re.fullmatch(r"[A-Za-z_]\w+", one) and one not in known]
+        for place, texts in said.items()
+    }
+    assert {place: names for place, names in wrong.items() if names} == {}
 
 
 def test_every_section_of_the_theory_names_its_place_in_the_code() -> None:

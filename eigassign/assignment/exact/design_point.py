@@ -2,7 +2,7 @@
 
 Its rows are m residuals, then k excesses. A row is linear in d until its mode is expected to meet a
 neighbour: behind that kink it is the worse of the line and of the eigenvalue of both modes' matrix
-(`crossing`). A program gets them one-sided: excesses, and residuals if the largest is
+(`NeighbourPairs`). A program gets them one-sided: excesses, and residuals if the largest is
 what counts, of the worst case either way; first as at the design, then as they are expected behind
 the kinks that its own step would pass.
 

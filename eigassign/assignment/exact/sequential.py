@@ -5,7 +5,7 @@ tenth of what its program promised; a step spoilt by curvature is corrected once
 the fall, of second order, drowns in round-off before the slopes balance: there a step is taken if
 it halves the stationarity and costs no more than round-off. The trust region grows and shrinks with
 how well promises are kept. The answer is judged by first-order optimality of the exact problem
-(`stationarity`).
+(`first_order` in `design_point`).
 
 **One optimum** are ends of searches with no barrier between them, however far they are apart: a
 parameter that nothing feels, or two that do the same, make a valley of designs that are equally

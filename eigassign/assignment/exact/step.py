@@ -6,10 +6,10 @@ At the design reached, in units z ∈ [0, 1] of the bounds, the step d solves eq
 
 or the same with the epigraph of the largest: max |r + J d| ≤ t, or r + J d ≤ t. The bounds |d| ≤ Δ
 are the trust region: its norm is the largest entry, so that it only tightens bounds, and the
-program stays the one that `solver` solves. v keeps it feasible, ν is raised until v falls no
-further. S is the part of the Hessian that J does not hold, gathered from the slopes met (symmetric
-rank-one updates), made convex. Where the design expects of the step rows that the program had not,
-it is sought anew with them.
+program stays one that `assignment.program` solves. v keeps it feasible, ν is raised until v falls
+no further. S is the part of the Hessian that J does not hold, gathered from the slopes met
+(symmetric rank-one updates), made convex. Where the design expects of the step rows that the
+program had not, it is sought anew with them.
 """
 
 from __future__ import annotations

@@ -148,7 +148,7 @@ class Frequencies:
 
     ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,
     they hold its part too. ``mixed`` (n_t, n_lowest − 1, n_y) are the slopes off the diagonal of
-    the matrices that neighbours among the lowest make (`crossing`), if known.
+    the matrices that neighbours among the lowest make (`NeighbourPairs`), if known.
     """
 
     hz: Floats

@@ -1,7 +1,8 @@
 """The keys `mechanism` and `coordinates`: joints, bodies, springs, assembly, drives, and the whole.
 
-To add a type of joint: write its model and put it into the union `Joint`. How it moves,
-`mechanism.kinematics.joints` says.
+To add a type of joint: write its model, put it into the union `Joint` and its name into those of
+`PLANAR`, `RIDING`, `SLIDING` and `ADVANCING` that it belongs to: in none, it is spatial and turns.
+How it moves, `mechanism.kinematics.joints` says.
 """
 
 from __future__ import annotations

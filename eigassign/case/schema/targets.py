@@ -196,7 +196,7 @@ class SomeModes(AnyTarget):
 
 
 class ModeTarget(SomeModes):
-    """A target on a mode, or on each of several.
+    """A target on a mode, or on each of several; its frequency is in the key named as its kind.
 
     Keys:
         mode: number of the elastic mode, 1 is the lowest; or a mode followed by its shape

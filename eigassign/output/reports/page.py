@@ -118,7 +118,7 @@ class FirstScreen:
 
 
 def verdict_of(results: RunResults) -> FirstScreen | None:
-    """The verdict of a run; None where nothing was asked for."""
+    """The first screen of a run, if it has a design; the verdict is of `study.design.judgement`."""
     row = results.assignment
     if row is None:
         return None

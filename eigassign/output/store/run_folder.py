@@ -176,7 +176,7 @@ def run_folder(
 ) -> Iterator[Path]:
     """Yield an empty hidden folder to fill; on a clean exit it becomes ``target``.
 
-    ``key`` and ``outcome``, as it is at the exit, stand in run.json; see `run_record`.
+    ``key`` and ``outcome``, as it is at the exit, stand in run.json.
     Any exception, interrupt or full disk inside leaves ``target`` as it was. Of two writers of
     one target the last one wins whole. Raises StorageError where ``target`` may not be replaced
     (checked on entry already) or cannot be written.

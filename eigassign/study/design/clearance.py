@@ -7,10 +7,10 @@ linear in time, the room that the modes k and k + 1 leave,
 
     g(t) = min( 1 − f_k / lower ,  f_{k+1} / ((1 + e) upper) − 1 ),
 
-is followed on points between which no coordinate goes on by more than 5° or 2.5 % of its way, and
-which are made denser until half the second difference of g there and beside, twice what a parabola
-and as much as a kink can deviate from the chord, is less than the room that is left: that is
-checked, not proved. Other targets, and what drives exert, are looked at there likewise.
+is followed on points between which no coordinate goes on by more than 10° or 5 % of its way. They
+are halved at least once, until half the second difference of g there and beside, twice what a
+parabola and as much as a kink can deviate from the chord, is less than the room that is left: that
+is checked, not proved. Other targets, and what drives exert, are looked at there likewise.
 
 Mesh and reduced links raise frequencies, by e at most, relative: mode k is below the band with more
 right than its number says, and mode k + 1 has to stay above it without e. Where e has no bound, or

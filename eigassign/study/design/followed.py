@@ -4,7 +4,7 @@ From the pose and design that name a mode, the design changes first, in a straig
 pose. Then the shape goes from sample to sample: from the pose's time to both ends of its own
 trajectory, of others from their samples nearest to the pose. The way depends on nothing but the
 design, so that frequencies and slopes do not either; where modes only cross, the way is all the
-same. How a shape is carried, and when it is lost, is for `eigassign.modal.exact.following` to say.
+same. How a shape is carried, and when it is lost, is for `modal.exact.tracking` to say.
 """
 
 from __future__ import annotations
