@@ -45,7 +45,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "scene": (
             "BETWEEN DESIGN_BOX Scene TRAJECTORY compare reach_warnings "
-            "study_expansions study_modes unseen_points validate_expansions"
+            "study_modes unseen_points validate_expansions"
         ),
         "updating.fit": "UpdateResults solve_update update_problem",
         "updating.measured": "read_measurements",

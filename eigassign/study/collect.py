@@ -202,16 +202,10 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
         yield from () if target.asked.is_aim else far_off(target.asked, target.initial_hz)
     for place, doubt in soft_drives(scene.file, scene.model, scene.path.q[:1]):
         yield f"{place}: {doubt}"
-    if assigned.answer.found is None:
-        yield from _accuracy_warnings(scene, assigned)
-
-
-def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """A warning for each target whose predicted frequency is farther off than the case accepts."""
     limit = scene.file.validation.max_error
     point = ", ".join(f"{value:.4g}" for value in assigned.answer.y)
-    off = [t for t in assigned.targets if not t.approximation_error <= limit]
-    for target in off:
+    one_shot = assigned.targets if assigned.answer.found is None else ()
+    for target in (each for each in one_shot if not each.approximation_error <= limit):
         yield (
             f"{target.label}: the predicted frequency is up to "
             f"{100 * target.approximation_error:.3g} % off the exact one, over the {100 * limit:g} "

@@ -77,18 +77,15 @@ def plan_expansion(
     notes = [q_note, y_note, modes_note]
     wanted: int | str = file.expansion.order if order is None else order
     if isinstance(wanted, int):
-        _require_affordable(file, model, wanted, given=order is None)
+        try:  # the linearised series is made of any order; the full one, see `pipeline.stages`
+            local_space(model.pencil, wanted, True, None).space.require_affordable()
+        except UsageError as error:
+            raise (
+                _wrong(file, "expansion.order", str(error)) if order is None else error
+            ) from None
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen, needed)
     return replace(found, notes=tuple(note for note in (*notes, *found.notes) if note))
-
-
-def _require_affordable(file: CaseFile, model: Model, order: int, given: bool) -> None:
-    """The linearised series is made of any order; the full one, see `pipeline.stages`."""
-    try:
-        local_space(model.pencil, order, True, None).space.require_affordable()
-    except UsageError as error:
-        raise (_wrong(file, "expansion.order", str(error)) if given else error) from None
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:

@@ -267,13 +267,8 @@ def compare(
     )
 
 
-def study_expansions(scene: Scene) -> tuple[Comparison, ...]:
-    """Both expansions of each mode at `unseen_points`; raises EigassignError where one has none."""
-    return compare(scene.model, scene.expansions, unseen_points(scene))
-
-
 def expansion_lines(scene: Scene, found: tuple[Comparison, ...]) -> tuple[str, ...]:
-    """`study_expansions` in words, one line a mode."""
+    """A comparison of both expansions at `unseen_points` in words, one line a mode."""
     where = "between the samples and all over the bounds"
     return tuple(
         f"mode {mode}: the full expansion is about {percent(MARGIN * one.worst['taylor'])} off at "
@@ -301,7 +296,7 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
     model, expansions = scene.model, scene.expanded
     everywhere, lines = tuple[Comparison, ...](), tuple[str, ...]()
     try:
-        everywhere = study_expansions(scene)
+        everywhere = compare(model, expansions, unseen_points(scene))
         lines = expansion_lines(scene, everywhere)
     except EigassignError as error:  # a design has no pose or modes
         lines = (f"the expansion is not measured all over the bounds: {error}",)
