@@ -46,9 +46,9 @@ def _short(value: Any) -> str:
         if getattr(value, "size", _FEW + 1) <= _FEW and value.ndim == 1:
             return f"[{', '.join(f'{x + 0:.6g}' for x in value.tolist())}]"
         return f"{type(value).__name__}{tuple(value.shape)}"
-    if is_dataclass(value):
+    if is_dataclass(value) or hasattr(value, "_fields"):
         return f"{type(value).__name__}(…)"
-    if isinstance(value, tuple) and not hasattr(value, "_fields"):
+    if isinstance(value, tuple):
         parts = [_short(part) for part in value[:2]]
         more = [f"… {len(value)} in all"] if len(value) > 2 else []
         return f"({', '.join(parts + more)}{',' if len(value) == 1 else ''})"

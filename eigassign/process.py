@@ -13,9 +13,8 @@ import threading
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from types import FrameType
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError
 from eigassign.files import CASE, printable, read_bytes
@@ -25,8 +24,7 @@ from eigassign.files import CASE, printable, read_bytes
 BUG, STORAGE, INTERRUPTED = EigassignError.exit_code, StorageError.exit_code, 130
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """An error on the command line: exit code, one line, and the problems listed before it."""
 
     exit_code: int

@@ -41,7 +41,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,8 +66,7 @@ from eigassign.facts import Fact
 ACCEPT = 1e-8  # residual of optimality
 
 
-@dataclass(frozen=True)
-class LinearModel:
+class LinearModel(NamedTuple):
     """λ along the trajectory, λ = l0 + l @ (y − y0).
 
     ``l0`` (n_t,) in rad²/s²; ``l`` (n_t, n_y) in rad²/s² per SI unit of y.

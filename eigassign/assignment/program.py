@@ -11,7 +11,7 @@ start is feasible, goes by it alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -53,8 +53,7 @@ class LinearConstraint:
         return float(self.coefficients @ y), self.coefficients
 
 
-@dataclass(frozen=True)
-class Program:
+class Program(NamedTuple):
     """min ½‖A x + b‖² + costᵀx  with  lower ≤ G x ≤ upper, in units in which all is O(1).
 
     The rows of G, those of parameters that bounds hold among them, have norm 1.
@@ -73,7 +72,7 @@ class Program:
 
     def some(self, rows: NDArray[np.bool_]) -> Program:
         """The program with these rows of G only."""
-        return replace(self, G=self.G[rows], lower=self.lower[rows], upper=self.upper[rows])
+        return self._replace(G=self.G[rows], lower=self.lower[rows], upper=self.upper[rows])
 
 
 class Solved(NamedTuple):

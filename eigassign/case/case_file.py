@@ -21,7 +21,7 @@ from difflib import get_close_matches
 from functools import cached_property, reduce
 from itertools import accumulate, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -159,8 +159,7 @@ def _superfluous(value: Part) -> set[str]:
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
 
 
-@dataclass(frozen=True)
-class Load:
+class Load(NamedTuple):
     """A property that trajectories set, in SI: as the file writes it, and along each of them.
 
     Of what is a design parameter it is what they add: 0 as the file writes it.
@@ -390,8 +389,7 @@ NO_VALUES: Mapping[str, object] = FrozenDict()
 MOST_PROBLEMS = 100  # shown
 
 
-@dataclass(frozen=True)
-class Unchecked:
+class Unchecked(NamedTuple):
     """A case file as it is written: its bytes, and the tree in them."""
 
     path: Path
@@ -467,7 +465,7 @@ def checked(
     """
     source, path = written.source, written.path
     if values:
-        source = replace(source, tree=with_values(source.tree, values))
+        source = source._replace(tree=with_values(source.tree, values))
     if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
         raise CaseError(tuple(crowded))
     named = named_files(source.tree, path.parent)

@@ -12,7 +12,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import accumulate, islice
 from pathlib import PurePath
@@ -138,8 +137,7 @@ class Mark(NamedTuple):
         return mark
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """One file as plain data, its marks, and the problems that did not keep it from being read."""
 
     file: str

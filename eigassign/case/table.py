@@ -14,7 +14,6 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,8 +37,7 @@ _POINT = re.compile(r"\d\.\d")
 MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
 
 
-@dataclass(frozen=True)
-class CsvColumn:
+class CsvColumn(NamedTuple):
     """A column to be read: numbers of one of these dimensions, or words where it has none.
 
     The first dimension is meant where the header gives no unit.
@@ -50,8 +48,7 @@ class CsvColumn:
     optional: bool = False
 
 
-@dataclass(frozen=True)
-class CsvTable:
+class CsvTable(NamedTuple):
     """Columns by their name, the line each row stands in, and what was passed over."""
 
     file: str

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import NamedTuple
 
 from eigassign.case.reader import NUMBER, shown, suggestion
 
@@ -21,8 +21,7 @@ class QuantityError(ValueError):
     """A quantity that cannot be read; the message says what was expected and what was found."""
 
 
-@dataclass(frozen=True)
-class Dimension:
+class Dimension(NamedTuple):
     """A physical dimension: its name, its SI unit, and other units worth mentioning.
 
     ``smallest`` and ``largest`` (SI) enclose every mechanism, from nanotubes to bridges, and keep
@@ -42,8 +41,7 @@ class Dimension:
         return f"{self.name} ({unit} when bare; or {self.examples})"
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """``factor · π^pi`` SI units; the exact fraction keeps a conversion to one rounding."""
 
     factor: Fraction

@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +68,7 @@ NEAR = 0.5
 ABOVE = 4  # modes above the wanted ones among which near ones are sought
 
 
-@dataclass(frozen=True)
-class MotionEffect:
+class MotionEffect(NamedTuple):
     """Relative change of each mode's frequency (n_instants, n_modes) at ``samples`` of the path."""
 
     samples: NDArray[np.intp]

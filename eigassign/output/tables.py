@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,7 @@ TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 _RANGES = "label lowest_hz highest_hz error"
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """A table of finished text; the first column names the row.
 
     ``section`` is that of the page that it stands in.
@@ -96,7 +94,7 @@ def _value(row: Any, name: str, one: Fact) -> Any:
 def run_tables(results: RunResults) -> tuple[Table, ...]:
     """What there is something to show of, section by section of `_KINDS`."""
     made = (
-        replace(table, section=section)
+        table._replace(section=section)
         for section, kinds in _KINDS.items()
         for table in kinds(results)
     )
@@ -152,7 +150,7 @@ def _design(results: RunResults) -> Iterator[Table]:
             "upper": "" if mass.upper is None else number(mass.upper),
             cost: "" if mass.price is None else number(mass.cost),
         }
-        made = replace(made, rows=(*made.rows, tuple(own.get(c, "") for c in made.columns)))
+        made = made._replace(rows=(*made.rows, tuple(own.get(c, "") for c in made.columns)))
     yield made
     yield _combinations(results)
 

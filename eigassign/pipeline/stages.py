@@ -184,7 +184,7 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     is there to compare with, and of a lower order where its set would be too large.
     """
     full_order = affordable_order(model, plan.order)
-    points = [plan, *(replace(plan, q0=np.array(q)) for q in plan.more_q)]
+    points = [plan, *(plan._replace(q0=np.array(q)) for q in plan.more_q)]
     made = [_expansions(model, at, full_order, cache) for at in points]
     fulls, linears = (
         NearestExpansion(parts) for parts in zip(*(both for both, _ in made), strict=True)

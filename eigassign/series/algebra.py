@@ -18,7 +18,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -298,8 +298,7 @@ class Samples:
             raise SingularityError("the mechanism is at a dead point") from error
 
 
-@dataclass(frozen=True)
-class Tangents:
+class Tangents(NamedTuple):
     """Samples with their derivatives in some directions, exact: rows (k, (1 + n_directions) n).
 
     The first n columns are the values at n ``samples``, the next n the derivatives in the first
@@ -369,8 +368,7 @@ class Tangents:
         return out.reshape(len(out), -1)
 
 
-@dataclass(frozen=True)
-class Truncated:
+class Truncated(NamedTuple):
     """Power series truncated to ``space``."""
 
     space: LowerSet

@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,7 @@ MOST_PAIRS = 10_000_000  # of coefficients that meet in a product
 PAIR_BYTES = 90  # measured for 5 to 9 variables
 
 
-@dataclass(frozen=True)
-class ProductTable:
+class ProductTable(NamedTuple):
     """Pairs (left, right) with γ_left + γ_right = γ_target, sorted by target.
 
     ``starts[k]`` is the first pair of target k; every target has at least the pair (0, k).
@@ -38,8 +38,7 @@ class ProductTable:
     starts: Ints
 
 
-@dataclass(frozen=True)
-class DegreePairs:
+class DegreePairs(NamedTuple):
     """Pairs with left ≠ 0 of all targets of one degree, ``target`` counted from its first."""
 
     left: Ints

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,8 +179,7 @@ LOOKS = 60  # poses and designs at corners of the bounds that a mesh is chosen a
 BEYOND = 8.0
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """A number for each link, None where it stays whole; how far that is off, about; the tries."""
 
     values: Mapping[str, Any]
@@ -193,8 +192,7 @@ class Choice:
         return self.values
 
 
-@dataclass(frozen=True)
-class SettledModel:
+class SettledModel(NamedTuple):
     """A model with the file it is of: ``file`` has numbers in place of ``auto`` for its links."""
 
     file: CaseFile

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +70,7 @@ class MotionRow:
         )
 
 
-@dataclass(frozen=True)
-class MotionStudy:
+class MotionStudy(NamedTuple):
     """A row a mode, none where inner dofs have no directions, and the words for all."""
 
     rows: tuple[MotionRow, ...]
@@ -152,8 +152,7 @@ NEAR_BUCKLING = 0.2
 BENT = 0.4
 
 
-@dataclass(frozen=True)
-class WeightStudy:
+class WeightStudy(NamedTuple):
     """The numbers, None where gravity is left out on purpose, and the words for them."""
 
     row: WeightRow | None
@@ -413,8 +412,7 @@ WEIGHT_POSES = 9  # at which the weight is judged; each costs an exact solve
 ROUNDED = 3  # at which round-off is measured by nine solves; of a large model one
 
 
-@dataclass(frozen=True)
-class Accuracy:
+class Accuracy(NamedTuple):
     """The errors of a run's numbers: of the mesh, and of all in lines of text."""
 
     mesh: MeshError | None  # None without beams or solids

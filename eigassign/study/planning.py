@@ -8,9 +8,8 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
 from itertools import chain, repeat
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,8 +42,7 @@ SHOWN = 8  # values of a point that a note names
 MANY_SAMPLES = 500  # up to which the distance to every other sample counts for the most central
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """Expansion point x0 = (q0, y0), order p and modes; ``notes`` say what was chosen and why."""
 
     q0: Floats
@@ -85,7 +83,7 @@ def plan_expansion(
             ) from None
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen, needed)
-    return replace(found, notes=tuple(note for note in (*notes, *found.notes) if note))
+    return found._replace(notes=tuple(note for note in (*notes, *found.notes) if note))
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:

@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -281,8 +282,7 @@ def expansion_lines(scene: Scene, found: tuple[Comparison, ...]) -> tuple[str, .
 # --- Mode studies: what the figures show
 
 
-@dataclass(frozen=True)
-class ModeStudies:
+class ModeStudies(NamedTuple):
     """One study for each expanded mode, and what they say in words."""
 
     rows: tuple[ModeStudy, ...] = ()
@@ -315,8 +315,7 @@ TRAJECTORY, DESIGN_BOX = "trajectory", "box of y at q0"
 BETWEEN = "between samples, all over the bounds"
 
 
-@dataclass(frozen=True)
-class Validation:
+class Validation(NamedTuple):
     """The rows of one case, and what else a reader should know."""
 
     rows: tuple[ValidationRow, ...]

@@ -12,7 +12,8 @@ Where modes meet it is that of Clarke: some share of the branches at each kink m
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +50,7 @@ class Rows:
         return Rows(*(np.concatenate([getattr(self, n), getattr(others, n)]) for n in names))
 
 
-@dataclass(frozen=True)
-class Expected:
+class Expected(NamedTuple):
     """The rows expected of a step, which of them lie behind a kink, and those as one-sided rows."""
 
     values: Floats  # (m + k,)
@@ -58,8 +58,7 @@ class Expected:
     rows: Rows
 
 
-@dataclass(frozen=True)
-class DesignPoint:
+class DesignPoint(NamedTuple):
     """A design in units of the bounds, what was seen of it, and its rows."""
 
     z: Floats  # (n,)
@@ -96,8 +95,8 @@ class DesignPoint:
 
     def shifted(self, by: Floats) -> DesignPoint:
         """What is expected with ``by`` (m + k,) added to it."""
-        pairs = replace(self.pairs, other=self.pairs.other + by[self.pairs.row])
-        return replace(self, values=self.values + by, pairs=pairs)
+        pairs = self.pairs._replace(other=self.pairs.other + by[self.pairs.row])
+        return self._replace(values=self.values + by, pairs=pairs)
 
     # --- What is expected
 

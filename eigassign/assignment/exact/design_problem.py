@@ -13,9 +13,8 @@ missed). Steps and slopes are in units z ∈ [0, 1] of the bounds.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -39,8 +38,7 @@ class Objective(StrEnum):
     LARGEST = "largest"
 
 
-@dataclass(frozen=True)
-class Cost:
+class Cost(NamedTuple):
     """c(y) = p·(y − y_ref) + p_m (m(y) − m_ref) + what is chosen of lists, p_m ≥ 0 and m > 0.
 
     Of parameters, of a mass, and of choices with a price each, which no slope tells.
@@ -79,8 +77,7 @@ class Cost:
         return np.asarray(least)
 
 
-@dataclass(frozen=True)
-class Appraisal:
+class Appraisal(NamedTuple):
     """A design seen from the targets: residuals (m,) and excesses (k,), with slopes in y.
 
     ``slopes`` (m, n_y) and ``excess_slopes`` (k, n_y) are per SI unit of y. An excess is relative
@@ -99,8 +96,7 @@ class Appraisal:
         return float(np.max(self.excess, initial=0.0))
 
 
-@dataclass(frozen=True)
-class DesignProblem:
+class DesignProblem(NamedTuple):
     """F and its limits; ``appraise`` may raise EigassignError where a design has no answer."""
 
     appraise: Callable[[Floats], Appraisal]
@@ -161,8 +157,7 @@ class DesignProblem:
 # --- The bounds as units
 
 
-@dataclass(frozen=True)
-class UnitBox:
+class UnitBox(NamedTuple):
     """z = (y − lower)/width of the parameters with room, and the linear constraints over z."""
 
     lower: Floats

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -221,7 +221,7 @@ def _held_at(problem: DesignProblem, j: int, at: float, start: Floats) -> Optimu
     """The fit from ``start`` with y_j ``at`` a value; None where there is no answer."""
     lower, upper = problem.lower.copy(), problem.upper.copy()
     lower[j] = upper[j] = at
-    held = replace(problem, lower=lower, upper=upper)
+    held = problem._replace(lower=lower, upper=upper)
     try:
         return _fitted(held, np.clip(start, lower, upper))
     except EigassignError:

@@ -99,7 +99,7 @@ def with_scenarios(
                 own = seen.pairs.chosen((seen.pairs.row >= m) | (s < len(goals)))
                 row = np.where(own.row < m, own.row + s * m, own.row + (len(goals) - 1) * m + s * k)
                 others, mixed = own.others * slopes, own.mixed * slopes
-                pairs.append(replace(own, row=row, others=others, mixed=mixed))
+                pairs.append(own._replace(row=row, others=others, mixed=mixed))
         return Appraisal(
             np.concatenate([seen.residual for seen, _ in goals]),
             np.vstack([seen.slopes * slopes for seen, slopes in goals]),

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -77,8 +77,7 @@ class StepRecord:
     taken: bool
 
 
-@dataclass(frozen=True)
-class Optimum:
+class Optimum(NamedTuple):
     """The best design found: by violation first, then by F.
 
     ``stationarity`` as `first_order` recomputes it. ``predicted`` is what the last program that
@@ -191,7 +190,7 @@ class _Run:
             corrected = self.proposed(place, (reached, move))
             again = None if corrected is None else self._reached(place, corrected)
             if corrected and again is not None and self._kept(place, again, move):
-                reached, move = again, replace(corrected, promised=move.promised)
+                reached, move = again, corrected._replace(promised=move.promised)
                 taken = True
         at, radius = place if reached is None else reached, self.region.radius
         length = float(np.abs(move.d).max(initial=0.0))
@@ -296,8 +295,7 @@ FINISHED = (End.OPTIMAL, End.STALLED)
 STOPPED = (End.SECONDS, End.INTERRUPTED)
 
 
-@dataclass(frozen=True)
-class Tally:
+class Tally(NamedTuple):
     """The number of starts whose steps ended at an optimum, and that of distinct ones."""
 
     starts: int = 0
@@ -355,7 +353,7 @@ def has_way(
         middle = minimise(problem, 0.5 * (a + b), 0)
         if np.any(np.array(worth(middle)) > most):
             lower[j] = upper[j] = middle.y[j]
-            middle = minimise(replace(problem, lower=lower, upper=upper), middle.y, DOWN)
+            middle = minimise(problem._replace(lower=lower, upper=upper), middle.y, DOWN)
     except EigassignError:
         return False
     if np.any(np.array(worth(middle)) > most):

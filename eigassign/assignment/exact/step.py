@@ -14,7 +14,8 @@ program had not, it is sought anew with them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +36,7 @@ class TrustRegion:
     weight: float  # ν
 
 
-@dataclass(frozen=True)
-class ProposedStep:
+class ProposedStep(NamedTuple):
     """A program's step d, what it promises, and the multipliers of its rows."""
 
     d: Floats
@@ -70,7 +70,7 @@ def step_program(
         before = merit(problem, place.value, place.seen.violation, region.weight)
         if best is None or spoilt is not None or best.promised > FLAT * max(abs(before), TINY**2):
             return best
-        flat = flat or (replace(best, promised=0.0), region.radius)
+        flat = flat or (best._replace(promised=0.0), region.radius)
         if not has_more_rows or region.radius < SMALLEST:
             step, region.radius = flat
             return step if step.d.any() else None
@@ -88,8 +88,7 @@ def _convex(place: DesignPoint, S: Floats) -> tuple[Floats, Floats]:
     return root.T @ root - gauss, root
 
 
-@dataclass(frozen=True)
-class _Program:
+class _Program(NamedTuple):
     """The program about a place in a region, for any rows."""
 
     problem: DesignProblem

@@ -27,7 +27,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,7 @@ TURNED = 0.8  # cosine of twice the angle from where a mode is no longer what it
 ANGLES = np.pi / 4.0 * np.arange(1, 8)  # of the mixtures of two modes that optimality looks at
 
 
-@dataclass(frozen=True)
-class NeighbourPairs:
+class NeighbourPairs(NamedTuple):
     """Rows whose mode may meet a neighbour, p of them; the matrix of each is
 
         [[value + slopes·δ,  mixed·δ          ],
@@ -70,11 +69,11 @@ class NeighbourPairs:
 
     def scaled(self, free: list[int], width: Floats) -> NeighbourPairs:
         """The rows with slopes in units ``width`` of the design parameters ``free``."""
-        return replace(self, others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
+        return self._replace(others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
 
     def chosen(self, mask: NDArray[np.bool_]) -> NeighbourPairs:
         """The pairs of a mask."""
-        return NeighbourPairs(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
+        return NeighbourPairs._make(column[mask] for column in self)
 
     def along(
         self, own: Floats, slopes: Floats, d: Floats
@@ -109,11 +108,7 @@ def joined(parts: Sequence[NeighbourPairs]) -> NeighbourPairs | None:
     """The rows of all parts as one; None where there are no parts."""
     if not parts:
         return None
-    columns = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in NeighbourPairs.__dataclass_fields__
-    )
-    return NeighbourPairs(*columns)
+    return NeighbourPairs._make(map(np.concatenate, zip(*parts, strict=True)))
 
 
 Ints = NDArray[np.intp]
@@ -142,8 +137,7 @@ class Solved:
         return np.asarray(self.hz[:, mode - 1] if mode > 0 else self.followed[:, mode])
 
 
-@dataclass(frozen=True)
-class Frequencies:
+class Frequencies(NamedTuple):
     """Frequencies ``hz`` (n_t, n_modes) of a design: the lowest, ascending, then followed ones.
 
     ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,

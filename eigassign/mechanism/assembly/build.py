@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy import sparse
@@ -170,8 +170,7 @@ def _with_links(case: CaseFile, change: Callable[[str, Any], dict[str, Any]]) ->
     return replace(case, mechanism=case.mechanism.model_copy(update={"links": links}))
 
 
-@dataclass(frozen=True)
-class WholeLinks:
+class WholeLinks(NamedTuple):
     """A case with its links before they are reduced, to any frequency."""
 
     case: CaseFile

@@ -20,7 +20,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +37,7 @@ Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]
 
 
-@dataclass(frozen=True)
-class LocalLink:
+class LocalLink(NamedTuple):
     """One link in its own frame, with its place among the global unknowns.
 
     ``own`` (n_local,) is P: the global index of each local dof, or -1 where it is slaved;
@@ -67,7 +67,7 @@ def add_links(K: AffineEntries, M: AffineEntries, links: Sequence[LocalLink], n_
 
 def add_stressed(K: AffineEntries, link: LocalLink, terms: Sequence[Term], n_u: int) -> None:
     """K += Bᵀ k_σ B of one link, which resists rigid motions, too."""
-    _add_whole(K, terms, _constants(replace(link, mass=terms)), link, n_u)
+    _add_whole(K, terms, _constants(link._replace(mass=terms)), link, n_u)
 
 
 def _add_whole(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,8 +108,7 @@ class StrandShape(Brief):
     motions: Floats
 
 
-@dataclass(frozen=True)
-class Shapes:
+class Shapes(NamedTuple):
     """The motion of a mechanism in ``count`` vectors, at one pose and design."""
 
     strands: tuple[StrandShape, ...]
@@ -137,8 +137,7 @@ def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> tuple[Shapes, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class _Symbols:
+class _Symbols(NamedTuple):
     """The arrays of scalars of one link that are evaluated at x, in a fixed order."""
 
     name: str

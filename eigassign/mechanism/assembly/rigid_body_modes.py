@@ -217,7 +217,7 @@ def _recombined(
     if np.array_equal(change, np.eye(len(change))):
         return replace(motion, rigid=rigid)
     moved = tuple(replace(p, twist=multiply(p.twist, change)) for p in motion.placements)
-    rates = replace(motion.coordinates, rates=motion.coordinates.rates @ change)
+    rates = motion.coordinates._replace(rates=motion.coordinates.rates @ change)
     passive = motion.passive_rates
     if passive is not None:
         passive = multiply(passive, change)

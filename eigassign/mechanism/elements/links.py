@@ -105,8 +105,7 @@ def element_motion(motion: Floats, axes: Floats) -> Floats:
     return np.concatenate([turned[:-1], turned[1:]], axis=1)
 
 
-@dataclass(frozen=True)
-class LinkMesh:
+class LinkMesh(NamedTuple):
     """One link: ``nodes`` maps a name to the local dofs of that node (None: rigidly attached).
 
     ``rigid`` are the terms ν_b N_b of N, (n_local, n_twist): nodal motion per twist of the origin.

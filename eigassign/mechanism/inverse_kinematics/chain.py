@@ -137,8 +137,7 @@ def tip_path(waypoints: ArrayLike, kind: str) -> Curve:
 # --- attitude
 
 
-@dataclass(frozen=True)
-class Attitude:
+class Attitude(NamedTuple):
     """The rotation of the tip's link to the world, R(s) on 0 ≤ s ≤ 1."""
 
     key: str  # of the case file: angle or orientation
@@ -204,16 +203,14 @@ def spatial_attitude(path: Curve, orientation: ArrayLike, kind: str) -> Attitude
 # --- path, attitude and times together
 
 
-@dataclass(frozen=True)
-class TipTarget:
+class TipTarget(NamedTuple):
     """The target of n tips: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) where asked for."""
 
     point: Floats
     rotation: Floats | None = None
 
 
-@dataclass(frozen=True)
-class Course:
+class Course(NamedTuple):
     """Sample k is due at path parameter ``s[k]`` and time ``time_s[k]``."""
 
     path: Curve
@@ -267,8 +264,7 @@ class TipEvaluation(NamedTuple):
     closure: Floats  # ∂F/∂z (n, n_e, n_q + n_p)
 
 
-@dataclass(frozen=True)
-class LoopAssembly:
+class LoopAssembly(NamedTuple):
     """The assembly of a chain's loops."""
 
     reference: Floats  # q (n_q,) at which the assembly is chosen
@@ -312,8 +308,7 @@ class TipChain:
         return np.array([k == kind for k in self.kinds], dtype=bool)
 
 
-@dataclass(frozen=True)
-class Reduced:
+class Reduced(NamedTuple):
     """A tip evaluation with the passive freedoms eliminated: loops closed to first order."""
 
     J: Floats  # (n, m, n_q): task components per u of the coordinates

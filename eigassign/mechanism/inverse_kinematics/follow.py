@@ -18,8 +18,9 @@ Shapes: n samples, n_q coordinates, n_y design parameters, n_z entries of a stat
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -111,8 +112,7 @@ RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 
 
-@dataclass(frozen=True)
-class Followed:
+class Followed(NamedTuple):
     """The coordinates q (n, n_q) in rad or m along a course."""
 
     q: Floats
@@ -371,7 +371,7 @@ class PathOfDesign:
 
     def problem_at(self, y: Floats) -> TipProblem:
         """The problem at a design, in the measure of the first one."""
-        return replace(self.problem, chain=self.problem.chain.redesigned(y))
+        return self.problem._replace(chain=self.problem.chain.redesigned(y))
 
     def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""
@@ -415,7 +415,7 @@ def _slopes(ik: TipProblem, u: Floats) -> Floats:
     motion = _by_design(ik, u)
     both = motion.J, motion.following
     (by_q, by_y), (follow_q, follow_y) = (np.split(of, [ik.n_q], axis=2) for of in both)
-    found = change(replace(motion, J=by_q, following=follow_q), -by_y)
+    found = change(motion._replace(J=by_q, following=follow_q), -by_y)
     found[:, ik.n_q :] += follow_y
     return found
 

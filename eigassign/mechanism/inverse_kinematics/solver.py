@@ -16,7 +16,6 @@ state, m task components.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +38,7 @@ _SLACK = 1e-9  # rad: round-off at the end of a branch's range
 _STRUCTURAL = 1e-6  # of L: a smaller singular value everywhere is round-off
 
 
-@dataclass(frozen=True)
-class TipProblem:
+class TipProblem(NamedTuple):
     """Inverse kinematics of one chain: its wanted branch, and what to know before solving."""
 
     chain: TipChain
@@ -343,8 +341,7 @@ _STRAY = 0.5  # of a trace's largest step: a corrector that moves further has le
 _MAX_ADVANCE = 0.125  # of the path, a trace step
 
 
-@dataclass(frozen=True)
-class Trace:
+class Trace(NamedTuple):
     """Solutions at path parameters s_i (m,) with their slopes du/ds, up to where it got."""
 
     s: Floats

@@ -54,7 +54,7 @@ def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) 
     rates[:n] = c.relative
     if np.array_equal(rates, c.rates):
         return motion
-    coords = replace(c, columns=tuple(range(n)), rates=rates)
+    coords = c._replace(columns=tuple(range(n)), rates=rates)
     return closed_kinematics(case, parameters, motion.tree, coords)
 
 

@@ -23,8 +23,7 @@ NodeName = tuple[str, str]  # (link, node); the ground is ("ground", "")
 GROUND: NodeName = ("ground", "")
 
 
-@dataclass(frozen=True)
-class JointEdge:
+class JointEdge(NamedTuple):
     """One joint as it is walked: ``follower`` hangs on ``base``.
 
     ``turned`` where the file names the two the other way round: the joint is then walked against
@@ -46,8 +45,7 @@ class JointEdge:
         return self.reversed() if self.turned else self
 
 
-@dataclass(frozen=True)
-class Freedom:
+class Freedom(NamedTuple):
     """One freedom of one joint: driven by coordinate number ``coordinate``, or passive (None)."""
 
     joint: str
@@ -260,8 +258,7 @@ Floats = NDArray[np.float64]
 Angles = dict[str, tuple[Floats, float] | None]  # per link: row over q and constant, or unknown
 
 
-@dataclass(frozen=True)
-class CoordinateMap:
+class CoordinateMap(NamedTuple):
     """s = ``relative`` q + ``offset`` are the joint coordinates in the order of q.
 
     ``columns`` are the coordinates that are not locked: the q̇ of eq. (1); ``rates``

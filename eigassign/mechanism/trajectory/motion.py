@@ -176,7 +176,7 @@ class TipMotion:
         """The course with other instants (n,)."""
         tau = np.clip(time_s / self.duration_s, 0.0, 1.0)
         s = np.clip(self.law.value(tau)[:, 0], 0.0, 1.0)
-        return replace(self.course, s=s, time_s=time_s)
+        return self.course._replace(s=s, time_s=time_s)
 
     def tip(self, time_s: Floats) -> Floats:
         """Where the tip is at the initial design, (n, 2 or 3) in m."""

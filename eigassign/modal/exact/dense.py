@@ -17,8 +17,7 @@ round-off, the sample is solved anew by `modes_with_mass`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +34,7 @@ NO_MASS = (
 )
 
 
-@dataclass(frozen=True)
-class Modes:
+class Modes(NamedTuple):
     """Eigenvalues λ (n_samples, count) in rad²/s² and modes φ (n_samples, n_dof, count).
 
     φᵀMφ = I at every sample; the entry of largest magnitude of every mode is positive.

@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,8 +224,7 @@ def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSerie
     return PencilSeries(pencil, *(_dense(space, stored, *each) for each in both))
 
 
-@dataclass(frozen=True)
-class ProductPairs:
+class ProductPairs(NamedTuple):
     """Products A_δ X_β of all β + δ = γ with |γ| and |δ| fixed, sorted by γ.
 
     The δ are among the ``slots`` of what is stored and the β among ``below``; ``left``, ``right``

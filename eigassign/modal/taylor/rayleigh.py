@@ -11,8 +11,8 @@ has the eigenvalues of the exact invariant subspace up to products of two missin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +50,7 @@ def eigenvalue_series(
     return matrix_product(space, root, matrix_product(space, numerator, root))
 
 
-@dataclass(frozen=True)
-class _Products:
+class _Products(NamedTuple):
     """Products of two vectors a ≤ b by the coefficient that they meet in."""
 
     a: Ints
@@ -61,8 +60,7 @@ class _Products:
     into: Ints | slice  # positions of the results; a slice where these are all
 
 
-@dataclass(frozen=True)
-class _Plan:
+class _Plan(NamedTuple):
     """Tables of the quotient for one pair of sets and one pattern of θ."""
 
     constant: _Products  # up to the order p: for K and M at w = 0
@@ -174,8 +172,7 @@ CHUNK = 4_000  # rows multiplied at once, so that the products stay in the cache
 PIECE = 16_000_000  # numbers projected at once: 128 MB, not 320 at order 10 in seven variables
 
 
-@dataclass(frozen=True)
-class ProjectedTerms:
+class ProjectedTerms(NamedTuple):
     """L A_j Rᵀ (n_matrices, n_terms, l, r) of ``terms`` j of the ``matrices``: 0 is K, 1 is M."""
 
     matrices: slice

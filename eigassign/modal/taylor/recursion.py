@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,8 +102,7 @@ def _mixing(space: LowerSet, degree: int, L: Floats) -> Floats:
     return C.transpose(0, 3, 1, 2).reshape(count * r, (below - 1) * r)
 
 
-@dataclass(frozen=True)
-class LocalSpace:
+class LocalSpace(NamedTuple):
     """The set over w, dz/dw and dw/dx."""
 
     space: LowerSet

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +123,7 @@ SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}
 def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
     """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
     sections = {"parameters": _found(results), "fit": _fit(results, most)}
-    every = (replace(table, section=key) for key, own in sections.items() for table in own)
+    every = (table._replace(section=key) for key, own in sections.items() for table in own)
     return tuple(table for table in every if table.rows)
 
 

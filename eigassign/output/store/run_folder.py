@@ -32,10 +32,9 @@ import json
 import logging
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from eigassign._version import __version__
 from eigassign.errors import StorageError
@@ -56,8 +55,7 @@ MARKER = "run.json"
 _SCHEMA = 3  # of run.json: of earlier ones no file is vouched for
 
 
-@dataclass(frozen=True)
-class RunOf:
+class RunOf(NamedTuple):
     """The case of a run; ``case_path`` is relative to the folder, so that both may move.
 
     ``key`` is a hash of all that the numbers of the run come from.
@@ -71,8 +69,7 @@ class RunOf:
         return self.case_path == other.case_path or self.key == other.key
 
 
-@dataclass(frozen=True)
-class RunRecord:
+class RunRecord(NamedTuple):
     """What run.json says: ``token`` tells this run from every other one, ``outcome`` how it ended.
 
     ``content`` is all of it but its hash, ``seal``.
@@ -92,7 +89,7 @@ def write_record(folder: Path, run: RunOf, token: str, outcome: Mapping[str, Any
         "eigassign_run": _SCHEMA,
         "eigassign_version": __version__,
         "token": token,
-        **vars(run),
+        **run._asdict(),
         "outcome": dict(outcome),
         "files": sorted(_contents(folder)),
     }

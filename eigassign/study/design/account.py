@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +56,7 @@ CUT = (End.SECONDS, End.STEPS, End.INTERRUPTED)  # ways that a search is ended b
 UNTRUSTED = "the error of the expansion is above validation.max_error"
 
 
-@dataclass(frozen=True)
-class VerifiedAssignment:
+class VerifiedAssignment(NamedTuple):
     """An answer with exact frequencies before and after, and what it means."""
 
     answer: Answer

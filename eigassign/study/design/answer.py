@@ -8,7 +8,8 @@ otherwise.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,7 @@ def require_assignable(file: CaseFile) -> None:
     file.require("optimize", needs)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """The design to be verified, and how it was found.
 
     ``scene`` has the instants between samples that were added. ``predicted`` has for each target

@@ -15,7 +15,8 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,8 +228,7 @@ SAME = 1e-9  # of the merit: a design this little worse is as good
 # --- Contradictions
 
 
-@dataclass(frozen=True)
-class Conflict:
+class Conflict(NamedTuple):
     """Limits that no design was found to meet together; without any one of them there is one.
 
     ``smallest`` is False where there are so many that only those missed here are named. Of limits
@@ -337,5 +337,5 @@ def least_changed(found: Found, initial: Floats) -> Found:
     if value > limit or seen.violation > max(best.seen.violation * (1.0 + SAME), MET):
         return found
     left, limits = first_order(problem, y, seen)
-    moved = replace(best, y=y, seen=seen, objective=value, stationarity=left, limits=limits)
+    moved = best._replace(y=y, seen=seen, objective=value, stationarity=left, limits=limits)
     return found.with_best(moved)

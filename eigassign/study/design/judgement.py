@@ -17,8 +17,7 @@ In this order, the first that holds:
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +45,7 @@ from eigassign.study.results import (
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SolvedDesigns:
+class SolvedDesigns(NamedTuple):
     """Exact frequencies of the initial design, the answer and the one shot."""
 
     initial: Solved
@@ -192,8 +190,7 @@ IMPROVED = 0.01  # of the merit of the start
 GAINED = 1e-9  # of what is to be light, high or wide: less is round-off
 
 
-@dataclass(frozen=True)
-class Facts:
+class Facts(NamedTuple):
     """What the verdict rests on.
 
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
@@ -222,8 +219,7 @@ class Facts:
     is_optimal: bool = True
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """The word, why in a sentence, and why this is no answer to build on; None if it is."""
 
     word: str

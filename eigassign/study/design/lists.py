@@ -8,8 +8,8 @@ continuous.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ Ints = NDArray[np.intp]
 KEEP = 5  # the combinations that are told of
 
 
-@dataclass(frozen=True)
-class ListedValues:
+class ListedValues(NamedTuple):
     """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns).
 
     ``prices`` (n_rows,): what a whole row costs, of F; none where its columns have prices, if any.

@@ -218,8 +218,7 @@ def _times(tree: Topology, node: NodeName, loop: JointEdge) -> int:
     return total
 
 
-@dataclass(frozen=True)
-class Loads:
+class Loads(NamedTuple):
     """What acts in a pose: functions of (q, y), variables, or numbers of many loads, axis behind.
 
     All in the axes of the link that it acts on, of a spring in its own.
@@ -235,11 +234,10 @@ class Loads:
     @property
     def each(self) -> list[Any]:
         """All arrays, in one order."""
-        return [array for own in vars(self).values() for array in own.values()]
+        return [array for own in self for array in own.values()]
 
 
-@dataclass(frozen=True)
-class Statics:
+class Statics(NamedTuple):
     """``on_nodes``: what joints and springs put on the nodes of each link, about each node;
     ``through``: what the follower of each joint, as it is walked, puts on its base node.
     """

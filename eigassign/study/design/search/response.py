@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,8 +185,7 @@ class Glances:
         return None if np.isnan(hz).any() else Solved(hz, nothing, nothing.astype(np.intp))
 
 
-@dataclass(frozen=True)
-class Outlook:
+class Outlook(NamedTuple):
     """What is known of all designs between two without solving for the best, by requirements.
 
     Their frequencies are between those at two corners, where they differ only in parameters in

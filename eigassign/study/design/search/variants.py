@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, zip_longest
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +69,7 @@ Floats = NDArray[np.float64]
 Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
 
 
-@dataclass(frozen=True)
-class PosedProblem:
+class PosedProblem(NamedTuple):
     """One choice of the number of modes below some bands, with the problem that it makes."""
 
     task: Task
@@ -371,8 +370,8 @@ def _after(
         if before is not None:  # what was said there is its prediction
             said, steps_before = before.seen.residual, before.steps
             if found.predicted is None and said.shape == found.seen.residual.shape:
-                found = replace(found, predicted=said)
-            found = replace(found, steps=(*steps_before, *found.steps))
+                found = found._replace(predicted=said)
+            found = found._replace(steps=(*steps_before, *found.steps))
         apart = with_end(optima, found, None if ended else problem)
     except KeyboardInterrupt:
         if search.ended:  # pressed again
