@@ -1,4 +1,3 @@
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -85,7 +84,7 @@ def test_not_a_number_never_reaches_the_solver(part):
     poisoned = np.array(getattr(SMALL, part))
     poisoned.flat[0] = np.nan
     with pytest.raises(UsageError):
-        solve_program(replace(SMALL, **{part: poisoned}), np.zeros(1))
+        solve_program(SMALL._replace(**{part: poisoned}), np.zeros(1))
 
 
 def test_an_equality_said_twice_does_no_harm():

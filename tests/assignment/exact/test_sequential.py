@@ -1,7 +1,6 @@
 """Programs in a row reach the exact optimum, keep limits, and say where they stopped."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -49,7 +48,7 @@ def towards(wanted: float, scale: float = 1.0) -> Callable[[np.ndarray], Apprais
 
 def problem(wanted: float = 1.7, **more: object) -> DesignProblem:
     appraise = towards(wanted, 1.0 / np.sqrt(40))
-    return replace(DesignProblem(appraise, np.zeros(3), np.array([2.0, 2.0, 5.0])), **more)
+    return DesignProblem(appraise, np.zeros(3), np.array([2.0, 2.0, 5.0]))._replace(**more)
 
 
 @pytest.mark.parametrize("wanted", [0.9, 1.7, 2.4, 5.0])
@@ -101,7 +100,7 @@ def test_linear_constraints_hold_and_their_multiplier_is_the_slope_of_the_optimu
 
 
 def test_the_worst_case_is_that_of_the_epigraph() -> None:
-    asked = replace(problem(), appraise=towards(1.7), objective=Objective.WORST_CASE)
+    asked = problem()._replace(appraise=towards(1.7), objective=Objective.WORST_CASE)
     found = minimise(asked, np.array([1.0, 0.5, 2.0]))
     best = np.inf
     for x in ([1.0, 0.5, 2.0], [0.1, 0.1, 0.1], [2.0, 1.0, 4.0]):
@@ -225,7 +224,7 @@ def test_ctrl_c_keeps_the_best_design_so_far() -> None:
         return asked.appraise(y)
 
     start = np.array([2.0, 0.0, 5.0])
-    found = minimise(replace(asked, appraise=interrupted), start)
+    found = minimise(asked._replace(appraise=interrupted), start)
     assert found.end is End.INTERRUPTED
     assert found.objective < asked(start, asked.appraise(start))
 
@@ -238,7 +237,7 @@ def test_a_step_to_where_no_design_is_goes_nowhere() -> None:
             raise AccuracyError("no answer here")
         return asked.appraise(y)
 
-    found = minimise(replace(asked, appraise=partly), np.array([0.2, 0.5, 0.5]))
+    found = minimise(asked._replace(appraise=partly), np.array([0.2, 0.5, 0.5]))
     assert found.y[0] <= 1.2
     assert found.objective < asked(found.y * 0.0, asked.appraise(np.array([0.2, 0.5, 0.5])))
 
