@@ -136,7 +136,8 @@ class _Deviations:
         own = found.variant.problem.measure(found.best.seen.residual)
         self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
-        small = self.scene.model.pencil.is_dense and not self.task.followers
+        few = self.task.followers or self.scene.path.follows_design  # each is followed anew
+        small = self.scene.model.pencil.is_dense and not few
         self.many = MANY if small and any(rows.of.mode_terms for rows in self.edges) else 0
 
     def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
