@@ -62,6 +62,14 @@ def frozen(array: Floats) -> Floats:
     return array
 
 
+def _lowest(hz: Floats) -> str:
+    return number(float(hz.min()))
+
+
+def _highest(hz: Floats) -> str:
+    return number(float(hz.max()))
+
+
 def _metres(along: Floats) -> str:
     """``0, -12.3 mm``: three digits each."""
     unit, size = handy_unit("m", *along.tolist())
@@ -742,8 +750,8 @@ class RangeRow:
     """
 
     label: Annotated[str, Fact("the target in words", "target")]
-    lowest_hz: Annotated[Curve, Fact(digits=lambda hz: number(hz.min()))]
-    highest_hz: Annotated[Curve, Fact(digits=lambda hz: number(hz.max()))]
+    lowest_hz: Annotated[Curve, Fact(digits=_lowest)]
+    highest_hz: Annotated[Curve, Fact(digits=_highest)]
     how: str
     error: Annotated[Share, Fact(digits=positive_percent)]
 
