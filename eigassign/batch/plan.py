@@ -215,10 +215,14 @@ def _six_digits(number: re.Match[str]) -> str:
 def cases_in(paths: Sequence[Path]) -> list[Path]:
     """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
 
-    Hidden folders and run folders (they hold a resolved case) are passed over. Raises UsageError
-    where a path does not exist or there is no case at all, StorageError for a folder that cannot be
-    read.
+    Without ``paths`` those of ./cases itself. Hidden folders and run folders (they hold a resolved
+    case) are passed over. Raises UsageError where a path does not exist or there is no case at all,
+    StorageError for a folder that cannot be read.
     """
+    if not paths:
+        paths = sorted(p for p in Path("cases").glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
+        if not paths:
+            raise UsageError("there are no case files in ./cases: name the cases")
     for path in paths:
         if not path.exists():
             raise UsageError(f"{path}: no such file or folder")

@@ -6,13 +6,14 @@ command needs is imported when it runs, so that ``--help`` is instant.
 Reading order:
 
     arguments  what several commands share: options, what is written on stderr, JSON
-    runs       optimize, expand, update, chart
+    runs       optimize, expand, update, validate, chart
     inspect    check, modes, schema, init, docs
     batch      batch
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -26,8 +27,10 @@ from eigassign.cli.arguments import print_json
 from eigassign.cli.batch import batch
 from eigassign.cli.inspect import check, docs, init, modes, schema
 from eigassign.cli.inspect import results_schema as results_schema
-from eigassign.cli.runs import chart, expand, optimize, update
+from eigassign.cli.runs import chart, expand, optimize, update, validate
 from eigassign.errors import UsageError
+
+COMPLETE = "_EIGASSIGN_COMPLETE"  # the name that click gives it
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -38,11 +41,19 @@ def main(args: Sequence[str] | None = None) -> int:
     process.replace_what_cannot_be_encoded()
     try:
         with process.terminable():
-            code = _invoke(arguments)
+            asked = os.environ.get(COMPLETE)
+            code = _invoke(arguments) if asked is None else _completed(asked)
             process.flush_streams()
             return code
     except BaseException as error:
         return _reported(error, arguments)
+
+
+def _completed(asked: str) -> int:
+    """Print click's script of a shell, or what that script asks for behind a tab; the exit code."""
+    from click.shell_completion import shell_complete
+
+    return shell_complete(cli, {}, "eigassign", COMPLETE, asked)
 
 
 def _reported(error: BaseException, arguments: list[str]) -> int:
@@ -111,6 +122,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (modes, expand, chart, schema)
+MORE = (modes, expand, validate, chart, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -1,8 +1,8 @@
-"""The work on cases: `optimize`, `expand`, `update`, `chart`."""
+"""The work on cases: `optimize`, `expand`, `update`, `validate`, `chart`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -13,9 +13,11 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign.cli.arguments import Reporter, print_json, reporting, show
+from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
     from eigassign.pipeline.run import Options, Outcome
+    from eigassign.study.results import ValidationRow
 
 
 @click.command(
@@ -162,6 +164,83 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
     _show(as_json, done.folder, results, sum(results.timing_s.values()), told)
     return 0 if results.verdict == "fitted" else 1
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign validate cases/two_link.yaml",
+        "eigassign validate cases --junit validation.xml",
+        "eigassign validate cases --json",
+    )
+)
+@click.argument("cases", nargs=-1, type=arguments.PATH)
+@click.option(
+    "--junit",
+    type=arguments.PATH,
+    metavar="FILE",
+    help="Also write the results in JUnit format, for CI servers (default: no file).",
+)
+@arguments.caching
+@arguments.json
+@arguments.common
+def validate(
+    cases: tuple[Path, ...],
+    junit: Path | None,
+    as_json: bool,
+    **how: Any,
+) -> int:
+    """Compare the expansion with exact frequencies.
+
+    Compares the full expansion, and the one that is linear in the design, along the trajectory,
+    within the bounds of the design, and at random points. CASES are files or folders; without any,
+    the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case.
+    """
+    from eigassign.batch.plan import cases_in
+    from eigassign.output.batch.summary import write_junit
+    from eigassign.pipeline import run
+
+    rows: list[ValidationRow] = []
+    failures: list[dict[str, object]] = []
+    tests: list[tuple[str, str, float, str, str, str]] = []
+    codes = [0]
+    with reporting(how) as reporter:
+        for case in cases_in(cases):
+            try:
+                answer = run.validate(case, _options(how, reporter))
+            except EigassignError as error:
+                codes.append(process.report(error))
+                failures.append({"case": case.stem, **process.document(error)})
+                tests.append(
+                    (case.stem, str(case), 0.0, "error", process.failure_of(error).text, "")
+                )
+                continue
+            reporter.warn(answer.warnings)
+            rows.extend(answer.rows)
+            codes.append(0 if answer.passed else 1)
+            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows), ""))
+        if junit:
+            write_junit(junit, tests)
+    if as_json:
+        print_json([*rows, *failures])
+    else:
+        from eigassign.output.console import print_tables
+        from eigassign.output.tables import validation_table
+
+        print_tables([validation_table(rows)] if rows else ())
+    return max(codes)
+
+
+def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
+    """The status of a validated case, and why it is not ok."""
+    from eigassign.facts import percent
+
+    reasons = [
+        f"mode {row.mode}, {row.where}: {percent(row.worst_taylor)} from exact, with the design "
+        f"linearised {percent(row.worst_linearised)}; accepted are {percent(row.limit)}"
+        for row in rows
+        if not row.passed
+    ]
+    return "tolerance" if reasons else "ok", "\n".join(reasons)
 
 
 @click.command(

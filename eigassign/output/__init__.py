@@ -33,6 +33,6 @@ __all__, __getattr__, __dir__ = face(
         "result_files": "sample_files",
         "store.cache": "Cache content_key default_directory",
         "store.run_folder": "is_untouched run_folder",
-        "tables": "Table modes_table run_tables",
+        "tables": "Table modes_table run_tables validation_table",
     },
 )

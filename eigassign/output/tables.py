@@ -30,6 +30,7 @@ from eigassign.study.results import (
     LeverRow,
     RunResults,
     TargetStudy,
+    ValidationRow,
     WeightRow,
 )
 
@@ -373,6 +374,12 @@ _KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
     "motion": _motion,
     "appendix": _appendix,
 }
+
+
+def validation_table(rows: Sequence[ValidationRow]) -> Table:
+    """Errors of both expansions, and whether the full one is within the case's tolerance."""
+    names = "case mode where points order worst_taylor worst_linearised limit passed"
+    return facts_table("Validation", rows, names, "Worst relative error of the frequency.")
 
 
 def modes_table(

@@ -2,6 +2,7 @@
 
 import json
 import re
+import xml.etree.ElementTree as ET
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -229,14 +230,14 @@ LIMITS_ONLY = (
 )
 
 
-@pytest.mark.parametrize("command", ["optimize", "expand", "batch"])
+@pytest.mark.parametrize("command", ["optimize", "expand", "validate", "batch"])
 def test_a_case_of_limits_alone_is_worked_on_by_every_command(
     command: str, capsys: Captured
 ) -> None:
     target = "targets:\n  - {mode: 1, frequency: 180 Hz}\n"
     assert target in GOOD
     Path("limits.yaml").write_text(GOOD.replace(target, LIMITS_ONLY))
-    less = {"batch": ["--reports", "none", "--jobs", "1"]}
+    less = {"validate": [], "batch": ["--reports", "none", "--jobs", "1"]}
     assert main([command, "limits.yaml", *less.get(command, LITTLE[2:])]) == 0
     out, _ = capsys.readouterr()
     if command == "optimize":
@@ -268,6 +269,42 @@ def test_expand_writes_coefficients_of_the_order_asked_for_beside_a_run(capsys: 
     assert "results/good_expansion/report.html written in" in out
     assert Path("results/good_expansion/coefficients.json").exists()
     assert not Path("results/good").exists()
+
+
+def test_validate_takes_all_of_cases_when_none_is_named(capsys: Captured) -> None:
+    Path("cases").mkdir()
+    Path("cases/a.yaml").write_text(GOOD)
+    Path("cases/b.yml").write_text(GOOD)
+    rows = json.loads(answer(capsys, "validate", "--json"))
+    assert {row["case"] for row in rows} == {"a", "b"}
+    assert all(row["passed"] for row in rows)
+
+
+def test_validate_ends_with_1_above_the_tolerance_and_still_shows_the_table(
+    capsys: Captured,
+) -> None:
+    Path("strict.yaml").write_text(GOOD.replace("50 %", "1e-9"))
+    out = answer(capsys, "validate", "strict.yaml", "good.yaml", code=1)
+    assert "strict" in out
+    assert "good" in out
+
+
+def test_validate_goes_on_after_a_wrong_case_and_ends_with_its_code(capsys: Captured) -> None:
+    Path("wrong.yaml").write_text("title: x")
+    rows = json.loads(answer(capsys, "validate", "wrong.yaml", "good.yaml", "--json", code=2))
+    assert {row["case"] for row in rows if "error" not in row} == {"good"}
+    (failed,) = (row for row in rows if "error" in row)
+    assert (failed["case"], failed["error"], failed["exit_code"]) == ("wrong", "CaseError", 2)
+
+
+def test_validate_tells_ci_servers(capsys: Captured) -> None:
+    Path("strict.yaml").write_text(GOOD.replace("50 %", "1e-9"))
+    Path("wrong.yaml").write_text("title: x")
+    answer(capsys, "validate", "good.yaml", "strict.yaml", "wrong.yaml", "--junit", "t.xml", code=2)
+    (suite,) = ET.parse("t.xml").getroot()
+    kinds = {case.get("name"): case[0].get("type") for case in suite if len(case)}
+    assert kinds == {"strict": "tolerance", "wrong": "error"}
+    assert "required key is missing" in (suite[2][0].text or "")
 
 
 FAILURES = [

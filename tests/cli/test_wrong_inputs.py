@@ -65,6 +65,8 @@ def test_every_problem_has_a_line_and_the_first_ones_a_caret(
         (["check", "gone.yaml"], "gone.yaml: no such case file"),
         (["check", "."], "expected a case file: it is a folder"),
         (["optimize", "gone.yaml"], "gone.yaml: no such case file"),
+        (["validate", "gone.yaml"], "gone.yaml: no such file or folder"),
+        (["validate"], "there are no case files in ./cases: name the cases"),
         (["batch", "gone"], "gone: no such file or folder"),
         (["batch", "."], "no case files (*.yaml, *.yml) in ."),
         (["batch"], "Missing argument 'PATHS...'"),

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
@@ -56,10 +57,13 @@ def test_the_workflow_is_one() -> None:
     assert all(commands(job) for job in jobs)
 
 
-def test_the_first_job_passes_and_fails_where_a_case_is_wrong() -> None:
-    assert [run(line) for line in commands("check")] == [0]
-    Path("cases", "two_link.yaml").write_text("title: x")
-    assert [run(line) for line in commands("check")] == [2]
+def test_the_first_job_passes_and_fails_when_an_expansion_is_too_far_off() -> None:
+    assert [run(line) for line in commands("validate")] == [0, 0]
+    strict = beam.TEXT.replace("50 %", "1e-9")
+    Path("cases", "two_link.yaml").write_text(strict)
+    assert [run(line) for line in commands("validate")] == [0, 1]
+    (suite,) = ET.parse("validation.xml").getroot()
+    assert suite[0][0].get("type") == "tolerance"
 
 
 def test_the_sweep_leaves_its_folder(capsys: pytest.CaptureFixture[str]) -> None:

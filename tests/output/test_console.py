@@ -12,7 +12,9 @@ from eigassign.output import (
     print_assignment,
     print_tables,
     print_verdict,
+    validation_table,
 )
+from eigassign.study import ValidationRow
 
 
 class Terminal(io.StringIO):
@@ -109,3 +111,15 @@ def test_modes_are_numbered_from_the_first_elastic_one():
     unknown = modes_table([200.0], rigid_modes=1, where="", truncation=[math.inf], note="so it is")
     assert unknown.rows == (("1", "200.000", "not known"),)
     assert unknown.caption == "1 rigid-body mode not counted. So it is."
+
+
+def test_a_validation_says_which_line_failed():
+    common = {"case": "arm", "mode": 1, "order": 4, "limit": 0.02, "points": 152}
+    spread = {"worst_linearised": 0.1, "rms_taylor": 1e-4, "rms_linearised": 0.01}
+    spread |= {"lowest_hz": 180.0, "mean_hz": 190.0, "highest_hz": 200.0}
+    rows = [
+        ValidationRow(where=where, worst_taylor=worst, passed=passed, **common, **spread)
+        for where, worst, passed in (("trajectory", 9e-4, True), ("box", 0.05, False))
+    ]
+    found = [(row[2], row[5], row[-1]) for row in validation_table(rows).rows]
+    assert found == [("trajectory", "0.0900 %", "ok"), ("box", "5.00 %", "FAILED")]

@@ -195,11 +195,14 @@ def test_modes_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert "warning" not in said.err
 
 
-def test_check_warns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(["check", str(boom(tmp_path))])
+@pytest.mark.parametrize("command", ["check", "validate"])
+def test_other_commands_warn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    main([command, str(boom(tmp_path))])
     said = capsys.readouterr()
     assert DOWN in said.err.replace("\n", " ")
-    main(["check", str(boom(tmp_path, "none"))])
+    main([command, str(boom(tmp_path, "none"))])
     assert "gravity" not in capsys.readouterr().err
 
 

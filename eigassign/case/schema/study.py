@@ -127,7 +127,7 @@ class ExpansionKeys(Part):
 
 
 class ValidationKeys(Part):
-    """How far from exact an expansion is too far.
+    """What `eigassign validate` compares, and how far from exact is too far.
 
     Keys:
         max_error: how far an expansion may be from exact, relative in Hz
