@@ -51,7 +51,8 @@ def frequencies(case: BuiltCase, designs: list[tuple[float, ...]], k: int) -> np
 
 
 def test_two_modes_are_no_farther_apart_than_a_design_brings_them() -> None:
-    case = case_of({"k1": K1, "motor": MOTOR}, [{"gap": {"between": [1, 2], "at_least": 100}}])
+    gap = {"gap": {"between": [1, 2], "at_least": 100}}
+    case = case_of({"k1": K1, "motor": MOTOR}, [gap], assignment={"starts": 4})
     verdict, reason = said(solve_case(case))
     assert verdict == "unreachable"
     grid = list(itertools.product(np.linspace(5e3, 4e4, 15), np.linspace(0.2, 2.0, 15)))
