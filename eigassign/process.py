@@ -6,7 +6,6 @@ import contextlib
 import errno
 import io
 import os
-import re
 import signal
 import sys
 import threading
@@ -83,34 +82,13 @@ def say(lines: Iterable[str], passing: bool = False) -> None:
     On a terminal the next line is written over those that are ``passing``.
     """
     with suppress(OSError, AttributeError, ValueError):
-        colours = shows_colours(sys.stderr)
         clears = sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
         for line in map(printable, lines):
-            shown = _coloured(line) if colours else line
             if clears:
                 # 58 columns: a line that wraps cannot be written over
-                shown = f"\r{line[:58]}\x1b[K\r" if passing else f"{shown}\x1b[K\n"
-            sys.stderr.write(shown if clears else f"{shown}\n")
+                shown = f"\r{line[:58]}\x1b[K\r" if passing else f"{line}\x1b[K\n"
+            sys.stderr.write(shown if clears else f"{line}\n")
         sys.stderr.flush()
-
-
-def shows_colours(stream: TextIO) -> bool:
-    """True for a terminal that shows them, unless somebody set NO_COLOR (no-color.org)."""
-    dull = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return stream.isatty() and not dull
-
-
-_BEGINNING = re.compile(r"(.+?:\d+:\d+: )?(eigassign: |warning: )?")
-_SHADES = {"eigassign: ": "31", "warning: ": "33"}  # red, yellow
-
-
-def _coloured(line: str) -> str:
-    """The place in a file in bold, and the word that says what kind of line it is in colour."""
-    found = _BEGINNING.match(line)
-    place, word = found.groups("") if found else ("", "")
-    bold = f"\x1b[1m{place}\x1b[0m" if place else ""
-    kind = f"\x1b[1;{_SHADES[word]}m{word}\x1b[0m" if word else ""
-    return f"{bold}{kind}{line[len(place + word) :]}"
 
 
 def _snippet(problem: Problem) -> Iterator[str]:

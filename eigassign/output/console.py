@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
@@ -10,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 from typing import TextIO
 
-from eigassign import process
 from eigassign.files import printable
 from eigassign.output.tables import Table, headline, run_tables
 from eigassign.study.results import RunResults
@@ -82,8 +82,10 @@ def _write(out: TextIO, lines: Iterable[str]) -> None:
 
 
 def _styled(text: str, style: str, out: TextIO) -> str:
-    """The text in a style of a terminal that shows colours."""
-    return f"\x1b[{style}m{text}\x1b[0m" if style and process.shows_colours(out) else text
+    """The text in a style of a terminal that shows colours; not where NO_COLOR is set."""
+    dull = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    shows = out.isatty() and not dull
+    return f"\x1b[{style}m{text}\x1b[0m" if style and shows else text
 
 
 def _drawn(table: Table, room: int, out: TextIO) -> Iterator[str]:

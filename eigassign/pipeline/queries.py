@@ -25,7 +25,7 @@ from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
 from eigassign.mechanism.elements.superelement import part_lines
-from eigassign.mechanism.kinematics.parameters import is_imported, resting_pose, written_loads
+from eigassign.mechanism.kinematics.parameters import resting_pose, written_loads
 from eigassign.modal.exact.solver import rounding_error
 from eigassign.output.figures import mechanism
 from eigassign.output.figures.graph import FigurePlan
@@ -35,14 +35,13 @@ from eigassign.study import pictures as drawing
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import (
     GIVEN,
-    digits_lines,
     judged_mesh,
     mesh_lines,
     study_weight,
     truncation_lines,
 )
 from eigassign.study.design.followed import named_notes
-from eigassign.study.design.judgement import far_off, soft_drives
+from eigassign.study.design.judgement import far_off
 from eigassign.study.meaning import levers
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import LeverRow, WeightRow
@@ -54,11 +53,6 @@ Floats = NDArray[np.float64]
 Where = Annotated[tuple[tuple[str, float], ...], Fact(unwritten=True)]
 Words = Annotated[tuple[str, ...], Fact(unwritten=True)]
 TooHigh = Annotated[list[Share] | None, Fact("at most", optional=True, may_lack=True)]
-
-
-# Of the kinetic energy: a mode in which all mass with a node's motion has less moves none. Of the
-# modes of a solid column those out of the plane have 2e-7 at most, others 1e-3 at least.
-STILL = 1e-5
 
 
 @dataclass(frozen=True)
@@ -188,24 +182,9 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         None if lost is None else lost.tolist(),
         weight.row,
         helped,
-        (*_between_nodes(case, q, y, len(hz)), *digits_lines(file), *weight.notes),
+        weight.notes,
         (*_beyond_bounds(case, y), *weight.warnings),
     )
-
-
-def _between_nodes(case: BuiltCase, q: Floats, y: Floats, count: int) -> Iterator[str]:
-    """Name the modes that move no node: an imported part alone, which in a plane may leave it."""
-    file, model = case.file, case.model()
-    parts = [name for name in file.mechanism.links if is_imported(file, name)]
-    if not parts or file.mechanism.space != "planar":
-        return
-    nodes = model.shapes(q, y, count).nodes.values()
-    moved = np.max([np.linalg.norm(node.motion[:, :3], axis=1) for node in nodes], axis=0)
-    still = [str(k) for k in np.flatnonzero(moved**2 * model.mass(y) < STILL) + 1]
-    if still:
-        these = f"mode {still[0]} moves" if len(still) == 1 else f"modes {', '.join(still)} move"
-        between = f"{' or '.join(parts)} moves between its nodes alone, out of the plane as a rule"
-        yield f"{these} no node: {between}"
 
 
 def _default_q(case: BuiltCase) -> Sequence[float]:
@@ -306,8 +285,6 @@ def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> 
     count = max((mode for one in ours for mode, _ in one.mode_terms), default=1)
     try:
         hz = model.frequencies(q, case.initial_design, count)[0]
-        for place, doubt in soft_drives(file, model, q):
-            yield file.problem(place, doubt)
     except UsageError as error:
         raise CaseError((file.problem("mechanism", str(error)),)) from error
     for one in ours:

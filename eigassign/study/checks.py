@@ -28,7 +28,6 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.facts import about
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
-from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import Trajectories, rates
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.solver import rounding_error
@@ -436,7 +435,7 @@ def study_accuracy(
     lines = [line for each in (first, mesh) for line in mesh_lines(each, scene.model)]
     lines += weight.lines
     lines += truncation_notes(scene, optimum)
-    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y), *digits_lines(scene.file)))
+    return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y)))
 
 
 def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) -> WeightStudy:
@@ -458,14 +457,6 @@ def _rounding_note(scene: Scene, y: Floats) -> str:
     lost = max(rounding_error(pencil, each, max(scene.modes)) for each in x)
     line = rounding_line(lost)
     return f"{line}, at {len(x)} poses and designs" if len(x) > 1 and np.isfinite(lost) else line
-
-
-def digits_lines(file: CaseFile) -> tuple[str, ...]:
-    """Where it is said what the digits of imported matrices cost; they are nobody's round-off."""
-    kinds = {link_type(file, name) for name in file.mechanism.links}
-    if "superelement" not in kinds:
-        return ()
-    return ("not in that: the digits of imported matrices, which eigassign check judges",)
 
 
 def rounding_line(lost: float) -> str:

@@ -20,7 +20,6 @@ from eigassign.study.design.judgement import (
     far_off,
     judged_modes,
     mode_rows,
-    soft_drives,
 )
 from eigassign.study.design.lists import cost, design_rows
 from eigassign.study.given import given
@@ -200,8 +199,6 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """Warnings of results that may mislead: doubts, crossing modes, a poor or worse design."""
     for target in assigned.targets:
         yield from () if target.asked.is_aim else far_off(target.asked, target.initial_hz)
-    for place, doubt in soft_drives(scene.file, scene.model, scene.path.q[:1]):
-        yield f"{place}: {doubt}"
     limit = scene.file.validation.max_error
     point = ", ".join(f"{value:.4g}" for value in assigned.answer.y)
     one_shot = assigned.targets if assigned.answer.found is None else ()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.parts import Quantity
 from eigassign.case.units import handy
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -49,7 +48,7 @@ def _made_of(file: CaseFile, name: str, link: Any) -> str:
     beams = [*link.beams.values()] if kind == "frame" else [link]
     sections = {n for beam in beams for n in _names(getattr(beam, "section", None))}
     materials = dict.fromkeys(m for beam in beams if (m := getattr(beam, "material", None)))
-    said = [_section(n, file.mechanism.sections[n]) for n in sorted(sections)[:2]]
+    said = sorted(sections)[:2]
     said += [f"{len(sections) - 2} more sections"] if len(sections) > 2 else []
     what = [kind] if kind != "beam" else []
     return ", ".join(filter(None, (*what, " and ".join(said), *materials)))
@@ -59,25 +58,6 @@ def _names(section: Any) -> tuple[str, ...]:
     if section is None:
         return ()
     return (section,) if isinstance(section, str) else (section.start, section.end)
-
-
-def _section(name: str, section: Any) -> str:
-    """``rod (tube, outer diameter 60 mm, thickness 3 mm)``."""
-    said = [] if section.shape == "bare" else [section.shape.replace("_", " ")]
-    for key, field in type(section).model_fields.items():
-        value, quantity = getattr(section, key), _quantity((field.annotation, *field.metadata))
-        if value is not None and quantity is not None and quantity.dimension is not None:
-            amount = handy(value, quantity.dimension.si).replace("m2", "m²").replace("m4", "m⁴")
-            said.append(f"{key.replace('_', ' ')} {amount}")
-    return f"{name} ({', '.join(said)})"
-
-
-def _quantity(kind: Any) -> Quantity | None:
-    """The quantity that a type, or one of several, is annotated with."""
-    if isinstance(kind, Quantity):
-        return kind
-    each = kind if isinstance(kind, tuple) else get_args(kind)
-    return next(filter(None, map(_quantity, each)), None)
 
 
 def _drives(file: CaseFile) -> Iterator[str]:

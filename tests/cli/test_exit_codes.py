@@ -1,7 +1,6 @@
 """What ends a process, and how: errors of ours and of the world, pipes, locales, signals."""
 
 import errno
-import io
 import os
 import random
 import re
@@ -94,37 +93,6 @@ def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
     assert "Traceback" not in err
     assert main(["fail", "--debug"]) == 4
     assert "Traceback (most recent call last)" in capsys.readouterr().err
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_errors_and_warnings_have_colours_on_a_terminal_only(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    thin = GOOD.replace("{shape: circle, diameter: 20 mm}", "{area: 3e-4, bending_inertia: 8e-5}")
-    Path("thin.yaml").write_text(thin)
-    Path("wrong.yaml").write_text(GOOD.replace("title: A small arm", "titel: A small arm"))
-
-    def said(stream: io.StringIO) -> list[str]:
-        monkeypatch.setattr(sys, "stderr", stream)
-        assert main(["check", "thin.yaml", "wrong.yaml"]) == 2
-        lines = stream.getvalue().splitlines()
-        return [line for line in lines if "igassign: " in line or ".yaml:" in line]
-
-    plain = said(io.StringIO())
-    warning, *_, error = said(Terminal())
-    place, _, text = plain[0].partition("warning: ")
-    assert warning == f"\x1b[1m{place}\x1b[0m\x1b[1;33mwarning: \x1b[0m{text}\x1b[K"
-    assert error == f"\x1b[1;31meigassign: \x1b[0m{plain[-1].removeprefix('eigassign: ')}\x1b[K"
-    monkeypatch.setenv("NO_COLOR", "1")
-    assert said(Terminal()) == [f"{line}\x1b[K" for line in plain]
-    monkeypatch.setenv("TERM", "dumb")
-    assert said(Terminal()) == plain
 
 
 def test_help_imports_click_and_nothing_heavy_and_blas_gets_one_thread_before_numpy() -> None:

@@ -36,12 +36,6 @@ def test_modes_state_what_round_off_leaves(tmp_path: Path) -> None:
     assert 1e-10 < (np.ptp(hz, axis=0) / hz[0]).max() < answers[0].round_off < 1e-2
 
 
-def test_modes_of_imported_parts_say_where_the_digits_of_their_files_are_judged() -> None:
-    (starter,) = (p for p in SHIPPED_CASES if p.stem == "imported_part")
-    notes = modes(starter, q=[0.1, 0.2], count=1).notes
-    assert "digits of imported matrices, which eigassign check judges" in notes[0]
-
-
 def test_check_says_what_the_case_amounts_to() -> None:
     answer = check(SHIPPED)
     assert (answer.n_dof, answer.n_rigid, answer.samples, answer.duration_s) == (23, 2, 152, 1.0)
@@ -131,8 +125,7 @@ def doubted(folder: Path, *edits: tuple[str, str]) -> list[str]:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("{stiffness: 8 kN m/rad}}", "{stiffness: 8}}", "of its strain in this drive"),
-        ("{stiffness: 20 kN m/rad}}", "{stiffness: 20}}", "a bare number is in N m/rad"),
+        ("{stiffness: 8 kN m/rad}}", "{stiffness: 8}}", "a factor of"),
         ("frequency: 15 Hz", "frequency: 900", "the initial design has 12.7"),
         ("frequency: 15 Hz", "frequency: 1.1", "a factor of 12 off. Check the unit (60 rpm"),
         ("frequency: 15 Hz", "at_least: 900", "mode 1 at least 900 Hz: the initial design has"),
@@ -144,23 +137,7 @@ def test_a_slip_that_shows_in_the_modes_is_asked_about(
 ) -> None:
     found = [warning for warning in doubted(tmp_path, (old, new)) if said in warning]
     assert len(found) == 1
-    key = "coordinates" if "stiffness" in new else "targets[0]"
-    assert key in found[0]
-
-
-def test_what_is_unusual_and_shows_in_the_modes_is_no_slip(tmp_path: Path) -> None:
-    soft = ("{stiffness: 8 kN m/rad}}", "{stiffness: 500}}")  # a belt
-    assert not any("strain" in warning for warning in doubted(tmp_path, soft))
-    rigid = [
-        (f"{{length: {mm} mm, material: aluminium, section: {s}, elements: 4}}",
-         f"{{type: rigid, length: {mm} mm, mass: 1, inertia: 0.01, center: [{mm // 2} mm, 0]}}")
-        for mm, s in ((600, "upper_tube"), (450, "fore_tube"))
-    ]  # fmt: skip
-    rigid += [("diameter: {parameter: sections.upper_tube.outer_diameter, min: 35 mm, max: 50 mm}",
-               "mass: {parameter: bodies.payload.mass, min: 0, max: 2}")]  # fmt: skip
-    assert not any("strain" in warning for warning in doubted(tmp_path, *rigid))
-    far = ("{mode: 1, frequency: 15 Hz}", "{mode: 1, frequency: 110}")
-    assert not any("factor" in warning for warning in doubted(tmp_path, far))
+    assert "targets[0]" in found[0]
 
 
 def test_a_run_tells_of_it_too(tmp_path: Path) -> None:

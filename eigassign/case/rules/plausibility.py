@@ -26,8 +26,6 @@ DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
 _ROUND_OFF = 1e-9  # of the terms of a limit
 LARGEST_ERROR = 0.5
 SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
-# The same ratio of a wire; a link of 30 bare "mm" with a depth of 10 mm is 3000.
-SLENDEREST = 2500.0
 # I / A² has no dimension: 1/12 for a square, a/12 and 1/(12 a) for a flat bar of aspect a on edge
 # and on its flat, D/(8π t) for a thin tube. The limits are a bar of aspect 1200 (or a tube of
 # D/t = 2500) and a strip of aspect 830; rolled sections lie between 0.3 and 10.
@@ -215,7 +213,7 @@ def bare_sections_can_exist(document: Document) -> Iterator[Finding]:
 
 
 def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
-    """Euler–Bernoulli beams are much longer than deep, but no beam is a thread."""
+    """Euler–Bernoulli beams are much longer than deep."""
     spatial = document.mechanism.space == "spatial"
     sections = document.mechanism.sections
     for name, link in document.mechanism.links.items():
@@ -225,12 +223,6 @@ def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
         ends = (taper.start, taper.end) if taper else (str(link.section),)
         thick = max(ends, key=lambda name: sections[name].depth(spatial))
         slenderness = link.length / sections[thick].depth(spatial)
-        if slenderness > SLENDEREST and 1.0 < link.length <= LENGTH[1]:
-            yield (
-                ("mechanism", "links", name, "length"),
-                f"length {link.length:g} m is {slenderness:.0f} times the depth of section "
-                f"{thick!r}: a bare number is in m; was {link.length:g} mm meant?",
-            )
         if slenderness < SLENDER:
             at_most = "at most " if isinstance(sections[thick], BareSection) else ""
             yield (

@@ -224,7 +224,7 @@ def _from_samples(
     time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
     if spec.time is not None:
         time_s = np.array(spec.time, dtype=np.float64)
-    notes = () if len(q) == 1 else _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
+    notes = () if len(q) == 1 else _jumps(q, q_names, q_units)
     return Trajectory(time_s, q, notes)
 
 
@@ -251,18 +251,6 @@ def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[s
         f"{name} jumps by {step:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
         for step, name, k in found
         if step > np.pi
-    )
-
-
-def _sparse(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
-    """A note where listed samples are so far apart that a motion between them seems to be meant."""
-    step, name, k = max(_largest_turns(q, q_names, q_units), default=(0.0, "", 0))
-    # more than 0.5 rad between listed samples looks like points of a motion
-    if step <= 0.5:
-        return ()
-    return (
-        f"{name} moves by {np.rad2deg(step):.3g} deg from sample {k} to {k + 1}: q "
-        "lists every pose that is looked at; for a motion through a few poses write points",
     )
 
 

@@ -27,10 +27,7 @@ from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import StaticTarget
 from eigassign.facts import verdict_word
-from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.exact.solver import modes
-from eigassign.modal.model import Model
 from eigassign.study.results import (
     MET,
     ErrorRow,
@@ -146,11 +143,6 @@ def _row(errors: Floats, weights: Floats) -> ErrorRow:
 # f goes with √(stiffness / mass): a tenth, or ten times, is a hundredfold of either. Targets of the
 # shipped cases are 0.80 to 2.6 times what their files have.
 FAR = 10.0
-# The share of its strain that mode 1 has outside of drives. In series with links a thousand times
-# as stiff it is 0.001 of a static load, and up to 0.003 where a motor's mass stands between a soft
-# drive and the links. In the shipped cases it is 0.1 at least.
-STIFF = 5e-3
-RIGID = 1e-9  # the same of links that cannot bend: round-off
 
 
 def far_off(asked: Requirement, hz: Floats) -> Iterator[str]:
@@ -162,25 +154,6 @@ def far_off(asked: Requirement, hz: Floats) -> Iterator[str]:
         yield (
             f"{asked.label}: the initial design has {near:.4g} Hz, a factor of {off:,.0f} off. "
             "Check the unit (60 rpm are 1 Hz), the mode, stiffnesses and masses"
-        )
-
-
-def soft_drives(file: CaseFile, model: Model, q: Floats) -> Iterator[tuple[str, str]]:
-    """Doubt drives beside which links hardly bend in mode 1 at a pose q (1, n_q): place, words."""
-    found = modes(model.pencil, model.x(q, initial_design(file)), 1)
-    lam, phi = found.lam[0, 0], found.phi[0, :, 0]
-    motion, shares = phi[len(phi) - len(model.motion.columns) :], dict[str, float]()
-    rates = model.motion.coordinates.rates[: len(file.coordinates)]
-    for rate, (name, one) in zip(rates, file.coordinates.items(), strict=True):
-        k = getattr(one.drive, "stiffness", None) or 0.0
-        shares[name] = float(k * (rate @ motion) ** 2 / lam)
-    if RIGID < 1.0 - sum(shares.values()) < STIFF:
-        name = max(shares, key=lambda each: shares[each])
-        sliding = file.coordinate_units[list(shares).index(name)] == "m"
-        yield (
-            f"coordinates.{name}.drive.stiffness",
-            f"mode 1 has {100 * shares[name]:.2f} % of its strain in this drive, the links hardly "
-            f"bend: check the stiffness (a bare number is in {'N/m' if sliding else 'N m/rad'})",
         )
 
 

@@ -37,7 +37,6 @@ from eigassign.study.updating.measured import PosedMeasurement, read_measurement
 Floats = NDArray[np.float64]
 STARTS = 100  # at most
 OUTLIER = 3.0  # standard deviations
-NEAR = 0.01  # of a frequency: modes so near may have been measured for each other
 
 # --- Results
 
@@ -409,7 +408,6 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
 
 
 def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
-    yield from _neighbours(problem, found)
     modes = sorted({each.mode for each in problem.measured})
     error = problem.model.discretisation_error(problem.q, found.y, modes)
     at = [modes.index(each.mode) for each in problem.measured]
@@ -419,23 +417,4 @@ def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
         yield (
             f"the mesh puts the frequency of {problem.measured[worst].label} off by "
             f"{share[worst]:.2g} standard deviations: give the links more elements, or auto"
-        )
-
-
-def _neighbours(problem: UpdateProblem, found: Identified) -> Iterator[str]:
-    """A warning where a measured mode may be its neighbour: they are within 1 % at ŷ."""
-    most = problem.model.n_dof - problem.model.n_rigid
-    count = min(int(problem.columns.max()) + 2, most)
-    hz = problem.model.frequencies(problem.q, found.y, count)
-    close = np.diff(hz, axis=1) < NEAR * hz[:, :-1]
-    doubtful = [
-        each.label
-        for each, row, column in zip(problem.measured, problem.rows, problem.columns, strict=True)
-        if close[row, max(column - 1, 0) : column + 1].any()
-    ]
-    if doubtful:
-        more = f" and {len(doubtful) - 3} more" if len(doubtful) > 3 else ""
-        yield (
-            f"{', '.join(doubtful[:3])}{more}: a neighbouring mode is within 1 %. Modes are "
-            "numbered by size: check that the number is that of the measured mode"
         )

@@ -25,7 +25,6 @@ SLIPS = {
     "no density": ("density: 2700", "¦density: 0", "0 kg/m3 is outside"),
     "length in mm": ("length: 0.45", "¦length: 450", "is the unit right?"),
     "length in mm, as mm": ("length: 0.45", "¦length: 450", "write 450 mm if that was meant"),
-    "short length in mm": ("length: 0.6", "¦length: 90", "90 m is 3000 times the depth of section 'rod': a bare number is in m; was 90 mm meant?"),
     "diameter in mm": ("rod: {shape: circle, diameter: 30 mm}", "rod: {shape: circle, ¦diameter: 30}", "write 30 mm if that was meant"),
     "section in mm": ("area: 7.0632e-4, bending_inertia: 3.97e-8", "¦area: 706.32, bending_inertia: 39700", "A bare number is in m2"),
     "position in mm": ("follower: fore.start}", "follower: fore.start, ¦position: [300, 0]}", "write 300 mm if that was meant"),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from scipy import sparse
 from scipy.sparse import linalg
 from solid_parts import METAL, Bar, bar, bdf, case, inp, msh
@@ -17,7 +16,6 @@ import eigassign as ea
 from eigassign.errors import CaseError, MechanismError, MissingMassError
 from eigassign.mechanism import Coupling, joined, part_lines, read_mesh, solid_part
 from eigassign.modal import Model
-from eigassign.pipeline import modes
 from eigassign.study import load_case
 
 # Hz, of the bar with rigid ends, one of them fixed: bending in its flat and its upright plane
@@ -446,16 +444,6 @@ def test_in_a_plane_a_solid_bends_in_it_only(tmp_path: Path) -> None:
     given["mechanism"]["space"] = "planar"
     hz = ea.load_case(given, allow_outside=True).model().frequencies([0.0], [], 1)[0]
     assert hz == pytest.approx(BENDING[:1], rel=3e-3)
-
-
-def test_modes_out_of_the_plane_are_named(tmp_path: Path) -> None:
-    """Both ends are held there: 22.37 in place of the 3.516 of a cantilever, less 2 % of shear."""
-    given = case(tmp_path, bar((20, 1, 1), 20, grading=1.5))
-    given["mechanism"]["space"] = "planar"
-    (tmp_path / "case.yaml").write_text(yaml.safe_dump(given))
-    found = modes(tmp_path / "case.yaml", count=4)
-    assert [one[:21] for one in found.notes if " no node" in one] == ["mode 3 moves no node:"]
-    assert found.frequencies_hz[2] == pytest.approx(BENDING[1] * 22.37 / 3.516, rel=3e-2)
 
 
 def test_what_a_mesh_adds_is_known_within_a_factor_of_two(tmp_path: Path) -> None:

@@ -230,15 +230,6 @@ def test_samples_that_jump_by_a_turn_are_noted():
     assert notes[0].startswith("q2 jumps by 6.2 rad from sample 0 to 1")
 
 
-def test_listed_samples_far_apart_are_noted_and_near_ones_are_not():
-    far = samples(q=((0.5, 0.0), (0.5, 1.0), (0.5, 0.9)), duration=1.0)
-    (note,) = build_trajectory(far, Q, no_arm).notes
-    assert note.startswith("q2 moves by 57.3 deg from sample 0 to 1")
-    assert build_trajectory(far, Q, no_arm, q_units=("rad", "m")).notes == ()
-    near = samples(q=((0.5, 0.0), (0.5, 0.3)), duration=1.0)
-    assert build_trajectory(near, Q, no_arm).notes == ()
-
-
 OK = ((0.1, 0.2), (0.3, 0.4), (0.5, 0.6))
 
 

@@ -202,19 +202,6 @@ def test_a_wrong_measurement_is_an_outlier_and_the_fit_poor() -> None:
     assert off[0] == "measurements[3]"
 
 
-def test_a_measured_mode_whose_neighbour_is_near_is_warned_of() -> None:
-    case = load_case(CASES / "stress" / "veering.yaml")
-    (parameter,) = case.file.design.parameters.values()
-    designs = np.linspace(parameter.min, parameter.max, 201)[:, None]
-    q = np.zeros((len(designs), 0))
-    hz = case.model().frequencies(q, designs, 2)
-    gap = hz[:, 1] / hz[:, 0] - 1.0
-    assert gap.min() < 0.01 < gap[0]
-    for k, near in ((int(gap.argmin()), True), (0, False)):
-        results = updated(measuring(case, q[:1], hz[k : k + 1]))
-        assert any("neighbouring mode" in line for line in results.warnings) is near
-
-
 # --- Measurements as they are given
 
 
