@@ -194,14 +194,14 @@ def test_limits_that_only_time_left_missed_are_not_said_to_be_out_of_reach() -> 
 
 def test_limits_that_contradict_are_proved_where_corners_bound_them() -> None:
     """Whatever is wanted besides: mode 1 at most 10 Hz is no convex limit, a frequency is none."""
-    stiff = "  - {mode: 1, at_least: 900 Hz}\n"
+    stiff, few = "  - {mode: 1, at_least: 900 Hz}\n", "assignment: {starts: 10}\n"
     for more in ("", "  - {mode: 2, frequency: 40 Hz}\n"):
-        result, row = solved(DESIGN, stiff + more, HELD)
+        result, row = solved(DESIGN, stiff + more + few, HELD)
         assert row.verdict in ("unreachable", "infeasible")
         assert not any("just meets" in note for note in result.results.notes)
         assert row.optimality.kind == "proved"
         assert "was found" not in row.reason
-    _, row = solved(DESIGN, stiff + "  - {mode: 1, at_most: 10 Hz}\n", HELD)
+    _, row = solved(DESIGN, stiff + "  - {mode: 1, at_most: 10 Hz}\n" + few, HELD)
     assert row.optimality.words == "proved: no design within the bounds meets all limits"
 
 
