@@ -27,12 +27,12 @@ for folder in (
 ):
     sys.path.insert(0, str(Path(__file__).parent / folder))
 
-FEW = 4  # of a family of random mechanisms or problems that are tried by default
+FEW = 3  # of a family of random mechanisms or problems that are tried by default
 
 
 @pytest.hookimpl(tryfirst=True)  # before markers choose
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test parametrised by ``seed`` is slow from its fifth seed on."""
+    """A test parametrised by ``seed`` is slow from its fourth seed on."""
     for item in items:
         of = getattr(item, "callspec", None)
         if of is not None and of.indices.get("seed", 0) >= FEW:

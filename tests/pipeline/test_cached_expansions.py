@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_cases import TARGET, automatic, case_of, chain, shipped
+from run_cases import ONE_SHOT, TARGET, automatic, case_of, chain, shipped
 from scipy import sparse
 
 from eigassign import Case
@@ -76,7 +76,8 @@ def test_what_is_cached_follows_the_rule_and_the_size(
     if rule is not None:
         monkeypatch.setenv("EIGASSIGN_CACHE", rule)
     for name, text, count in (("small", shipped(), small), ("large", shipped(*LARGE), large)):
-        solve_case(case_of(tmp_path, text), Options(cache_dir=tmp_path / name, study="none"))
+        case = case_of(tmp_path, text + ONE_SHOT)
+        solve_case(case, Options(cache_dir=tmp_path / name, study="none"))
         assert len(list((tmp_path / name).glob("*.h5"))) == count, name
 
 
