@@ -144,9 +144,12 @@ class _Program(NamedTuple):
     def with_weight(self, rows: Rows) -> tuple[Floats, Floats] | None:
         """The step that the rows lead to, with a ν that no further rise betters."""
         weight = self.region.weight
-        solved = self.solved(rows, weight)
+        solved, last = self.solved(rows, weight), None
         for _ in range(6):  # tenfold rises of ν, while v falls
             if solved is None or (v := rows.levels(solved[0], self.least)[0]) <= MET:
+                break
+            last = last or self.solved(rows, 1e6 * weight)  # v does not rise with ν: none is less
+            if last is not None and rows.levels(last[0], self.least)[0] >= 0.99 * v:
                 break
             weight *= 10.0
             again = self.solved(rows, weight)
