@@ -76,14 +76,6 @@ def file_digest(path: str | Path, limit: int) -> str | None:
     return found.hexdigest()
 
 
-def at_home(path: str, what: str) -> Path:
-    """``path`` with the home folder for ``~``; raises UsageError, with ``what``, without one."""
-    try:
-        return Path(path).expanduser()
-    except RuntimeError:
-        raise UsageError(f"{what}: there is no home folder for {path!r}") from None
-
-
 def seen_from(folder: Path, path: str | Path) -> str:
     """``path`` as seen from ``folder``, or from the root on another drive."""
     try:

@@ -64,9 +64,9 @@ def plan_expansion(
     """Settle the expansion; ``order`` and ``modes`` override the file's.
 
     Where one that is not ``needed`` is not found within `LOOKS`, its order is 0, and a note says
-    why. Raises CaseError at the key at fault: lengths that differ from the model's, modes it does
-    not have, an automatic expansion point without a trajectory to be central in, an order of which
-    the memory would not suffice; UsageError for such an ``order``.
+    why. Raises CaseError at the key at fault: modes that the model does not have, an automatic
+    expansion point without a trajectory to be central in, an order of which the memory would not
+    suffice; UsageError for such an ``order``.
     """
     q0, q_note = _q0(file, model, trajectory)
     y0, y_note = _y0(file, model, q0)
@@ -90,8 +90,6 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     n, given = len(file.coordinates), file.expansion.q
     of_loads = ", loads in the middle of their ranges" if file.loads else ""
     if given != "auto":
-        if len(given) != n:
-            raise _wrong(file, "expansion.q", f"{len(given)} values for {n} coordinates")
         q0 = with_middle_loads(file, given)
         why = f"from the case file{of_loads}"
         point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
@@ -141,8 +139,6 @@ def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
         return np.zeros(0), ""
     if given != "auto":
         y0 = np.array(given, dtype=np.float64)
-        if len(y0) != n_y:
-            raise _wrong(file, "expansion.y", f"{len(y0)} values for {n_y} design parameters")
         return y0, f"{_design(file, model, y0)}, from the case file"
     y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
     if model.pencil.weight is not None:

@@ -20,7 +20,6 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.expression import Scalar, exp, is_constant, one_atom
 
@@ -268,7 +267,7 @@ def _values(
     E = parameters.number(path + "youngs_modulus", data.youngs_modulus)
     rho = parameters.number(path + "density", data.density)
     sheared = bool(getattr(beam, "shear", False))
-    G = _shear_modulus(case, parameters, beam, E, sheared)
+    G = _shear_modulus(case, parameters, beam, E)
     kappa, kappa_y = section.shear_coefficient, section.shear_coefficient_y
     kGA = G * section.area * kappa if sheared else None
     return BeamValues(
@@ -285,9 +284,7 @@ def _values(
     )
 
 
-def _shear_modulus(
-    case: CaseFile, parameters: ModelParameters, beam: Any, E: Scalar, sheared: bool
-) -> Scalar:
+def _shear_modulus(case: CaseFile, parameters: ModelParameters, beam: Any, E: Scalar) -> Scalar:
     """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
     data: Any = case.mechanism.materials[beam.material]
     path = f"materials.{beam.material}."
@@ -296,10 +293,7 @@ def _shear_modulus(
     if getattr(data, "poissons_ratio", None) is not None:
         nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
         return E / ((nu + 1.0) * 2.0)
-    if case.mechanism.space == "planar" and not sheared:
-        return 0.0
-    message = "needs poissons_ratio or shear_modulus for torsion or shear"
-    raise MechanismError(f"mechanism.materials.{beam.material}", message)
+    return 0.0
 
 
 # --- tapers

@@ -38,10 +38,6 @@ def closed_kinematics(
     """
     if tree.loops:
         return _close_loops(case, parameters, tree, coords)
-    if tree.passive:
-        name = tree.passive[0].joint
-        message = "moves without a coordinate in an open chain: give it one, or make it fixed"
-        raise MechanismError(f"mechanism.joints.{name}", message)
     values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
     return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
 

@@ -147,14 +147,10 @@ class _SpanningTree(NamedTuple):
 
 
 def build_tree(case: CaseFile) -> Topology:
-    """From the ground, joints in the order of the file, each from base to follower if possible.
-
-    Raises MechanismError for a link that no joint connects to the ground.
-    """
+    """From the ground, joints in the order of the file, each from base to follower if possible."""
     joints = [_edge(case, joint) for joint in case.mechanism.joints]
     rigid = {n for n, link in case.mechanism.links.items() if getattr(link, "type", "") == "rigid"}
     walk = _walk(joints, frozenset(), rigid)
-    _require_connected(case, walk.edges)
     while better := _better(joints, walk, rigid):
         walk = better
     loops = (*walk.elastic, *walk.rigid)
@@ -169,14 +165,6 @@ def _edge(case: CaseFile, name: str) -> JointEdge:
     elif joint.base != "ground":
         base = split(joint.base)
     return JointEdge(name, base, split(joint.follower))
-
-
-def _require_connected(case: CaseFile, edges: Sequence[JointEdge]) -> None:
-    placed = {edge.follower[0] for edge in edges}
-    for link in case.mechanism.links:
-        if link not in placed:
-            message = "is not connected to the ground by joints"
-            raise MechanismError(f"mechanism.links.{link}", message)
 
 
 def _walk(joints: Sequence[JointEdge], closing: frozenset[str], rigid: set[str]) -> _SpanningTree:

@@ -246,22 +246,12 @@ def _from_points(spec: PointTrajectory) -> Trajectory:
 
 def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
     """A note for each angle that moves by more than half a turn from sample to sample."""
-    found = _largest_turns(q, q_names, q_units)
+    steps, units = np.abs(np.diff(q, axis=0)), q_units or ["rad"] * len(q_names)
     return tuple(
-        f"{name} jumps by {step:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
-        for step, name, k in found
-        if step > np.pi
+        f"{name} jumps by {own[k]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
+        for own, name, unit in zip(steps.T, q_names, units, strict=True)
+        if unit == "rad" and own[k := int(own.argmax())] > np.pi
     )
-
-
-def _largest_turns(
-    q: Floats, q_names: Sequence[str], q_units: Sequence[str]
-) -> list[tuple[float, str, int]]:
-    """The largest step of each angle in rad, its name, and the sample before it."""
-    steps = np.abs(np.diff(q, axis=0))
-    units = q_units or ["rad"] * len(q_names)
-    named = zip(steps.T, q_names, units, strict=True)
-    return [(own.max(), name, int(own.argmax())) for own, name, unit in named if unit == "rad"]
 
 
 # --- several trajectories

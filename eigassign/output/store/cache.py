@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, UsageError
-from eigassign.files import CACHE, at_home, raised, read_bytes
+from eigassign.files import CACHE, raised, read_bytes
 from eigassign.output.store.atomic import replace_synced, sweep_files
 
 Array = NDArray[Any]
@@ -51,7 +51,11 @@ def default_directory() -> Path | None:
     Raises UsageError where the variable names the home folder of nobody.
     """
     if chosen := os.environ.get("EIGASSIGN_CACHE_DIR"):
-        return at_home(chosen, "EIGASSIGN_CACHE_DIR")
+        try:
+            return Path(chosen).expanduser()
+        except RuntimeError:
+            message = f"EIGASSIGN_CACHE_DIR: there is no home folder for {chosen!r}"
+            raise UsageError(message) from None
     from platformdirs import user_cache_path
 
     try:
