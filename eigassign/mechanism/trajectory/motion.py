@@ -133,7 +133,9 @@ def sampled_motion(time_s: Floats, q: Floats) -> Motion:
     # what q rounded to 1e-16 leaves of second differences where the velocity does not change
     step = np.diff(time_s)[:, None]
     least = 4e-15 * np.abs(q).max(axis=0) / step.min() ** 2
-    c[2:][:, np.maximum(2.0 * np.abs(c[2]), np.abs(2.0 * c[2] + 6.0 * c[3] * step)) <= least] = 0.0
+    if len(c) > 2:  # two samples are on a line
+        bends = np.maximum(2.0 * np.abs(c[2]), np.abs(2.0 * c[2] + 6.0 * c[3] * step))
+        c[2:][:, bends <= least] = 0.0
     return Motion(Curve(time_s, c), np.zeros(0))
 
 
