@@ -1,11 +1,14 @@
-"""Time against accuracy of every way to the frequencies of a case, timed on this machine.
+"""Speed against accuracy of every method on a case, where methods fail, and what to write.
 
 Reading order:
 
-    results     what is asked of a chart and what it holds, as plain numbers, and words for these
-    question    the points at which every method is asked for frequencies; how answers are timed
+    results     what a chart holds, as plain numbers, and words for these
+    question    points to learn from, and others as a test
     methods     the list of methods
-    comparison  every method put the same question; meshes; which no other beats, what to choose
+    boxes       error against the size of the box
+    failures    what makes methods fail, by name
+    comparison  every method put the same question; which no other beats
+    advice      what to write for which question; several cases side by side
 """
 
 from eigassign.faces import face
@@ -13,11 +16,15 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "comparison": "advise chart_meshes compare_methods front skipped_notes",
-        "question": "QUICK Effort build_bench build_question measure",
+        "advice": "advised build_matrix headline",
+        "boxes": "HALF_WIDTHS reaches study_boxes",
+        "comparison": "compare_methods front",
+        "failures": "find_failures near_modes",
+        "methods": "CURVES Built Method list_methods",
+        "question": "QUICK Effort Points Subject build_subject errors",
         "results": (
-            "ACCURACIES Advice Asked Chart ChartPoint Errors Front MeshRow Timing machine "
-            "time_in_words"
+            "ACCURACY EVALUATIONS Advice BoxRow Cell Chart ChartPoint Finding Front Matrix "
+            "OrderRow Reach machine"
         ),
     },
 )

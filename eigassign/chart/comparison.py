@@ -1,230 +1,230 @@
-"""Every method put the same question: built, evaluated, timed, compared; meshes; what to choose.
+"""Every method put the same question: made, judged at points that none has seen, timed in turns.
 
-Evaluations are timed in large batches, as a search over designs asks for them.
+Errors do not depend on the machine. Times are the least processor time of repeats, in which all
+methods take turns, so that another process disturbs all alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.case.case_file import CaseFile
-from eigassign.chart.methods import Method, list_methods
-from eigassign.chart.question import (
-    Bench,
-    Effort,
-    Question,
-    build_bench,
-    build_question,
-    measure,
-    timed,
+from eigassign.chart.boxes import reaches, study_boxes
+from eigassign.chart.failures import find_failures, near_modes
+from eigassign.chart.methods import (
+    EXACT,
+    KRIGING,
+    MESH,
+    NO_KRIGING,
+    SCIPY,
+    Built,
+    Method,
+    list_meshes,
+    list_methods,
 )
+from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
-    Advice,
+    ACCURACY,
+    EVALUATIONS,
     Asked,
     Chart,
     ChartPoint,
-    Errors,
+    Finding,
     Front,
-    MeshRow,
-    Timing,
     machine,
 )
-from eigassign.errors import EigassignError
-from eigassign.facts import time_in_words
-from eigassign.mechanism.assembly.build import refined
-from eigassign.study.built_case import build_model
-from eigassign.study.scene import Scene
+from eigassign.errors import EigassignError, LostModeError
+from eigassign.modal.exact.solver import rounding_error
+from eigassign.modal.exact.tracking import EXTRA, FollowedShape, MoreModesError, follow, places
+from eigassign.study.built_case import BuiltCase
 
 Floats = NDArray[np.float64]
+LEAST_S = 1e-3  # a timed run takes at least so long: a thousand times what the clock resolves
+ONCE_S, OFTEN_S = 1.0, 0.1  # a run that takes over so long is not repeated, or three times only
+SHAPED, SHAPED_DOF = 48, 2000  # test points at which errors by shape are taken, up to this size
 
 
 def compare_methods(
-    scene: Scene, effort: Effort, accuracies: Sequence[float], progress: Callable[[str], None]
+    case: BuiltCase,
+    effort: Effort,
+    accuracy: float = ACCURACY,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Chart:
-    """Time against error of every method; no meshes yet.
-
-    Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
-    """
-    bench = build_bench(scene, effort)
-    progress("solving the points of the question exactly")
-    question = build_question(bench)
-    charted, skipped = chart_methods(bench, question, progress)
-    one, asked, file = float(question.asked.trajectory_samples), question.asked, scene.file
-    named = {"one trajectory": one, "1000 trajectories": 1000.0 * one, "online alone": None}
+    """The chart of a case, without advice. Raises what `build_subject` does."""
+    subject, unfollowed = build_subject(case)
+    pencil, n_dof = subject.model.pencil, subject.model.n_dof
+    effort, skipped = effort.of_size(n_dof), dict[str, str]()
+    progress("solving the test points exactly")
+    tests = subject.tested(effort)
+    exact, near = subject.exact(tests.x), near_modes(subject, tests)
+    shapes = _by_shape(subject, tests) if near else np.full_like(exact, np.nan)
+    floor, made = (
+        rounding_error(pencil, subject.x0, max(subject.modes)),
+        dict[str, tuple[ChartPoint, Built]](),
+    )
+    for method in list_methods(subject, effort):
+        if method.curve not in {row.curve for row, _ in made.values()}:
+            progress(f"charting {method.curve}")
+        try:
+            one = _made(subject, method, tests, exact, shapes, floor)
+            made.setdefault(one[0].method, one)
+        except (EigassignError, np.linalg.LinAlgError, MemoryError) as error:
+            why = "the memory does not suffice" if isinstance(error, MemoryError) else str(error)
+            skipped[f"{method.curve}, {method.size}"] = why
+    progress("charting meshes")
+    made |= {one[0].method: one for one in _meshes(subject, effort, tests, floor)}
+    progress("timing all in turns")
+    along = subject.along(subject.initial)
+    times = _timed([partial(built.answer, along) for _, built in made.values()], effort.repeats)
+    points = tuple(
+        replace(row, trajectory_s=least, spread_s=median - least)
+        for (row, _), (least, median) in zip(made.values(), times, strict=True)
+    )
+    progress("charting boxes")
+    boxes = study_boxes(subject, effort, {name: built for name, (_, built) in made.items()}, floor)
+    findings = tuple(find_failures(subject, near, exact, points, boxes, skipped, accuracy))
+    if unfollowed:
+        findings = (_unfollowed(unfollowed), *findings)
+    question = Asked(
+        subject.modes, n_dof, len(np.unique(tests.design)), len(tests), len(along), accuracy,
+        floor, time.get_clock_info("process_time").resolution,
+    )  # fmt: skip
+    constant, file = _constant(exact), case.file
     return Chart(
         title=file.title, case_name=file.path.stem, case_sha256=file.sha256,
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
-        asked=asked, points=tuple(charted), skipped=tuple(skipped.items()),
-        fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named.items()),
-        advice=tuple(advise(charted, asked, accuracies)),
-        notes=tuple(skipped_notes(skipped)), warnings=scene.warnings,
+        asked=question, points=points, skipped=tuple(skipped.items()),
+        fronts=tuple(front(points, n, accuracy, constant) for n in EVALUATIONS),
+        boxes=boxes, reach=reaches(boxes, accuracy), findings=findings,
+        notes=() if any(p.curve == KRIGING for p in points) else (NO_KRIGING,),
+        warnings=tuple(map(str, file.warnings)),
     )  # fmt: skip
 
 
-def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
-    """A note for each reason, with the methods that it kept from an answer."""
-    for why in dict.fromkeys(skipped.values()):
-        names = [name for name, own in skipped.items() if own == why]
-        yield f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no answer: {why}"
-
-
-# --- Measured: what every method costs, and how wrong it is
-
-
-def chart_methods(
-    bench: Bench, question: Question, progress: Callable[[str], None]
-) -> tuple[list[ChartPoint], dict[str, str]]:
-    """A point for every method, exact solvers first; of those that cannot answer, why.
-
-    After a set-up that takes over ``effort.most_s`` no other of its family is made.
-    """
-    charted, skipped, ended = list[ChartPoint](), dict[str, str](), dict[str, str]()
-    for method in list_methods(bench):
-        if method.family not in ended:
-            progress(f"charting {method.family}")
-        exact = (p.online.median_s for p in charted if p.family.startswith("exact"))
-        try:
-            if why := ended.setdefault(method.family, ""):
-                raise EigassignError(why)
-            point, set_up_s = _chart_method(bench, question, method, min(exact, default=0.0))
-        except EigassignError as error:
-            skipped[method.name] = str(error)
-            continue
-        charted.append(point)
-        if set_up_s > bench.effort.most_s:
-            ended[method.family] = f"{method.name} took {time_in_words(set_up_s)} to set up"
-    return charted, skipped
-
-
-def _chart_method(
-    bench: Bench, question: Question, method: Method, exact_s: float
-) -> tuple[ChartPoint, float]:
-    """Set up, evaluated, timed and compared; and the seconds of setting up."""
-    asked, effort, solver = question.asked, bench.effort, method.family.startswith("exact")
-    points = question.points[: method.parameters.get("points")]
-    built, set_up = measure(method.build, effort)
-    hz, spent = timed(partial(built.evaluate, points))
-    # as many as take 20 ms at the pace of the first answers
-    many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(points)), 32768))
-    some = points[np.resize(np.arange(len(points)), many)]
-    offline = Timing(0.0, 0.0, 0.0, 0) if solver else set_up
-    online = measure(partial(built.evaluate, some), effort, many)[1]
-    exact, n = question.exact_hz[: len(hz)], asked.random_points
-    pays = not solver and online.median_s < exact_s
-    point = ChartPoint(
-        method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
-        offline=offline, online=online, solves=built.solves, solves_online=float(solver),
-        everywhere=errors(hz, exact, asked.floor_hz if solver else 0.0),
-        random=errors(hz[:n], exact[:n]),
-        trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
-        # from so many evaluations: offline + N online < N exact
-        break_even=offline.median_s / (exact_s - online.median_s) if pays else None,
-        use=method.use, key=method.key,
+def _made(
+    subject: Subject, method: Method, tests: Points, exact: Floats, shapes: Floats, floor: float
+) -> tuple[ChartPoint, Built]:
+    """A method made, and asked at all test points."""
+    learnt = subject.learnt(method.learns) if method.learns else tests[:0]
+    built, spent = _run(partial(method.build, learnt))
+    if spent < ONCE_S:  # the first run warms up, and imports
+        spent = min(_run(partial(method.build, learnt))[1] for _ in range(1 + (spent < OFTEN_S)))
+    hz = asked(built.answer, tests, exact)
+    size = built.size or method.size
+    shaped = errors(hz, shapes)[0] if np.isfinite(shapes).all(axis=1).any() else None
+    worst, rms, failed = errors(hz, exact)
+    row = ChartPoint(
+        f"{method.curve}, {size}", method.curve, size,
+        0.0 if method.curve in (EXACT, SCIPY, MESH) else spent, 0.0, 0.0, max(worst, floor), rms,
+        None if shaped is None else max(shaped, floor), failed, method.use,
     )  # fmt: skip
-    return point, set_up.median_s
+    return row, built
 
 
-def errors(hz: Floats, exact: Floats, floor_hz: float = 0.0) -> Errors:
-    """Worst and root mean square of |f − f_exact|, infinite where a method gives no number.
+def _by_shape(subject: Subject, tests: Points) -> Floats:
+    """Frequencies (n, n_modes) of modes of one shape, NaN at most points and where it is lost.
 
-    An error below ``floor_hz``, the round-off of the exact solves, means nothing.
+    The shapes are those of the test point at which neighbours are farthest from each other.
     """
-    off = np.abs(hz - exact)
-    failed = ~np.isfinite(off)
-    off = np.where(failed, np.inf, off)
-    rms, relative = float(np.sqrt(np.mean(np.square(off)))), float((off / exact).max())
-    worst = max(float(off.max()), floor_hz)
-    return Errors(worst, rms, relative, len(hz), int(failed.any(axis=1).sum()))
+    pencil, highest = subject.model.pencil, max(subject.modes)
+    hz = np.full((len(tests), len(subject.modes)), np.nan)
+    if pencil.n_dof > SHAPED_DOF:
+        return hz
+    lowest = subject.exact(tests.x, min(highest + 1, len(pencil.elastic)))
+    apart = np.nan_to_num(np.min(np.diff(lowest, axis=1) / lowest[:, :-1], axis=1), nan=-1.0)
+    (start,) = places(pencil, tests.x[[int(apart.argmax())]], highest, EXTRA)
+    for k in np.unique(np.linspace(0, len(tests) - 1, SHAPED).astype(int)):
+        with suppress(LostModeError, MoreModesError, EigassignError):
+            there = places(pencil, tests.x[k : k + 1], highest, EXTRA)
+            for column, mode in enumerate(subject.modes):
+                one = FollowedShape(start, 1.0 * (np.arange(1, len(start.lam) + 1) == mode))
+                found = follow(pencil, one, there)[0]
+                hz[k, column] = np.nan if found.is_shared else np.sqrt(found.lam) / (2.0 * np.pi)
+    return hz
 
 
-# --- Meshes: elements against discretisation error
+def _meshes(
+    subject: Subject, effort: Effort, tests: Points, floor: float
+) -> Iterator[tuple[ChartPoint, Built]]:
+    """Meshes against their limit f + (f − f_coarser)/15, for errors fall like h⁴ when halved."""
+    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
+    found = [
+        (str(count), finer, finer.exact(few.x)) for count, finer in list_meshes(subject, effort)
+    ]
+    if len(found) > 1:
+        limit = found[-1][2] + (found[-1][2] - found[-2][2]) / 15.0
+        nowhere = np.full_like(limit, np.nan)
+        for count, finer, _ in (*found, ("as in the case", subject, limit)):
+            built = Built(lambda points, finer=finer: finer.exact(points.x))  # type: ignore[misc]
+            size, use = f"{count} elements a link", f"elements: {count}, of every link"
+            if finer is subject:
+                size, use = count, ""
+            method = Method(MESH, size, lambda _, built=built: built, use=use)  # type: ignore[misc]
+            yield _made(subject, method, few, limit, nowhere, floor)
 
 
-def chart_meshes(
-    file: CaseFile, x: Floats, modes: Sequence[int], effort: Effort
-) -> tuple[MeshRow, ...]:
-    """One row for each mesh up to ``effort.most_dof``, from coarse to fine, at points x (n, n_x).
-
-    The limit is extrapolated from the two finest, f + (f − f_coarser)/15, for errors fall like h⁴
-    where cubic beam elements are halved; the finest row's own error is therefore an estimate. No
-    rows where fewer than two meshes differ.
-    """
-    meshes = {
-        counts: (k, finer) for k in sorted(effort.factors) for finer, counts in [refined(file, k)]
-    }
-    sizes, times, solved = list[tuple[float, int, int]](), list[Timing](), list[Floats]()
-    for counts, (factor, finer) in meshes.items():
-        model = build_model(finer)
-        if not counts or model.n_dof > effort.most_dof:
-            break
-        q, y = np.split(x, [len(model.q_names)], axis=1)
-        hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort, len(x))
-        solved.append(hz[:, np.array(modes) - 1])
-        sizes.append((factor, sum(counts), model.n_dof))
-        times.append(spent)
-    if len(sizes) < 2:
-        return ()
-    off = np.array(solved) - (limit := solved[-1] + (solved[-1] - solved[-2]) / 15.0)
-    worst, relative = (np.abs(e).max(axis=(1, 2)) for e in (off, off / limit))
-    with np.errstate(divide="ignore", invalid="ignore"):  # where an error is 0
-        slopes = -np.diff(np.log(worst)) / np.diff(np.log([factor for factor, *_ in sizes]))
-    orders = [*(float(p) if np.isfinite(p) else None for p in slopes[:-1]), None, None]
-    rows = zip(sizes, worst.tolist(), relative.tolist(), orders, times, strict=True)
-    return tuple(MeshRow(*size, w, e, order, spent) for size, w, e, order, spent in rows)
+def _unfollowed(why: str) -> Finding:
+    """The finding of a path that cannot be followed."""
+    kind = "straight or folded arm"
+    return Finding(kind, "along the path", "all", why, "keep it within reach; charted at rest")
 
 
-# --- Which methods no other beats, and what to choose
+# --- Times
+
+
+def _run(job: Callable[[], Built]) -> tuple[Built, float]:
+    start = time.process_time()
+    return job(), time.process_time() - start
+
+
+def _timed(jobs: Sequence[Callable[[], object]], repeats: int) -> list[tuple[float, float]]:
+    """Least and median seconds of each job by turns; short ones run many times at a turn."""
+    spent, many = [list[float]() for _ in jobs], [1] * len(jobs)
+    for turn in range(repeats + 1):
+        for k, job in enumerate(jobs):
+            before = min(spent[k], default=0.0)
+            if before > ONCE_S or (turn > 3 and before > OFTEN_S):
+                continue
+            start = time.process_time()
+            for _ in range(many[k]):
+                job()
+            each = (time.process_time() - start) / many[k]
+            if turn or each > ONCE_S:  # the first run warms up
+                spent[k].append(each)
+            many[k] = max(many[k], int(LEAST_S / (each + 1e-7)))
+    return [(min(own), float(np.median(own))) for own in spent]
+
+
+# --- Which methods no other beats
 
 
 def front(
-    points: Sequence[ChartPoint], name: str, evaluations: float | None, floor_hz: float
+    points: Sequence[ChartPoint], evaluations: int, accuracy: float, constant: float = np.inf
 ) -> Front:
-    """The methods that nothing beats in cost and error at once; errors below the floor are equal.
+    """The methods within the accuracy that nothing beats in cost and error at once.
 
-    A point that equals another in one of the two and is no better in the other is beaten.
+    One that is hardly better than the best ``constant`` answers is not among them, nor are meshes,
+    whose errors are of another kind.
     """
-    able = [(p.cost_s(evaluations), max(p.everywhere.worst_hz, floor_hz), p.method) for p in points]
+    rows = [p for p in points if p.curve != MESH]
+    most = min(accuracy, max(0.5 * constant, min((p.worst_relative for p in rows), default=0.0)))
+    able = (p for p in rows if p.worst_relative <= most)
     kept, best = list[str](), np.inf
-    for _, error, method in sorted(able, key=lambda each: each[:2]):
-        if error < best:
-            kept, best = [method, *kept], error
-    return Front(name, evaluations, tuple(kept))
+    for p in sorted(able, key=lambda p: (p.cost_s(evaluations), p.worst_relative)):
+        if p.worst_relative < best:
+            kept, best = [*kept, p.method], p.worst_relative
+    return Front(evaluations, tuple(kept))
 
 
-def advise(
-    points: Sequence[ChartPoint], asked: Asked, accuracies: Sequence[float]
-) -> Iterator[Advice]:
-    """What to write in the case for each accuracy: the lowest order that has it, in words too.
-
-    Nothing is advised below round-off: no method can be seen to be that accurate.
-    """
-    floor = asked.floor_hz / asked.typical_hz
-    keyed = [p for p in points if p.key]
-    exact = [time_in_words(p.online.median_s) for p in points if p.family == "exact"][:1]
-    for accuracy in accuracies:
-        able = [p for p in keyed if p.everywhere.worst_relative <= accuracy][:1]
-        if accuracy < floor:
-            words = f"nothing is within {_share(accuracy)} of exact: round-off moves even exact "
-            yield Advice(accuracy, f"{words}solves by {floor:.1e}", is_below_round_off=True)
-        elif not able:
-            nearest = min((p.everywhere.worst_relative for p in keyed), default=None)
-            off = "" if nearest is None else f", the nearest is {_share(nearest)} off at worst"
-            which = "write `method: sequential` under `assignment`, which needs no expansion"
-            words = f"{which}: no order that was charted is within {_share(accuracy)} of exact{off}"
-            yield Advice(accuracy, words)
-        for p in able:
-            worst, each = p.everywhere.worst_relative, p.online.median_s
-            words = f"write `{p.key}` under `expansion`: {_share(worst)} off at worst, "
-            words += f"{time_in_words(each)} a sample"
-            words += "".join(f" (an exact solve takes {time})" for time in exact)
-            yield Advice(accuracy, words, p.key, p.method, worst, each)
-
-
-def _share(relative: float) -> str:
-    """``0.13 %``; of what is far below as a power of ten."""
-    return f"{100.0 * relative:.2g} %" if relative >= 1e-6 or not relative else f"{relative:.1e}"
+def _constant(exact: Floats) -> float:
+    """The worst relative error of the best constants, one a mode: (max − min)/(max + min)."""
+    known = exact[np.isfinite(exact).all(axis=1)]
+    high, low = known.max(axis=0, initial=0.0), known.min(axis=0, initial=np.inf)
+    return float(((high - low) / (high + low)).max()) if len(known) else 0.0

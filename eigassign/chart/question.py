@@ -1,186 +1,216 @@
-"""The question put to every method, and how the answers are timed.
+"""What every method of a chart is asked: poses and designs that it learns from, others as a test.
 
-Frequencies are asked for between the samples of the trajectory and all over the design's box, and
-along the trajectory at several designs.
-
-Times are processor time, which on one thread is the time it takes where nothing else runs.
+Methods learn at the samples of the trajectory. They are judged between them and at other designs of
+one fixed sequence (`kronecker`), so that no test point is ever one that was learnt from. How many
+points there are follows from the size of the model alone: a slow machine changes times.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeVar
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.results import Asked, Timing
-from eigassign.errors import CaseError
-from eigassign.modal.exact.solver import rounding_error
-from eigassign.study.planning import at_corners, corners, joint_map, scattered
-from eigassign.study.scene import Scene
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import CaseError, EigassignError, SingularityError, TrajectoryError
+from eigassign.mechanism.kinematics.loop_closure import kronecker
+from eigassign.mechanism.kinematics.parameters import resting_pose
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.model import Model
+from eigassign.study.built_case import BuiltCase
+from eigassign.study.planning import corners, plan_expansion, poses_at
 
 Floats = NDArray[np.float64]
-SEED = 20211
 Ints = NDArray[np.intp]
-T = TypeVar("T")
-
-
-# --- How much is tried, and how it is timed
+LEARNT = 1000  # the row of the sequence from which designs are learnt; tests begin with row 1
+EDGE = 0.05  # of a step between samples: test points keep so far from both
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Points, sizes of the methods and time limits, unless given those without ``--quick``."""
+    """Points and sizes, unless given those without ``--quick``."""
 
     quick: bool = False
-    random_points: int = 600  # at which methods are compared, beside
-    samples_per_design: int = 152  # along the trajectory at several designs
-    most_s: float = 60.0  # for the exact answers, one method's set-up
-    orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
-    coefficients: int = 5000  # largest set that is expanded
-    half_orders: tuple[int, ...] = (0, 1, 2, 3)
-    expansion_points: tuple[int, ...] = (1, 3, 5)
-    factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
-    most_dof: int = 40_000  # of a refined mesh
-    repeats: int = 15  # of a job, at most, and none is begun after
-    repeat_s: float = 1.0  # its first run included
+    designs: int = 32
+    instants: int = 16  # along the trajectory at each design
+    coefficients: int = 5000  # of the largest set that is expanded
+    learnt: tuple[int, ...] = (25, 50, 100, 200, 400)  # points of radial basis functions
+    kriged: tuple[int, ...] = (25, 50, 100, 200)  # Kriging takes their third power
+    elements: tuple[int, ...] = (1, 2, 4, 8, 16)
+    most_dof: int = 10_000  # of a mesh
+    boxes: int = 16  # designs and instants of each box
+    repeats: int = 9
+
+    def of_size(self, n_dof: int) -> Effort:
+        """Fewer points for larger models, so that the work grows slowly."""
+        share = min(1.0, 400.0 / n_dof) ** 0.5
+        names = ("designs", "instants", "boxes")
+        return replace(self, **{name: max(4, round(share * getattr(self, name))) for name in names})
 
 
-QUICK = Effort(
-    quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
-    expansion_points=(1, 3), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
-    repeat_s=0.1,
-)  # fmt: skip
-
-
-def timed(job: Callable[[], T]) -> tuple[T, float]:
-    """The result of a job, and the seconds it took."""
-    start = time.process_time()
-    return job(), time.process_time() - start
-
-
-def measure(job: Callable[[], T], effort: Effort, count: int = 1) -> tuple[T, Timing]:
-    """The result of a job, and how long each of its ``count`` parts takes.
-
-    The first run does not count, for it warms caches, unless it takes too long for another.
-    """
-    result, first = timed(job)
-    spent = list[float]()
-    while len(spent) < effort.repeats and first + sum(spent) < effort.repeat_s:
-        spent.append(timed(job)[1])
-    median, low, high = (np.quantile(spent or [first], (0.5, 0.25, 0.75)) / count).tolist()
-    return result, Timing(median, low, high, len(spent))
-
-
-# --- The case, and its exact solves
+QUICK = Effort(True, 16, 12, 1500, (25, 50, 100), (25, 50), (1, 2, 4, 8), 1500, 8, 5)
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Poses q (n, n_q) and designs y (n, n_y)."""
+    """Poses and designs x (n, n_x); where along the samples (n,); which design (n,) each is."""
 
-    q: Floats
-    y: Floats
+    x: Floats
+    place: Floats
+    design: Ints
 
     def __len__(self) -> int:
-        return len(self.q)
+        return len(self.x)
 
-    def __getitem__(self, rows: slice | Ints) -> Points:
-        return Points(self.q[rows], self.y[rows])
-
-
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """A case on which methods are tried, and its exact solves."""
-
-    scene: Scene
-    effort: Effort
-    lower: Floats  # (n_y,); the same as upper where a parameter is kept
-    upper: Floats
-
-    def points(self, samples: Floats | Ints, y: Floats) -> Points:
-        """Samples of the trajectory (n,) at designs (n, n_y); 1.5 is between second and third."""
-        every = np.arange(len(self.scene.path.q))
-        q = [np.interp(samples, every, own) for own in self.scene.path.q.T]
-        return Points(np.reshape(q, (-1, len(y))).T, y)
-
-    def exact(self, points: Points) -> Floats:
-        """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
-        modes = self.scene.expansions.modes
-        hz = self.scene.model.frequencies(points.q, points.y, max(modes))
-        return np.asarray(hz[:, np.array(modes) - 1])
-
-    @cached_property
-    def solve_s(self) -> float:
-        """Seconds of one exact solve, roughly: to decide how many can be afforded."""
-        count = 1 if self.scene.model.n_dof > 1000 else min(16, len(self.scene.path.q))
-        some = self.points(np.arange(count), np.tile(self.lower, (count, 1)))
-        self.exact(some[:1])
-        return max(timed(lambda: self.exact(some))[1] / count, 1e-6)
-
-
-def build_bench(scene: Scene, effort: Effort) -> Bench:
-    """Raises CaseError where nothing varies that a frequency could depend on."""
-    (lower, upper), model = scene.bounds, scene.model
-    if not (_moves(scene) or (upper > lower).any()):
-        why, remedy = "no coordinate changes a frequency", "give"
-        which = zip(scene.file.coordinates.values(), model.pencil.active, strict=False)
-        if joints := ", ".join(dict.fromkeys(each.joint for each, active in which if active)):
-            still = "along the trajectory nothing moves that a frequency depends on"
-            why, remedy = f"{still} (joints: {joints})", "let it move, or give"
-        room = f"{remedy} a design parameter a `max` above its `min`"
-        message = f"nothing to chart: {why}, and no design parameter may change; {room}"
-        raise CaseError((scene.file.problem("trajectory", message),))
-    return Bench(scene, effort, lower, upper)
-
-
-def _moves(scene: Scene) -> bool:
-    """True where a joint on which a frequency depends moves along the trajectory, in rad or m."""
-    s = scene.path.q @ joint_map(scene.model).T
-    return bool(s.size) and float(np.ptp(s, axis=0).max()) > 1e-9
-
-
-# --- The question
+    def __getitem__(self, rows: slice | Ints | NDArray[np.bool_]) -> Points:
+        return Points(self.x[rows], self.place[rows], self.design[rows])
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """``points``: first random ones, then ``runs`` along the trajectory, one for each design."""
+class Subject:
+    """A case on which methods are tried. SI units, x = (q, y)."""
 
-    points: Points
-    exact_hz: Floats  # (n, n_modes)
-    runs: tuple[slice, ...]
-    asked: Asked
+    file: CaseFile
+    model: Model
+    path: Trajectories | None
+    modes: tuple[int, ...]
+    x0: Floats  # about which series are expanded, (n_x,)
+    initial: Floats  # (n_y,)
+    bounds: tuple[Floats, Floats]  # of y
+
+    @property
+    def rows(self) -> tuple[slice, ...]:
+        """The samples of each trajectory; none where there is nothing between samples."""
+        rows = () if self.path is None else self.path.rows
+        return rows if any(own.stop - own.start > 1 for own in rows) else ()
+
+    @property
+    def changes(self) -> bool:
+        """True where a design parameter has room."""
+        return bool((self.bounds[1] > self.bounds[0]).any())
+
+    def split(self, x: Floats) -> tuple[Floats, Floats]:
+        """q and y of x."""
+        n_q = len(self.model.q_names)
+        return x[..., :n_q], x[..., n_q:]
+
+    def exact(self, x: Floats, count: int | None = None) -> Floats:
+        """The charted modes (n, n_modes) in Hz, or the lowest ``count``; NaN where there are none.
+
+        By eigassign's own exact solve.
+        """
+        most = count or max(self.modes)
+        hz = answered(lambda k: self.model.frequencies(*self.split(x[k]), most), len(x), most)
+        return hz if count else hz[:, np.array(self.modes) - 1]
+
+    def tested(self, effort: Effort) -> Points:
+        """Test points: between the samples, at designs spread over the bounds and at corners."""
+        designs, instants = self.initial[None], effort.designs * effort.instants
+        if self.changes:
+            instants = effort.instants if self.rows else 1
+            inside = self._designs(1, effort.designs * effort.instants // instants)
+            designs = np.vstack([np.where(corners(len(self.initial)), *self.bounds[::-1]), inside])
+        if not self.rows:
+            q = np.tile(self.split(self.x0)[0], (len(designs), 1))
+            return Points(np.hstack([q, designs]), np.zeros(len(q)), np.arange(len(q)))
+        share = kronecker(1 + len(designs) * instants, 1)[1:, 0].reshape(len(designs), -1)
+        steps = np.concatenate([np.arange(own.start, own.stop - 1) for own in self.rows])
+        step, rest = np.divmod(np.sort(share) * len(steps), 1.0)
+        place = steps[step.astype(np.intp)] + EDGE + (1.0 - 2.0 * EDGE) * rest
+        parts = list[tuple[Floats, Floats, Ints]]()
+        for k, y in enumerate(designs):
+            with suppress(TrajectoryError):  # a design that cannot follow the path
+                x = np.hstack([self._poses(place[k], y), np.tile(y, (instants, 1))])
+                parts.append((x, place[k], np.full(instants, k)))
+        return Points(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def learnt(self, count: int) -> Points:
+        """Points to learn from: samples, at other designs of the same sequence; each once."""
+        y = self._designs(LEARNT, count) if self.changes else np.tile(self.initial, (count, 1))
+        q, k = np.tile(self.split(self.x0)[0], (count, 1)), np.zeros(count, dtype=np.intp)
+        if self.rows and self.path is not None:
+            share = kronecker(LEARNT + count, 1 + y.shape[1])[LEARNT:, 0]
+            last = len(self.path.q) - 1  # of samples alone evenly, both ends included
+            k = np.rint(last * (share if self.changes else np.linspace(0, 1, count))).astype(int)
+            q = self.path.q[k]
+            if self.path.follows_design:
+                q = np.array([poses_at(self.path, y[i])[k[i]] for i in range(count)])
+        x = np.hstack([q, y])
+        once = np.sort(np.unique(x, axis=0, return_index=True)[1])
+        return Points(x[once], k[once].astype(np.float64), once)
+
+    def along(self, y: Floats) -> Points:
+        """One trajectory, at its own samples, or a single pose, at design y."""
+        q = self.split(self.x0[None])[0] if self.path is None else poses_at(self.path, y)
+        x = np.hstack([q, np.tile(y, (len(q), 1))])
+        return Points(x, np.arange(len(q), dtype=np.float64), np.zeros(len(q), dtype=np.intp))
+
+    def _designs(self, first: int, count: int) -> Floats:
+        lower, upper = self.bounds
+        return lower + kronecker(first + count, len(lower))[first:] * (upper - lower)
+
+    def _poses(self, place: Floats, y: Floats) -> Floats:
+        """q at ascending places along the samples; raises TrajectoryError as `between` does."""
+        found = list[Floats]()
+        for rows in self.rows:
+            own = place[(place >= rows.start) & (place <= rows.stop - 1)] - rows.start
+            if self.path is not None and len(own):
+                found.append(self.path.between(rows, y)(own))
+        return np.concatenate(found)
 
 
-def build_question(bench: Bench) -> Question:
-    """Points between samples and all over the box of designs, and runs at several designs.
+def answered(solve: Callable[[Ints], Floats], count: int, width: int) -> Floats:
+    """``solve`` of the rows 0 to ``count`` − 1, (count, width), NaN at those at which it raises."""
 
-    The runs are at the initial design and at corners, where approximations err most. The samples
-    are fewer where an exact solve takes long.
+    def part(rows: Ints) -> Floats:
+        try:
+            return solve(rows)
+        except EigassignError:
+            if len(rows) == 1:
+                return np.full((1, width), np.nan)
+        return np.vstack([part(half) for half in np.array_split(rows, 2)])
+
+    return part(np.arange(count)) if count else np.empty((0, width))
+
+
+def asked(answer: Callable[[Points], Floats], points: Points, exact: Floats) -> Floats:
+    """What a method says at points, in the shape of what is exact there; NaN where it has none."""
+    with np.errstate(all="ignore"):
+        return answered(lambda rows: answer(points[rows]), *exact.shape)
+
+
+def errors(hz: Floats, exact: Floats) -> tuple[float, float, int]:
+    """Worst and rms of |f/f_exact − 1|, infinite where a method has no number; how many have none.
+
+    Points without an exact answer do not count.
     """
-    scene, effort, designs = bench.scene, bench.effort, corners(len(bench.lower))
-    wanted = effort.random_points + (1 + len(designs)) * effort.samples_per_design
-    share = min(1.0, effort.most_s / (wanted * bench.solve_s))
-    n_random, along = (
-        max(4, int(share * count)) for count in (effort.random_points, effort.samples_per_design)
-    )
-    case = scene.file, scene.trajectory, scene.q0, np.clip(scene.initial, *scene.bounds)
-    within, outer = scattered(*case[:3], n_random), at_corners(*case, designs, along)
-    x, where = np.vstack([within[0], outer[0]]), np.append(within[1], outer[1])
-    points = bench.points(where, x[:, len(scene.q0) :])
-    n, modes = len(scene.path.spread(along)), scene.expansions.modes
-    runs = tuple(slice(k, k + n) for k in range(n_random, len(points), n))
-    exact_hz, samples = bench.exact(points), len(scene.path.q)
-    floor = max(rounding_error(scene.model.pencil, each, max(modes)) for each in x[[0, -1]])
-    asked = Asked(
-        modes=modes, n_dof=scene.model.n_dof, random_points=n_random, designs=len(runs),
-        samples_per_design=n, trajectory_samples=samples,
-        seed=SEED, typical_hz=float(np.median(exact_hz)),
-        floor_hz=floor * float(exact_hz.max()),
-    )  # fmt: skip
-    return Question(points, exact_hz, runs, asked)
+    off = np.abs(hz / exact - 1.0)[np.isfinite(exact).all(axis=1)]
+    failed = ~np.isfinite(off)
+    off = np.where(failed, np.inf, off)
+    rms = float(np.sqrt(np.mean(off**2))) if off.size else 0.0
+    return float(off.max(initial=0.0)), rms, int(failed.any(axis=1).sum())
+
+
+def build_subject(case: BuiltCase) -> tuple[Subject, str]:
+    """What of a case is charted, and why its trajectory cannot be followed, where that is so.
+
+    Then it is charted at rest. Raises CaseError for what cannot be modelled.
+    """
+    file, model, path, why = case.settled.file, case.model(), None, ""
+    if file.trajectory is not None:
+        try:
+            path = case.trajectory
+        except CaseError as error:
+            if not isinstance(error.__cause__, TrajectoryError | SingularityError):
+                raise
+            why = error.problems[0].message
+    if path is None and file.expansion.q == "auto":
+        at_rest = file.expansion.model_copy(update={"q": tuple(resting_pose(file).tolist())})
+        file = replace(file, expansion=at_rest)
+    plan, given = plan_expansion(file, model, path, order=1), file.design.parameters.values()
+    bounds = np.array([p.min for p in given]), np.array([p.max for p in given])
+    x0, initial = np.append(plan.q0, plan.y0), np.clip(case.initial_design, *bounds)
+    return Subject(file, model, path, plan.modes, x0, initial, bounds), why

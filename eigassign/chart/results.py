@@ -1,7 +1,6 @@
-"""What is asked of a chart and what it holds, as plain numbers, and the words for these.
+"""What a chart holds, as plain numbers and the words for them: seconds, Hz, relative errors.
 
-Seconds and Hz; errors are those of a frequency, over all charted modes. Every number can be
-computed again from ``parameters``, the seed and the case file.
+An error is |f / f_exact − 1| over all charted modes, at test points that no method has seen.
 """
 
 from __future__ import annotations
@@ -11,169 +10,139 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
 
 from eigassign._version import __version__
-from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
+from eigassign.facts import Fact, Seconds, Share, time_in_words
 from eigassign.study.results import CaseRow
 
-SCHEMA = 7  # of chart.json
-_BREAK_EVEN = "evaluations from which it beats exact solves"
-ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)  # worst relative errors in Hz that are advised for
-ErrorHz = Annotated[Hertz, Fact(digits=".2e")]
-RelativeError = Annotated[Share, Fact("of the frequency", "relative", digits=".1e")]
-_KINDS = {  # of methods whose family begins so: the first that fits
-    "Taylor": "series of λ",
-    "1/λ": "series of 1/λ",
-    "reduced": "reduced models",
-    "exact by others": "exact solves by others",
-    "exact": "exact solves",
-}
-
-
-def kind_of(family: str) -> str:
-    """The kind of a family's methods in words."""
-    return next(kind for beginning, kind in _KINDS.items() if family.startswith(beginning))
+SCHEMA = 8  # of chart.json
+EVALUATIONS = (1, 100, 10_000)  # trajectories over which a preparation is spread
+ACCURACY = 1e-2  # wanted of a frequency, where nothing is said
+Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
+RelativeError = Annotated[Share, Fact(digits=".2e", may_lack=True)]
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores, versions, linear algebra and its threads; no names of host or user."""
-    file, settings = Path("/proc/cpuinfo"), cast(dict[str, Any], np.show_config(mode="dicts"))
+    """Processor, cores, versions and threads of linear algebra; no names of host or user."""
+    file, threads = Path("/proc/cpuinfo"), os.environ.get("OMP_NUM_THREADS")
     lines = file.read_text(errors="replace").splitlines() if file.exists() else []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    blas = settings.get("Build Dependencies", {}).get("blas", {})
-    threads = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
     packages = {"eigassign": __version__, "NumPy": np.__version__, "SciPy": scipy.__version__}
     return {
-        "processor": (named or [platform.processor()])[0] or platform.machine(),
+        "processor": [*named, platform.processor(), platform.machine()][0],
         "cores": os.cpu_count() or 1,
-        "system": f"{platform.system()} {platform.machine()}",
         "versions": {"Python": platform.python_version(), **packages},
-        "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
-        "threads": "1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
+        "threads": threads or "as the library chooses",  # NumPy does not tell
     }
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Seconds: median and quartiles of ``repeats`` runs after a first one that does not count.
-
-    ``repeats`` is 0 where the first run took so long that it alone was timed.
-    """
-
-    median_s: Seconds
-    low_s: Seconds
-    high_s: Seconds
-    repeats: int
-
-    def __str__(self) -> str:
-        """Median and quartiles; one run alone is marked."""
-        median, low, high = map(time_in_words, (self.median_s, self.low_s, self.high_s))
-        if not self.median_s:
-            return median
-        return f"{median} ({low}–{high})" if self.repeats else f"{median} (once)"
-
-
-@dataclass(frozen=True)
-class Errors:
-    """|f − f_exact| over ``samples`` points; ``failed`` gave no number and are infinitely wrong."""
-
-    worst_hz: Annotated[ErrorHz, Fact(heading="worst")]
-    rms_hz: ErrorHz
-    worst_relative: RelativeError
-    samples: int
-    failed: Annotated[int, Fact(heading="no number", digits=lambda n: str(n or ""))]
-
-
-@dataclass(frozen=True)
 class ChartPoint:
-    """One method: what it costs and how wrong it is."""
+    """One method of one size: what it costs and how wrong it is."""
 
     method: Annotated[str, Fact("unique in its chart")]
-    family: str
-    ours: Annotated[bool, Fact("offered by eigassign; others are what people do without it")]
-    parameters: Mapping[str, Any]
-    offline: Annotated[Timing, Fact("set-up, exact solves included", "set-up")]
-    online: Annotated[Timing, Fact("one evaluation out of a large batch", "one evaluation")]
-    solves: Annotated[int, Fact("exact eigensolves of the set-up")]
-    solves_online: Annotated[float, Fact("exact eigensolves of one evaluation")]
-    everywhere: Annotated[Errors, Fact("random and along the trajectory")]
-    random: Annotated[Errors | None, Fact("over random samples of trajectory × design box")]
-    trajectory: Annotated[Errors | None, Fact("at several designs", "worst along the trajectory")]
-    break_even: Annotated[float | None, Fact(_BREAK_EVEN, "pays from", "", ",.0f", "never")]
-    use: Annotated[str, Fact("the call that asks for it", "how")] = ""
-    key: Annotated[str, Fact("what a case file asks for it by, under `expansion`")] = ""
+    curve: Annotated[str, Fact("the kind of method")]
+    size: Annotated[str, Fact("order, number of vectors, stations, elements or points")]
+    preparation_s: Annotated[Time, Fact("of all that comes before the first answer", "preparation")]
+    trajectory_s: Annotated[Time, Fact("one design at all samples", "one trajectory")]
+    spread_s: Annotated[Seconds, Fact("median of the repeats above their least")]
+    worst_relative: Annotated[RelativeError, Fact("at the test points", "worst error")]
+    rms_relative: Annotated[RelativeError, Fact(heading="rms error")]
+    worst_by_shape: Annotated[
+        RelativeError | None,
+        Fact("against the mode of the same shape", "worst by shape", absent=""),
+    ]
+    failed: Annotated[int, Fact("test points without a number", digits=lambda n: str(n or ""))]
+    use: Annotated[str, Fact("the call or key that asks for it", "how")] = ""
 
-    @property
-    def exact_solves(self) -> str:
-        """The exact solves of the set-up, and of an evaluation."""
-        each = f" + {self.solves_online:.2g} each" if self.solves_online else ""
-        return f"{self.solves}{each}"
-
-    def cost_s(self, evaluations: float | None) -> float:
-        """Seconds for set-up and so many evaluations; of one evaluation alone where None."""
-        if evaluations is None:
-            return self.online.median_s
-        return self.offline.median_s + evaluations * self.online.median_s
+    def cost_s(self, evaluations: float) -> float:
+        """Seconds of a trajectory, with its share of the preparation."""
+        return self.trajectory_s + self.preparation_s / evaluations
 
 
 @dataclass(frozen=True)
 class Front:
-    """Methods that no other beats in cost and error at once, the most accurate first.
+    """Methods that are accurate enough, and that no other beats in cost and error at once."""
 
-    The cost is that of ``evaluations`` with the set-up, or of one evaluation where it is None.
-    """
+    evaluations: Annotated[int, Fact("trajectories over which the preparation is spread")]
+    methods: Annotated[tuple[str, ...], Fact("the cheapest first")]
 
-    name: str
-    evaluations: float | None
-    methods: tuple[str, ...]
+
+@dataclass(frozen=True)
+class BoxRow:
+    """The worst error where only a part of the case's ranges is used, about the same point."""
+
+    method: str
+    varied: Annotated[str, Fact("q, y, or q and y")]
+    half_width: Annotated[float, Fact("of the case's own ranges; 1: all of them", digits="g")]
+    worst_relative: Annotated[RelativeError, Fact(heading="worst error")]
+    claimed: Annotated[
+        RelativeError | None, Fact("what the method says of its own error, at worst", absent="")
+    ]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far a method goes: the half-width up to which its error is below the one wanted."""
+
+    method: str
+    varied: str
+    half_width: Annotated[float, Fact("1: all of the case's own ranges", "goes to", digits=".2g")]
+    error_at_all: Annotated[RelativeError, Fact("at all of them", "error at all")]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something at which methods fail: what, where, why, and what serves instead."""
+
+    kind: Annotated[str, Fact(heading="what")]
+    where: str
+    methods: Annotated[str, Fact("that fail by it", "fail")]
+    why: str
+    instead: str
+    modes: Annotated[tuple[int, ...], Fact(digits=lambda m: ", ".join(map(str, m)))] = ()
+    gap: Annotated[float | None, Fact("of the frequencies, relative", digits=".1e", absent="")] = (
+        None
+    )
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What to write in a case for an accuracy: the lowest order that was measured to have it."""
+    """What to write for a question, and what it was measured to give."""
 
-    accuracy: Annotated[
-        Share,
-        Fact("the worst relative error in Hz", "asked for", digits=lambda a: f"{100.0 * a:.2g} %"),
-    ]
-    words: Annotated[str, Fact("what to write in the case, in a sentence")]
-    key: Annotated[str | None, Fact("null: none does it", "under expansion", absent="none")] = None
-    method: Annotated[str | None, Fact("the charted method that the key asks for")] = None
-    worst_relative: Annotated[Share | None, Fact("its worst error", "worst error")] = None
-    sample_s: Annotated[Seconds | None, Fact("its time", "a sample", "", time_in_words)] = None
-    is_below_round_off: bool = False
+    question: str
+    words: Annotated[str, Fact("what to write, and the consequence", "write")]
+    key: Annotated[str | None, Fact("of the case file", absent="")] = None
 
 
 @dataclass(frozen=True)
-class MeshRow:
-    """One mesh: ``elements`` in all, against the limit that the meshes converge to."""
+class OrderRow:
+    """`optimize` with an expansion of this order."""
 
-    factor: Annotated[float, Fact("of the case's own elements", digits="g")]
-    elements: int
-    n_dof: Annotated[int, Fact("degrees of freedom", "dof")]
-    worst_hz: Annotated[ErrorHz, Fact(heading="worst error")]
-    worst_relative: RelativeError
-    order: Annotated[float | None, Fact("observed, to the next finer mesh", digits=".2f")]
-    solve: Annotated[Timing, Fact("one exact solve", "exact solve")]
+    order: int
+    moved: Annotated[
+        float | None,
+        Fact("the design, from that of the highest order, of the bounds", digits=".1e", absent=""),
+    ]
+    one_shot: Annotated[RelativeError | None, Fact("the one shot's worst error", absent="")]
 
 
 @dataclass(frozen=True)
 class Asked:
     """The question that every method is put."""
 
-    modes: tuple[int, ...]
+    modes: Annotated[tuple[int, ...], Fact(digits=lambda m: ", ".join(map(str, m)))]
     n_dof: int
-    random_points: int
     designs: int
-    samples_per_design: int
+    test_points: int
     trajectory_samples: int
-    seed: int
-    typical_hz: Hertz
-    floor_hz: Annotated[Hertz, Fact("round-off of exact answers: no error below it counts")]
+    accuracy: Annotated[Share, Fact("wanted of a frequency")]
+    floor: Annotated[RelativeError, Fact("round-off of exact answers: no error below it counts")]
+    clock_s: Annotated[Seconds, Fact("resolution of the clock")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,8 +161,11 @@ class Chart:
     points: tuple[ChartPoint, ...]
     skipped: Annotated[tuple[tuple[str, str], ...], Fact("method, why")]
     fronts: tuple[Front, ...]
-    advice: tuple[Advice, ...]
-    mesh: tuple[MeshRow, ...] = ()
+    boxes: tuple[BoxRow, ...]
+    reach: tuple[Reach, ...]
+    findings: tuple[Finding, ...]
+    advice: tuple[Advice, ...] = ()
+    orders: tuple[OrderRow, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     seconds: Annotated[Seconds, Fact("that the chart took")] = 0.0
@@ -202,3 +174,50 @@ class Chart:
     def case(self) -> CaseRow:
         """The case that was charted."""
         return CaseRow(self.case_name, self.title, None, self.reference, self.case_sha256, {})
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One kind of method on one case."""
+
+    case: str
+    curve: str
+    error_at_equal_cost: Annotated[
+        RelativeError | None, Fact("the least for at most the time of exact solves", absent="none")
+    ]
+    cost_at_equal_accuracy: Annotated[
+        float | None,
+        Fact("the least with the accuracy wanted, of that of exact solves", digits=".2g",
+             absent="none"),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Matrix:
+    """Scenes × methods."""
+
+    schema: int = SCHEMA
+    version: str
+    accuracy: Share
+    evaluations: Annotated[int, Fact("trajectories over which preparations are spread")]
+    machine: Mapping[str, Any]
+    cases: Annotated[tuple[str, ...], Fact("in the order of the rows")]
+    cells: tuple[Cell, ...]
+    findings: Annotated[Mapping[str, tuple[Finding, ...]], Fact("by case")]
+    refused: Annotated[tuple[tuple[str, str], ...], Fact("case, why")]
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: Seconds = 0.0
+
+    @property
+    def case(self) -> CaseRow:
+        """What stands at the head of its page."""
+        count = f"{len(self.cases)} cases"
+        return CaseRow(count, "Scenes × methods", None, None, "", {})
+
+    @property
+    def headline(self) -> str:
+        """How many cases there are, and in how many methods fail by name."""
+        fail = sum(1 for found in self.findings.values() if found)
+        refused = f"; {len(self.refused)} refused" if self.refused else ""
+        return f"{len(self.cases)} cases, methods fail by name in {fail}{refused}"

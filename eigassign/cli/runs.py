@@ -246,44 +246,53 @@ def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
 @click.command(
     epilog=arguments.examples(
         "eigassign chart planar_arm.yaml --quick",
-        "eigassign chart planar_arm.yaml --quick --accuracy 1e-4",
+        "eigassign chart planar_arm.yaml --accuracy 1e-4",
+        "eigassign chart cases/stress --quick",
     )
 )
-@arguments.case
-@click.option(
-    "--quick", is_flag=True, help="Fewer methods, points and repeats: ten seconds to a minute."
-)
+@click.argument("cases", nargs=-1, required=True, type=arguments.PATH)
+@click.option("--quick", is_flag=True, help="Fewer sizes, points and repeats: some seconds a case.")
 @click.option(
     "--accuracy",
     type=arguments.ACCURACY,
-    help="Advise for this largest relative error (default: for several).",
+    help="The relative error that is wanted of a frequency (default: 0.01).",
 )
-@arguments.writing("results/<case>_chart")
+@arguments.writing("results/<case>_chart, or results/charts of several cases")
 @arguments.json
 @arguments.common
-def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
-    """Compare time and accuracy of all methods on one case.
+def chart(
+    cases: tuple[Path, ...], quick: bool, accuracy: float | None, as_json: bool, **how: Any
+) -> int:
+    """Chart speed against accuracy, and where methods fail.
 
-    Times exact solves, expansions and reduced models on this machine, and compares them with the
-    same exact frequencies; compares meshes. Writes figures,
-    chart.json and report.html, and says what to write in the case.
+    Every method is judged at points that none has seen, and timed on this machine. Names what
+    makes methods fail in the case, how far each may be trusted, and what to write. Several CASES,
+    or a folder of them, are put side by side.
     """
+    from eigassign.batch.plan import cases_in
+    from eigassign.chart.advice import headline
     from eigassign.chart.question import QUICK, Effort
-    from eigassign.chart.results import ACCURACIES
+    from eigassign.chart.results import ACCURACY
     from eigassign.output.console import print_tables, print_verdict
-    from eigassign.output.reports.chart import chart_tables, headline
-    from eigassign.pipeline import studies as charting
+    from eigassign.output.reports import chart as page
+    from eigassign.pipeline import charting
 
-    accuracies = ACCURACIES if how["accuracy"] is None else (how["accuracy"],)
-    effort = QUICK if quick else Effort()
+    effort, wanted = QUICK if quick else Effort(), accuracy or ACCURACY
+    several = len(cases) > 1 or cases[0].is_dir()
+    paths = cases_in(cases) if several else cases
     with reporting(how) as reporter:
-        folder, made = charting.chart(case, _options(how, reporter), effort, accuracies)
+        options = _options(how, reporter)
+        if several:
+            folder, matrix = charting.chart_cases(paths, options, effort, wanted)
+            line, tables, made = matrix.headline, page.matrix_tables(matrix), matrix
+        else:
+            folder, one = charting.chart(paths[0], options, effort, wanted)
+            line, tables, made = headline(one), page.chart_tables(one), one
         reporter.warn(made.warnings)
 
     def told() -> None:
-        print_verdict(headline(made) or "")
-        written = "What to write in the case"
-        print_tables(table for table in chart_tables(made) if table.title == written)
+        print_verdict(line)
+        print_tables(table for table in tables if table.section != "appendix")
 
     _show(as_json, folder, made, made.seconds, told)
     return 0

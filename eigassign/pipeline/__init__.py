@@ -6,7 +6,8 @@ Reading order:
     run      the paper's flowchart: case, model, expansion, assignment, verification
     queries  check a case, draw it; its frequencies at one point
     urdf     a robot from URDF as the content of a case
-    studies  measured frequencies to parameters; time against accuracy of every method
+    studies  measured frequencies to the parameters that explain them
+    charting speed against accuracy of every method, on one case or several
 """
 
 from eigassign.faces import face
@@ -14,9 +15,10 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
+        "charting": "chart_case chart_cases",
         "queries": "check draw modes",
         "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
         "stages": "Stages affordable_order expand_plan expansion_key silent",
-        "studies": "chart_case update_case",
+        "studies": "update_case",
     },
 )

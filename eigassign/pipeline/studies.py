@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eigassign.brief import cut
-from eigassign.chart.comparison import chart_meshes, compare_methods
-from eigassign.chart.question import Effort
-from eigassign.chart.results import ACCURACIES, Chart
-from eigassign.errors import AccuracyError
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.reports.chart import write_chart
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.reports.update import update_figures, update_tables, write_update
-from eigassign.pipeline.run import DEFAULT, Options, prepare
+from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks import truncation_notes
 from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 
@@ -82,41 +75,3 @@ def update_case(case: BuiltCase, options: Options = DEFAULT) -> Updated:
         with stages("checks", "checking mesh and neighbouring modes"):
             results = collect_update(problem, found, stages.timing_s)
     return Updated(results, BuiltCase(case.file.with_design(found.y)))
-
-
-def chart(
-    path: str | Path, options: Options, effort: Effort, accuracies: Sequence[float]
-) -> tuple[Path, Chart]:
-    """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
-    case = load_case(path, options.allow_outside)
-    with new_run_folder(case.file, options.out, options.force, "_chart") as folder:
-        made = chart_case(case, options, effort, accuracies)
-        options.progress("writing the chart")
-        write_chart(made, folder.hidden, options.figures, options.report)
-    return folder.path, made
-
-
-def chart_case(
-    case: BuiltCase, options: Options, effort: Effort, accuracies: Sequence[float] = ACCURACIES
-) -> Chart:
-    """Time against accuracy of every method on this case; nothing written.
-
-    Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
-    """
-    stages, progress = Stages(options.progress), options.progress
-    with case.located():
-        try:
-            scene = prepare(case, stages, None)
-        except AccuracyError:  # `auto` refuses, which the chart then says of the usual order
-            if case.file.expansion.order != "auto":
-                raise
-            usual = type(case.file.expansion)().order
-            scene = prepare(case, stages, None, order=int(usual))
-        with stages("methods", "charting methods"):
-            made = compare_methods(scene, effort, accuracies, progress)
-        with stages("mesh", "charting meshes"):
-            poses = scene.path.q[scene.path.spread(5)]
-            x = scene.model.x(poses, scene.initial)
-            mesh = chart_meshes(case.settled.file, x, scene.expansions.modes, effort)
-    notes = (*made.notes, *truncation_notes(scene))
-    return replace(made, mesh=mesh, notes=notes, seconds=stages.total_s)

@@ -56,6 +56,7 @@ class Curve:
     x: Floats | None = None
     end: str = ""
     names: tuple[str, ...] = ()  # of its points, where each has one
+    marks: tuple[str, ...] = ()  # written at its points
     hover: str = ""  # its name under the pointer, where it has no other
 
 

@@ -247,6 +247,8 @@ def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -
     at, look = shown.x if curve.x is None else curve.x, _line(curve.look)
     if at.size == 1 and not curve.look.marker:
         look["marker"] = "o"
+    for text, x, y in zip(curve.marks, at, panel.shown(curve), strict=False):
+        axes.annotate(text, (x, y), (3.0, 3.0), textcoords="offset points", size=7.0)
     if curve.look.area:
         axes.fill(at, curve.y, color=curve.look.area, zorder=above, clip_on=False)
     if shown.sheet and curve.end:

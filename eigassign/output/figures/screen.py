@@ -35,7 +35,7 @@ _DASHES = {
     "dash-dotted": "dashdot",
     "fine": "4px,4px",
 }
-_NAMED = "%{text}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
+_NAMED = "%{hovertext}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
 _MARKERS = {"o": "circle", "s": "square"}
 
 
@@ -165,7 +165,8 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     name = short(curve.hover or curve.label or curve.end or names.get(look, ""), 60)
     unit = panel.label.rpartition("[")[2].partition("]")[0] if "[" in panel.label else ""
     single = x.size == 1 and not look.marker
-    parts = [part for part, there in (("lines", look.width), ("markers", look.marker)) if there]
+    drawn = (("lines", look.width), ("markers", look.marker), ("text", curve.marks))
+    parts = [part for part, there in drawn if there]
     marker = {
         "symbol": _MARKERS.get(look.marker, "circle") + ("" if look.filled else "-open"),
         "size": look.size * 1.3,
@@ -186,7 +187,8 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
         "hovertemplate": f"%{{y:.4~g}} {unit}".rstrip()
         if not shown.x_logarithmic
         else "%{y:.3~g} at %{x:.3~g}",
-        **({"text": list(curve.names), "hovertemplate": _NAMED} if curve.names else {}),
+        **({"hovertext": list(curve.names), "hovertemplate": _NAMED} if curve.names else {}),
+        **({"text": list(curve.marks), "textposition": "top right"} if curve.marks else {}),
         **({} if name else {"hoverinfo": "skip", "hovertemplate": None}),
     }
 

@@ -1,161 +1,303 @@
-"""What a chart leaves: figures of time against error; its tables; chart.json and the report.
+"""What a chart leaves: errors against time and against the size of the box; tables; files.
 
-Every figure is a scatter over two logarithmic axes. Methods that differ by a setting are joined by
-a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
-names the kinds. A broad band joins the methods that no other beats.
+A colour is a kind of method, its orders or sizes stand at its points. What the front passes by is
+pale, not absent. Of several cases there is one picture of scenes × methods.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import cycle
+import csv
+import io
+import re
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from eigassign.chart.results import Chart, ChartPoint, Front, kind_of
-from eigassign.facts import capital
+from eigassign.chart.advice import headline
+from eigassign.chart.methods import CURVES, FULL, LINEAR, MESH
+from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Matrix
+from eigassign.facts import percent
 from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 
-BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
-RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
+WINE, OLIVE, BROWN = "#882255", "#999933", "#8a5a2b"
+COLOURS = dict(
+    zip(
+        CURVES,
+        (
+            *(graph.BLUE, graph.VERMILLION, graph.SKY, graph.GREEN, graph.PURPLE, graph.ORANGE),
+            *(WINE, OLIVE, graph.BLACK, graph.GREY, BROWN),
+        ),
+        strict=True,
+    )
+)
+WANTED = Look(graph.BLACK, 1.0, "fine")
+LEVELS = (  # of a heat map: up to which error or cost, how it looks and what it is called
+    (1e-6, "#1a6e3c", "≤ 0.0001 %"), (1e-4, "#56ae6b", "≤ 0.01 %"), (1e-2, "#c3dd8a", "≤ 1 %"),
+    (np.inf, "#d9694a", "over 1 %"),
+)  # fmt: skip
+COSTS = (
+    (0.01, "#1a6e3c", "≤ 1/100"), (0.1, "#56ae6b", "≤ 1/10"), (1.0, "#c3dd8a", "≤ 1"),
+    (np.inf, "#d9694a", "over 1"),
+)  # fmt: skip
+SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
+            "reach": "How far each method goes"}  # fmt: skip
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """The figures that this chart has something to show for; the time of a sample first."""
-    plans = [_front(chart, f) for f in sorted(chart.fronts, key=lambda f: bool(f.evaluations))]
-    plans += [_mesh(chart)] if chart.mesh else []
-    return tuple(plans)
+    """Error against time; where something varies, against the size of the box, and as claimed."""
+    return (_plane(chart), *((_boxes(chart), _claims(chart)) if chart.boxes else ()))
 
 
-def _front(chart: Chart, front: Front) -> FigurePlan:
-    """The methods by family, over the band through the best; what to write is ringed."""
-    asked, n = chart.asked, front.evaluations
-    what = "time of a sample" if n is None else f"set-up and {n:,.0f} evaluations"
-    name = "".join(c if c.isalnum() else "_" for c in front.name)
-    shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
+def _pale(colour: str) -> str:
+    """The colour on white, at a third."""
+    parts = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - (255 - part) / 3):02x}" for part in parts)
+
+
+def _mark(size: str) -> str:
+    """What is written at a point: the order, or the number of points, vectors, elements."""
+    return "".join(re.findall(r"\d+", size)[:1])
+
+
+def _plane(chart: Chart) -> FigurePlan:
+    """A panel for each number of trajectories that a preparation is spread over."""
+    asked, shown = chart.asked, [p for p in chart.points if p.worst_relative <= 1.0]
+    panels = list[Panel]()
+    for k, one in enumerate(chart.fronts):
+        n, marks = one.evaluations, list[Mark]()
+        marks.append(Rule(100.0 * asked.accuracy, WANTED, note="wanted"))
+        for curve in CURVES:
+            own = [p for p in shown if p.curve == curve]
+            best = [p for p in own if p.method in one.methods]
+            colour, shape = COLOURS[curve], "s" if curve == MESH else "o"
+            if own:
+                pale = Look(_pale(colour), 1.0, "solid", shape, 5.0)
+                marks.append(_curve(own, n, pale))
+            if own and not k:  # the legend shows full colours, in the first panel
+                marks.append(_curve(best, n, Look(colour, 0.0, "solid", shape, 7.0), curve))
+            elif best:
+                marks.append(_curve(best, n, Look(colour, 0.0, "solid", shape, 7.0)))
+        label = "one trajectory" if n == 1 else f"{n:,} trajectories"
+        panels.append(Panel(f"worst error [%], {label}", tuple(marks), 3.4, True, 14))
     lost = len(chart.points) - len(shown)
-    verb = "method is" if lost == 1 else "methods are"
-    beyond = f" {lost} {verb} wrong by over 100 % somewhere and not drawn." if lost else ""
     caption = (
-        f"Worst |f / f exact − 1| over {asked.random_points} random samples of trajectory × design "
-        f"box and {asked.designs} × {asked.samples_per_design} samples along the trajectory at "
-        "several designs. Filled: eigassign's; hollow: what people do without it; the band: no "
-        f"charted method is both quicker and more accurate.{beyond}"
+        f"Worst error of a frequency at {asked.test_points} test points that no method has seen, "
+        f"against the time of a trajectory of {asked.trajectory_samples} samples; what is prepared "
+        "is spread over 1, 100 and 10,000 trajectories. Numbers are orders, vectors, stations, "
+        "points, elements a link. Full colours: within what is wanted, and nothing is both quicker "
+        "and more accurate. Squares: the error of the mesh itself."
     )
-    floor = asked.floor_hz / asked.typical_hz
-
-    def curve(points: Sequence[ChartPoint], look: Look, label: str = "") -> Curve:
-        x = np.array([p.cost_s(n) for p in points])
-        y = np.array([100.0 * max(p.everywhere.worst_relative, floor) for p in points])
-        return Curve(y, look, label, x, names=tuple(p.method for p in points))
-
-    best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
-    ringed = [p for p in shown if p.method in {a.method for a in chart.advice[:1]}]
-    curves = [
-        (ours, curve([p for p in shown if p.family == family], PLAIN, kind_of(family)))
-        for family, ours in dict.fromkeys((p.family, p.ours) for p in shown)
-    ]
-    marks: list[Mark] = [
-        Rule(100.0 * floor, PLAIN, note="round-off of exact solves"),
-        curve(best, BAND),
-        *([curve(ringed, RING, "to write in the case")] if ringed else ()),
-        *_coloured(curves),
-    ]
-    room = (np.array([50.0 * floor]),)  # for the name of the level
-    heading = f"{capital(what)} against worst error"
-    alt = f"Scatter of worst error in % over {what} for all methods."
-    panel = Panel("worst error [%]", tuple(marks), 3.8, True, None, room)
-    section = "answer" if n is None else "appendix"
-    name = name if n is None else f"cost_{name}"
-    return FigurePlan(name, heading, caption, alt, _scatter(heading, "time [s]", panel), section)
+    caption += f" {lost} over 100 % are not drawn." if lost else ""
+    heading = "Error against time"
+    shows = Graph(heading, "time of a trajectory [s]", np.zeros(0), tuple(panels),
+                  x_logarithmic=True, beside=True)  # fmt: skip
+    return FigurePlan("plane", heading, caption, "Worst error over time.", shows, "answer")
 
 
-def _mesh(chart: Chart) -> FigurePlan:
-    """Error over elements; below, time over elements."""
+def _curve(points: Sequence[ChartPoint], n: float, look: Look, label: str = "") -> Curve:
+    y = np.array([100.0 * p.worst_relative for p in points])
+    x = np.array([p.cost_s(n) for p in points])
+    marks = tuple(_mark(p.size) for p in points) if not look.width else ()
+    names = tuple(f"{p.method}, rms {percent(p.rms_relative)}" for p in points)
+    return Curve(y, look, label, x, names=names, marks=marks)
+
+
+def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
+    """A colour for each kind of method, dashes for its orders."""
+    looks, dashes = dict[str, Look](), ("dotted", "dash-dotted", "dashed", "solid")
+    for method in dict.fromkeys(row.method for row in rows):
+        kind = next(c for c in sorted(CURVES, key=len, reverse=True) if method.startswith(c))
+        count = sum(1 for look in looks.values() if look.colour == COLOURS[kind])
+        looks[method] = Look(
+            COLOURS[kind], 1.4, dashes[count % 4] if kind in (FULL, LINEAR) else "solid", "o", 4.0
+        )
+    return looks
+
+
+def _boxes(chart: Chart) -> FigurePlan:
+    """Worst error over half-width, a panel for q, y and both."""
+    looks, panels = _looks(chart.boxes), list[Panel]()
+    for varied in dict.fromkeys(row.varied for row in chart.boxes):
+        marks: list[Mark] = [Rule(100.0 * chart.asked.accuracy, WANTED, note="wanted")]
+        for method, look in looks.items():
+            own = [r for r in chart.boxes if (r.method, r.varied) == (method, varied)]
+            y = np.array([100.0 * r.worst_relative for r in own])
+            x, label = np.array([r.half_width for r in own]), "" if panels else method
+            marks.append(Curve(np.where(y <= 1e4, y, np.nan), look, label, x))
+        panels.append(Panel(f"worst error [%] over {varied}", tuple(marks), 3.0, True, 14))
+    heading = "Error against the size of the box"
     caption = (
-        "Worst error of exact frequencies against the limit that the meshes converge to, "
-        f"extrapolated from the two finest ({chart.mesh[-1].elements} elements)."
+        "Worst error where poses, designs or both keep within a part of the case's ranges about "
+        "the point of expansion; 1 is all of them. Where a curve passes the line, its method is "
+        "no longer as accurate as wanted."
     )
-    for row in [row for row in chart.mesh if row.factor == 1.0]:
-        own = f"The case's own mesh ({row.elements} elements)"
-        caption += f" {own} is {row.worst_hz:.3g} Hz from the limit."
-    rows = [(row.elements, row.worst_hz, row.solve.median_s) for row in chart.mesh if row.worst_hz]
-    counts, *values = np.array(rows, dtype=np.float64).T
-    heading = "Elements against discretisation error"
-    above, below = (Curve(y, Look(graph.BLUE, 0.9, marker="o"), x=counts) for y in values)
-    panels = (
-        Panel("worst error [Hz]", (above,), 3.8, True, None),
-        Panel("exact solve [s]", (below,), 2.0, True, None),
+    shows = Graph(heading, "half-width of the ranges", np.zeros(0), tuple(panels),
+                  x_logarithmic=True, beside=True)  # fmt: skip
+    return FigurePlan("boxes", heading, caption, "Worst error over half-width.", shows, "reach")
+
+
+def _claims(chart: Chart) -> FigurePlan:
+    """What methods say of their own error, over what is true."""
+    rows = [r for r in chart.boxes if r.claimed is not None and r.worst_relative < 1.0]
+    marks: list[Mark] = []
+    for method, look in _looks(chart.boxes).items():
+        own = [r for r in rows if r.method == method and r.claimed]
+        x = 100.0 * np.array([r.worst_relative for r in own])
+        y = 100.0 * np.array([r.claimed for r in own], dtype=np.float64)
+        if own:
+            marks.append(Curve(y, Look(look.colour, 0.0, "solid", "o", 4.0), method, x))
+    ends = np.array([1e-12, 1e2])
+    marks.append(Curve(ends, WANTED, "claimed = true", ends))
+    heading = "Claimed and true errors"
+    caption = (
+        "In every box: the share of a series' last degree, or Kriging's own deviation, against the "
+        "worst error that was measured. Below the diagonal a method is surer than it should be."
     )
-    alt = "Discretisation error in Hz over the number of elements."
-    return FigurePlan("mesh", heading, caption, alt, _scatter(heading, "elements", *panels))
-
-
-def _scatter(title: str, x: str, *panels: Panel) -> Graph:
-    return Graph(title, x, np.zeros(0), panels, x_logarithmic=True, beside=True)
-
-
-def _coloured(curves: Sequence[tuple[bool, Curve]]) -> Iterator[Curve]:
-    """The others first, hollow and dashed; of one label all look alike, and one has it."""
-    names = dict.fromkeys(curve.label for _, curve in curves)
-    colours = dict(zip(names, cycle(graph.SERIES), strict=False))
-    named = set[tuple[bool, str]]()
-    for ours, curve in sorted(curves, key=lambda pair: pair[0]):
-        dash, marker = ("solid", "o") if ours else ("fine", "s")
-        look = Look(colours[curve.label], 0.9, dash, marker, 6.0, ours)
-        yield replace(curve, look=look, label="" if (ours, curve.label) in named else curve.label)
-        named.add((ours, curve.label))
-
-
-def headline(chart: Chart) -> str | None:
-    """What to write in the case, in a sentence; None where no advice is asked for."""
-    return f"{capital(chart.advice[0].words)}." if chart.advice else None
+    panel = Panel("claimed error [%]", tuple(marks), 4.0, True, 16)
+    shows = Graph(heading, "worst error [%]", np.zeros(0), (panel,), x_logarithmic=True,
+                  beside=True)  # fmt: skip
+    return FigurePlan("claims", heading, caption, "Claimed error over true error.", shows, "reach")
 
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
-    """The tables that have rows."""
+    """The tables that have rows; the findings and what to write first."""
     return tuple(table for table in _tables(chart) if table.rows)
 
 
 def _tables(chart: Chart) -> Iterator[Table]:
-    """What to write, all methods, and mesh."""
-    names = "accuracy key worst_relative sample_s"
-    yield facts_table("What to write in the case", chart.advice, names)
-    names = (
-        "method offline online exact_solves everywhere.worst_hz everywhere.rms_hz "
-        "trajectory.worst_hz everywhere.failed break_even use"
-    )
-    points = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
+    names = "kind where modes gap methods why instead"
+    yield _in("fails", facts_table(SECTIONS["fails"], chart.findings, names))
+    yield _in("write", facts_table(SECTIONS["write"], chart.advice, "question words"))
+    table = facts_table("What optimize makes of each order", chart.orders, "order moved one_shot")
+    yield _in("write", table)
+    limited = [row for row in chart.reach if row.half_width < 1.0]
     caption = (
-        'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
-        "number of evaluations from which it beats exact solves."
+        f"To {percent(chart.asked.accuracy)}; methods that are not here hold all of the ranges."
     )
+    names = "method varied half_width error_at_all"
+    yield _in("reach", facts_table(SECTIONS["reach"], limited, names, caption))
+    names = (
+        "method preparation_s trajectory_s spread_s worst_relative rms_relative worst_by_shape "
+        "failed use"
+    )
+    points = sorted(chart.points, key=lambda p: p.worst_relative)
+    clock = f"{chart.asked.clock_s:.0e} s"
+    caption = f"Least processor time of repeats in turns; the clock resolves {clock}."
     yield facts_table("All methods", points, names, caption)
-    names = "elements factor n_dof worst_hz worst_relative order solve"
-    caption = "Against the limit extrapolated from the two finest; factor 1 is the case's own mesh."
-    yield facts_table("Mesh", chart.mesh, names, caption)
+    names = "method varied half_width worst_relative claimed"
+    yield facts_table("All boxes", chart.boxes, names)
+    yield Table("Left out", ("method", "why"), chart.skipped)
     m = dict(chart.machine)
-    m["linear algebra"] = f"{m.pop('blas')}, threads: {m.pop('threads')}"
     m["versions"] = ", ".join(f"{name} {version}" for name, version in m["versions"].items())
     yield Table("Machine", ("", ""), tuple((name, str(value)) for name, value in m.items()))
+
+
+def _in(section: str, table: Table) -> Table:
+    return Table(table.title, table.columns, table.rows, table.caption, section)
 
 
 def write_chart(
     chart: Chart, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
 ) -> None:
-    """Into ``folder``, which must exist: chart.json, a report of this kind, the figures.
-
-    Every point in chart.json can be computed again from its parameters.
-    """
+    """Into ``folder``, which must exist: chart.json, a report of this kind, the figures."""
     data = f"{dumps(results_document(chart, may_lack=True))}\n".encode()
-    tone = "good" if any(a.key for a in chart.advice[:1]) else "fair"
+    tone = "fair" if chart.findings else "good"
     report.write_page(
         chart, chart_tables(chart), chart_figures(chart), folder, formats, kind,
-        ("chart.json", data), line=headline(chart), tone=tone,
+        ("chart.json", data), line=headline(chart), tone=tone, headings=SECTIONS,
+    )  # fmt: skip
+
+
+# --- Several cases
+
+
+def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
+    """Two heat maps: errors at equal cost, costs at equal accuracy."""
+    wanted = percent(matrix.accuracy)
+    return (
+        _heat(matrix, "errors", "Worst error for the time of exact solves", LEVELS,
+              lambda cell: cell.error_at_equal_cost),
+        _heat(matrix, "costs", f"Time for {wanted}, of that of exact solves", COSTS,
+              lambda cell: cell.cost_at_equal_accuracy),
+    )  # fmt: skip
+
+
+def _heat(matrix: Matrix, name: str, heading: str, levels: Sequence[tuple[float, str, str]],
+          value: Callable[[Cell], float | None]) -> FigurePlan:  # fmt: skip
+    cells = [(CURVES.index(c.curve) + 1.0, -float(matrix.cases.index(c.case)), c, value(c))
+             for c in matrix.cells]  # fmt: skip
+    marks: list[Mark] = []
+    for k, (_, colour, label) in enumerate((*levels, (0.0, "#e9e9e9", "no answer"))):
+        own = [each for each in cells if k == _level(each[3], levels)]
+        at, below = (np.array([each[axis] for each in own]) for axis in (0, 1))
+        names = tuple(
+            f"{c.case}: {c.curve}, {'–' if v is None else f'{v:.2g}'}" for *_, c, v in own
+        )
+        marks.append(Curve(below, Look(colour, 0.0, "solid", "s", 15.0), label, at, names=names))
+    failing = [c for c in matrix.cases if matrix.findings[c]]
+    at = np.array([-float(matrix.cases.index(c)) for c in failing])
+    kinds = tuple(", ".join(dict.fromkeys(f.kind for f in matrix.findings[c])) for c in failing)
+    look = Look(graph.VERMILLION, 0.0, "solid", "o", 6.0)
+    marks.append(Curve(at, look, "something fails by name", np.zeros(len(at)), names=kinds))
+    columns = "; ".join(f"{k}: {curve}" for k, curve in enumerate(CURVES, 1))
+    caption = f"Columns: {columns}. Preparations are spread over {matrix.evaluations} trajectories."
+    room = np.array([0.6, -len(matrix.cases) + 0.4])
+    panel = Panel(
+        "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
+    )
+    shows = Graph(heading, "method", np.zeros(0), (panel,), (-0.6, len(CURVES) + 0.6))
+    return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
+
+
+def _level(value: float | None, levels: Sequence[tuple[float, str, str]]) -> int:
+    if value is None:
+        return len(levels)
+    return next(k for k, (most, *_) in enumerate(levels) if value <= most or k == len(levels) - 1)
+
+
+def matrix_tables(matrix: Matrix) -> tuple[Table, ...]:
+    """What fails, by case; errors and costs, cases × methods; what was refused."""
+    rows = [
+        (c, f.kind, f.where, f.methods, f.instead) for c in matrix.cases for f in matrix.findings[c]
+    ]
+    tables = [
+        _in(
+            "fails",
+            Table(SECTIONS["fails"], ("case", "what", "where", "fail", "instead"), tuple(rows)),
+        )
+    ]
+    for title, value in (("Errors at equal cost", _error), ("Costs at equal accuracy", _cost)):
+        found = {(c.case, c.curve): value(c) for c in matrix.cells}
+        body = tuple((c, *(found[c, curve] for curve in CURVES)) for c in matrix.cases)
+        tables.append(Table(title, ("case", *CURVES), body))
+    tables.append(_in("fails", Table("Refused", ("case", "why"), matrix.refused)))
+    return tuple(table for table in tables if table.rows)
+
+
+def _error(cell: Cell) -> str:
+    return "" if cell.error_at_equal_cost is None else f"{cell.error_at_equal_cost:.1e}"
+
+
+def _cost(cell: Cell) -> str:
+    return "" if cell.cost_at_equal_accuracy is None else f"{cell.cost_at_equal_accuracy:.2g}"
+
+
+def write_matrix(
+    matrix: Matrix, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
+) -> None:
+    """Into ``folder``: matrix.json, matrix.csv, a report of this kind, the heat maps."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = ("case", "curve", "error_at_equal_cost", "cost_at_equal_accuracy")
+    writer.writerows([names, *([getattr(c, name) for name in names] for c in matrix.cells)])
+    (folder / "matrix.csv").write_text(text.getvalue(), encoding="utf-8")
+    data = f"{dumps(results_document(matrix, may_lack=True))}\n".encode()
+    report.write_page(
+        matrix, matrix_tables(matrix), matrix_figures(matrix), folder, formats, kind,
+        ("matrix.json", data), line=matrix.headline, tone="fair", headings=SECTIONS,
     )  # fmt: skip

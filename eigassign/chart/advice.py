@@ -1,0 +1,92 @@
+"""What to write for which question, with the consequence measured; several cases side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from eigassign._version import __version__
+from eigassign.chart.methods import CURVES, EXACT, FULL, LINEAR, MESH
+from eigassign.chart.results import Advice, Cell, Chart, ChartPoint, Matrix, OrderRow, machine
+from eigassign.facts import capital, percent, time_in_words
+
+EQUAL = 100  # trajectories over which preparations are spread where cases are compared
+
+
+def advised(chart: Chart, orders: Sequence[OrderRow] = ()) -> Chart:
+    """The chart with what to write; ``orders`` is what `optimize` makes of each order."""
+    return replace(chart, orders=tuple(orders), advice=tuple(_advise(chart, orders)))
+
+
+def headline(chart: Chart) -> str:
+    """How good the paper's method is here, how far it goes, and what to write, in sentences."""
+    paper = [p for p in chart.points if p.curve == LINEAR]
+    said = [finding.kind for finding in chart.findings]
+    lines = [f"{capital(said[0])} found: see what fails."] if said else []
+    if paper:
+        best = min(paper, key=lambda p: p.worst_relative)
+        line = f"The paper's method, series linearised in y, is {percent(best.worst_relative)} off"
+        line += f" at worst ({best.size})"
+        reach = [r for r in chart.reach if r.method.startswith(LINEAR) and r.half_width < 1.0]
+        reach = [r for r in reach if r.method.endswith("order 4")]
+        wanted = percent(chart.asked.accuracy)
+        far = "; ".join(f"{r.half_width:.2g} of the ranges of {r.varied}" for r in reach)
+        line += f"; order 4 is within {wanted} up to {far}." if far else "."
+        lines.append(line)
+    lines += [f"{one.words[:1].upper()}{one.words[1:]}." for one in chart.advice if one.key]
+    return " ".join(lines)
+
+
+def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
+    accuracy, wanted = chart.asked.accuracy, percent(chart.asked.accuracy)
+    if orders:
+        moved = max((row.moved for row in orders if row.moved is not None), default=0.0)
+        shots = ", ".join(percent(o.one_shot) for o in orders if o.one_shot is not None)
+        names = ", ".join(str(row.order) for row in orders)
+        words = f"nothing: the design is the same to {moved:.0e} of the bounds for orders {names}"
+        words += ", since the search solves exactly"
+        words += f"; the one shot is off by {shots}" if shots else ""
+        yield Advice("a design (`optimize`)", words)
+    able = [p for p in chart.points if p.worst_relative <= accuracy]
+    full = [p for p in able if p.curve == FULL][:1]
+    series = any(p.curve == FULL for p in chart.points)
+    for p in full:
+        key = p.size.replace("order ", "order: ")
+        words = f"write `{key}` under `expansion`: {percent(p.worst_relative)} off at worst"
+        yield Advice("the series (`expand`)", words, key)
+    if series and not full:
+        words = f"solve exactly: no series that was charted is within {wanted}"
+        yield Advice("the series (`expand`)", words)
+    for method in chart.fronts[-1].methods[:1]:
+        p = next(p for p in able if p.method == method)
+        words = f"{p.method}, {percent(p.worst_relative)} off, {time_in_words(p.trajectory_s)} a "
+        words += f"trajectory: `{p.use}`" if p.use else "trajectory: `model.frequencies(q, y)`"
+        yield Advice("thousands of evaluations elsewhere", words)
+    for p in [p for p in able if p.curve == MESH and p.use][:1]:
+        key = p.use.partition(",")[0]
+        words = f"write `{key}` for every link: {percent(p.worst_relative)} from the finest mesh"
+        yield Advice("the mesh", words, key)
+
+
+def build_matrix(
+    charts: Mapping[str, Chart], refused: Mapping[str, str], accuracy: float, seconds: float
+) -> Matrix:
+    """Scenes × methods: errors at equal cost, that of exact solves, and costs at equal accuracy."""
+    cells = [Cell(name, k, *_cell(chart, k)) for name, chart in charts.items() for k in CURVES]
+    return Matrix(
+        version=__version__, accuracy=accuracy, evaluations=EQUAL, machine=machine(),
+        cases=tuple(charts), cells=tuple(cells), refused=tuple(refused.items()),
+        findings={name: chart.findings for name, chart in charts.items()}, seconds=seconds,
+    )  # fmt: skip
+
+
+def _cell(chart: Chart, curve: str) -> tuple[float | None, float | None]:
+    own = [p for p in chart.points if p.curve == curve]
+    exact_s = min(p.cost_s(EQUAL) for p in chart.points if p.curve == EXACT)
+
+    def cost(p: ChartPoint) -> float:
+        return p.cost_s(EQUAL) / exact_s
+
+    cheap = [p.worst_relative for p in own if cost(p) <= 1.0 or curve == EXACT]
+    right = [cost(p) for p in own if p.worst_relative <= chart.asked.accuracy]
+    return min(cheap, default=None), min(right, default=None)

@@ -1,0 +1,98 @@
+"""Speed against accuracy of every method, on one case or side by side on several."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from eigassign.chart.advice import advised, build_matrix
+from eigassign.chart.comparison import compare_methods
+from eigassign.chart.question import Effort
+from eigassign.chart.results import ACCURACY, Chart, Matrix, OrderRow
+from eigassign.errors import EigassignError, UsageError
+from eigassign.output.reports.chart import write_chart, write_matrix
+from eigassign.output.store.run_folder import run_folder
+from eigassign.pipeline.run import DEFAULT, Options, solve_case
+from eigassign.pipeline.stages import Stages, new_run_folder
+from eigassign.study.built_case import BuiltCase, load_case
+
+TRIED = (1, 2, 4, 8)  # orders of which optimize is asked
+SOLVED_DOF = 400  # up to which it is
+
+
+def chart(
+    path: str | Path, options: Options, effort: Effort, accuracy: float = ACCURACY
+) -> tuple[Path, Chart]:
+    """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
+    case = load_case(path, options.allow_outside)
+    with new_run_folder(case.file, options.out, options.force, "_chart") as folder:
+        made = chart_case(case, options, effort, accuracy)
+        options.progress("writing the chart")
+        write_chart(made, folder.hidden, options.figures, options.report)
+    return folder.path, made
+
+
+def chart_case(
+    case: BuiltCase, options: Options, effort: Effort, accuracy: float = ACCURACY
+) -> Chart:
+    """Speed against accuracy on this case, and what to write; nothing written.
+
+    Raises CaseError for what cannot be modelled.
+    """
+    stages = Stages(options.progress)
+    with case.located(), stages("methods", "charting methods"):
+        made = compare_methods(case, effort, accuracy, options.progress)
+        orders = list(_orders(case, made, options))
+    return replace(advised(made, orders), seconds=stages.total_s)
+
+
+def _orders(case: BuiltCase, made: Chart, options: Options) -> Iterator[OrderRow]:
+    """What `optimize` makes of the orders, where something is asked of a model of modest size."""
+    file = case.file
+    if not (file.has_question and file.design.parameters and made.asked.n_dof <= SOLVED_DOF):
+        return
+    found = dict[int, tuple[dict[str, float], float | None]]()
+    for order in (p for p in TRIED if any(each.size == f"order {p}" for each in made.points)):
+        options.progress(f"optimizing with order {order}")
+        expansion = file.expansion.model_copy(update={"order": order})
+        try:
+            quiet = replace(DEFAULT, use_cache=False, report="none", study="none")
+            result = solve_case(BuiltCase(replace(file, expansion=expansion)), quiet)
+        except EigassignError:
+            continue
+        shot = result.results.error and result.results.error.one_shot
+        found[order] = dict(result.design), shot.max_relative if shot else None
+    width = {k: (p.max - p.min) or 1.0 for k, p in file.design.parameters.items()}
+    last = next(reversed(found.values()), ({}, None))[0]
+    for order, (design, shot) in found.items():
+        moved = max((abs(design[k] - last[k]) / width[k] for k in last), default=0.0)
+        yield OrderRow(order, moved, shot)
+
+
+def chart_cases(
+    paths: Sequence[Path], options: Options, effort: Effort, accuracy: float = ACCURACY
+) -> tuple[Path, Matrix]:
+    """Scenes × methods in one folder: matrix.json, matrix.csv, report.html, heat maps.
+
+    A case that cannot be charted is told with the reason, and does not stop the others.
+    """
+    target = options.out or Path("results", "charts")
+    stages, charts, refused = Stages(options.progress), dict[str, Chart](), dict[str, str]()
+    common = Path(os.path.commonpath([path.absolute().parent for path in paths]))
+    with run_folder(target, case_path=common, key="charts", force=options.force) as hidden:
+        for k, path in enumerate(paths, 1):
+            name = path.stem if path.stem not in charts else str(path)
+            with stages(name, f"{name} ({k} of {len(paths)})"):
+                try:
+                    case = load_case(path, options.allow_outside)
+                    with case.located():
+                        charts[name] = advised(compare_methods(case, effort, accuracy))
+                except EigassignError as error:
+                    refused[name] = str(error)
+        if not charts:
+            raise UsageError("none of the cases can be charted: " + next(iter(refused.values())))
+        made = build_matrix(charts, refused, accuracy, stages.total_s)
+        write_matrix(made, hidden, options.figures, options.report)
+    return target, made
