@@ -43,8 +43,9 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
         moved = max((row.moved for row in orders if row.moved is not None), default=0.0)
         shots = ", ".join(percent(o.one_shot) for o in orders if o.one_shot is not None)
         names = ", ".join(str(row.order) for row in orders)
-        words = f"nothing: the design is the same to {moved:.0e} of the bounds for orders {names}"
-        words += ", since the search solves exactly"
+        same = f"to {moved:.0e} of the bounds" if moved > 1e-12 else "to the last digit"
+        words = f"nothing: the design is the same {same} for orders {names}, since the search "
+        words += "solves exactly"
         words += f"; the one shot is off by {shots}" if shots else ""
         yield Advice("a design (`optimize`)", words)
     able = [p for p in chart.points if p.worst_relative <= accuracy]
@@ -63,9 +64,8 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
         words += f"trajectory: `{p.use}`" if p.use else "trajectory: `model.frequencies(q, y)`"
         yield Advice("thousands of evaluations elsewhere", words)
     for p in [p for p in able if p.curve == MESH and p.use][:1]:
-        key = p.use.partition(",")[0]
-        words = f"write `{key}` for every link: {percent(p.worst_relative)} from the finest mesh"
-        yield Advice("the mesh", words, key)
+        words = f"write `{p.use}` for every link: {percent(p.worst_relative)} from the finest mesh"
+        yield Advice("the mesh", words, p.use)
 
 
 def build_matrix(

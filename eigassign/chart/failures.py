@@ -33,8 +33,7 @@ WHY = {
     "no series of one of them converges",
     "repeated modes": "their shapes are not unique: they are expanded together",
     "too few samples to see a kink": "they see nothing between the points they learn from",
-    "straight or folded arm": "joint angles have no derivative with respect to the tip, and beyond "
-    "there is no pose",
+    "radius of convergence": "a higher order is worse than a lower one: beyond it terms grow",
     "singular": "the mechanism has no modes there: a dead point, or a part that nothing holds",
     "basis without the mode": "a mode that comes down among poses and designs is in no vector",
 }
@@ -166,14 +165,13 @@ def _serves(points: Sequence[ChartPoint], accuracy: float) -> str:
 
 
 def _some(names: Sequence[str]) -> str:
-    """Names of methods, those of one curve together: ``Taylor: order 1, order 2``."""
+    """Names of methods, those of one curve together: ``Taylor: order 1 to order 8``."""
     kinds: dict[str, list[str]] = {}
     for name in names:
         curve, _, size = name.rpartition(", ")
         kinds.setdefault(curve, []).append(size)
-    return "; ".join(
-        f"{curve}: {', '.join(own)}".removeprefix(": ") for curve, own in kinds.items()
-    )
+    shown = {k: own if len(own) < 3 else [f"{own[0]} to {own[-1]}"] for k, own in kinds.items()}
+    return "; ".join(f"{k}: {', '.join(own)}".removeprefix(": ") for k, own in shown.items())
 
 
 def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, list[str]]]:
@@ -183,5 +181,6 @@ def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, 
     for varied, h in dict.fromkeys((r.varied, r.half_width) for r in boxes) if orders[1:] else ():
         lower, higher = (errors[varied, h, method] for method in orders[-2:])
         if higher > accuracy and not higher < lower:
-            yield f"from {h:g} of the ranges of {varied} on", orders[-1:]
+            far = f"from {h:g} of the ranges of {varied} on" if h < 1.0 else f"all over {varied}"
+            yield far, orders[-1:]
             return

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.chart.question import Effort, Points, Subject
-from eigassign.errors import AccuracyError, EigassignError
+from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.assembly.build import refined
 from eigassign.modal.exact.dense import condense
 from eigassign.modal.expansion import NearestExpansion, expand
@@ -66,7 +66,7 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
     """All methods but meshes, exact solvers first."""
     kind = "dense" if subject.model.pencil.is_dense else "sparse"
     yield Method(EXACT, kind, lambda _: Built(lambda points: subject.exact(points.x)))
-    yield Method(SCIPY, "one by one", lambda _: Built(partial(_by_scipy, subject)))
+    yield Method(SCIPY, "one by one", partial(_scipy, subject))
     if subject.rows or subject.changes:
         yield from _series(subject, effort)
         for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
@@ -83,13 +83,17 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
 # --- Exact solves by others
 
 
+def _scipy(subject: Subject, _: Points) -> Built:
+    if subject.model.n_dof > SCIPY_DOF:
+        raise UsageError(f"its dense solver is not tried with {subject.model.n_dof} unknowns")
+    return Built(partial(_by_scipy, subject))
+
+
 def _by_scipy(subject: Subject, points: Points) -> Floats:
     """Frequencies (n, n_modes) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
     from scipy.linalg import eigh
 
     pencil, highest = subject.model.pencil, max(subject.modes)
-    if pencil.n_dof > SCIPY_DOF:
-        raise EigassignError(f"its dense solver is not tried with {pencil.n_dof} unknowns")
     elastic, mu = pencil.elastic, np.full((len(points), highest), np.nan)
     which = [len(elastic) - highest, len(elastic) - 1]
     for k, x in enumerate(points.x):

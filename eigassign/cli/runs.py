@@ -16,6 +16,7 @@ from eigassign.cli.arguments import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
+    from eigassign.chart.results import Chart, Matrix
     from eigassign.pipeline.run import Options, Outcome
     from eigassign.study.results import ValidationRow
 
@@ -282,12 +283,13 @@ def chart(
     paths = cases_in(cases) if several else cases
     with reporting(how) as reporter:
         options = _options(how, reporter)
+        made: Chart | Matrix
         if several:
-            folder, matrix = charting.chart_cases(paths, options, effort, wanted)
-            line, tables, made = matrix.headline, page.matrix_tables(matrix), matrix
+            folder, made = charting.chart_cases(paths, options, effort, wanted)
+            line, tables = made.headline, page.matrix_tables(made)
         else:
-            folder, one = charting.chart(paths[0], options, effort, wanted)
-            line, tables, made = headline(one), page.chart_tables(one), one
+            folder, made = charting.chart(paths[0], options, effort, wanted)
+            line, tables = headline(made), page.chart_tables(made)
         reporter.warn(made.warnings)
 
     def told() -> None:

@@ -62,13 +62,13 @@ def _orders(case: BuiltCase, made: Chart, options: Options) -> Iterator[OrderRow
             result = solve_case(BuiltCase(replace(file, expansion=expansion)), quiet)
         except EigassignError:
             continue
-        shot = result.results.error and result.results.error.one_shot
+        shot = result.results.error.one_shot if result.results.error else None
         found[order] = dict(result.design), shot.max_relative if shot else None
     width = {k: (p.max - p.min) or 1.0 for k, p in file.design.parameters.items()}
     last = next(reversed(found.values()), ({}, None))[0]
-    for order, (design, shot) in found.items():
+    for order, (design, off) in found.items():
         moved = max((abs(design[k] - last[k]) / width[k] for k in last), default=0.0)
-        yield OrderRow(order, moved, shot)
+        yield OrderRow(order, moved, off)
 
 
 def chart_cases(

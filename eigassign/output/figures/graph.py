@@ -247,7 +247,7 @@ def spread(wanted: Floats | Sequence[float], gap: float) -> list[float]:
 def power(value: float) -> str:
     """A power of ten as people read it: ``0.01``, ``10⁻⁷``."""
     exponent = round(math.log10(value))
-    if -4 <= exponent <= 4:
+    if -3 <= exponent <= 4:
         return f"{10.0**exponent:g}"
     return "10" + str(exponent).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
 

@@ -152,7 +152,7 @@ def _graph(shown: Graph) -> Figure:
         panels[0].set_xlim(shown.x_limits)
     if shown.x_logarithmic:
         own = [curve.x for panel in shown.panels for curve in panel.curves if curve.x is not None]
-        _logarithmic(panels[0], "x", graph.decades(own))
+        _logarithmic(panels[0], "x", shown.x_limits or graph.decades(own))
     handles: list[Any] = []
     for axes, panel in zip(panels, shown.panels, strict=True):
         _ordinate(axes, panel)
@@ -248,7 +248,8 @@ def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -
     if at.size == 1 and not curve.look.marker:
         look["marker"] = "o"
     for text, x, y in zip(curve.marks, at, panel.shown(curve), strict=False):
-        axes.annotate(text, (x, y), (3.0, 3.0), textcoords="offset points", size=7.0)
+        how: dict[str, Any] = {"color": curve.look.colour, "size": 7.0}
+        axes.annotate(text, (x, y), (3.0, 3.0), textcoords="offset points", **how)
     if curve.look.area:
         axes.fill(at, curve.y, color=curve.look.area, zorder=above, clip_on=False)
     if shown.sheet and curve.end:

@@ -123,7 +123,7 @@ def _whole(shown: Graph) -> dict[str, list[float | None]]:
 def _abscissa(shown: Graph) -> Json:
     if shown.x_logarithmic:
         own = [c.x for panel in shown.panels for c in panel.curves if c.x is not None]
-        return _decades(graph.decades(own))
+        return _decades(shown.x_limits or graph.decades(own))
     if shown.x_limits is not None:
         return {"range": _numbers(shown.x_limits)}
     low, high = (shown.x.min(), shown.x.max()) if shown.x.size else (0.0, 1.0)

@@ -73,6 +73,7 @@ def _plane(chart: Chart) -> FigurePlan:
         marks.append(Rule(100.0 * asked.accuracy, WANTED, note="wanted"))
         for curve in CURVES:
             own = [p for p in shown if p.curve == curve]
+            own.sort(key=lambda p: p.worst_relative * (p.curve == MESH))  # one is the case's own
             best = [p for p in own if p.method in one.methods]
             colour, shape = COLOURS[curve], "s" if curve == MESH else "o"
             if own:
@@ -102,9 +103,8 @@ def _plane(chart: Chart) -> FigurePlan:
 def _curve(points: Sequence[ChartPoint], n: float, look: Look, label: str = "") -> Curve:
     y = np.array([100.0 * p.worst_relative for p in points])
     x = np.array([p.cost_s(n) for p in points])
-    marks = tuple(_mark(p.size) for p in points) if not look.width else ()
     names = tuple(f"{p.method}, rms {percent(p.rms_relative)}" for p in points)
-    return Curve(y, look, label, x, names=names, marks=marks)
+    return Curve(y, look, label, x, names=names, marks=tuple(_mark(p.size) for p in points))
 
 
 def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
@@ -136,7 +136,7 @@ def _boxes(chart: Chart) -> FigurePlan:
         "the point of expansion; 1 is all of them. Where a curve passes the line, its method is "
         "no longer as accurate as wanted."
     )
-    shows = Graph(heading, "half-width of the ranges", np.zeros(0), tuple(panels),
+    shows = Graph(heading, "half-width of the ranges", np.zeros(0), tuple(panels), (0.008, 1.25),
                   x_logarithmic=True, beside=True)  # fmt: skip
     return FigurePlan("boxes", heading, caption, "Worst error over half-width.", shows, "reach")
 

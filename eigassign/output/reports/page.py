@@ -36,7 +36,7 @@ from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetSt
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-    from eigassign.chart.results import Chart
+    from eigassign.chart.results import Chart, Matrix
     from eigassign.study.updating.fit import UpdateResults
 
 Floats = NDArray[np.float64]
@@ -249,7 +249,7 @@ class Shown:
 
 
 def page(
-    f: RunResults | Chart | UpdateResults,
+    f: RunResults | Chart | Matrix | UpdateResults,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
@@ -366,7 +366,7 @@ def write_run(
 
 
 def write_page(
-    f: RunResults | Chart | UpdateResults,
+    f: RunResults | Chart | Matrix | UpdateResults,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     folder: Path,
