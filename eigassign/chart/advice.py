@@ -7,8 +7,17 @@ from dataclasses import replace
 
 from eigassign._version import __version__
 from eigassign.chart.methods import CURVES, EXACT, FULL, LINEAR, MESH
-from eigassign.chart.results import Advice, Cell, Chart, ChartPoint, Matrix, OrderRow, machine
-from eigassign.facts import capital, percent, time_in_words
+from eigassign.chart.results import (
+    EVALUATIONS,
+    Advice,
+    Cell,
+    Chart,
+    ChartPoint,
+    Matrix,
+    OrderRow,
+    machine,
+)
+from eigassign.facts import percent, time_in_words
 
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 
@@ -21,8 +30,10 @@ def advised(chart: Chart, orders: Sequence[OrderRow] = ()) -> Chart:
 def headline(chart: Chart) -> str:
     """How good the paper's method is here, how far it goes, and what to write, in sentences."""
     paper = [p for p in chart.points if p.curve == LINEAR]
-    said = [finding.kind for finding in chart.findings]
-    lines = [f"{capital(said[0])} found: see what fails."] if said else []
+    said = dict.fromkeys(
+        f.kind for f in chart.findings if f.kind not in ("refused", "out of memory")
+    )
+    lines = [f"Found: {', '.join(said)}."] if said else []
     if paper:
         best = min(paper, key=lambda p: p.worst_relative)
         line = f"The paper's method, series linearised in y, is {percent(best.worst_relative)} off"
@@ -58,11 +69,10 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
     if series and not full:
         words = f"solve exactly: no series that was charted is within {wanted}"
         yield Advice("the series (`expand`)", words)
-    for method in chart.fronts[-1].methods[:1]:
-        p = next(p for p in able if p.method == method)
+    offered = [p for p in able if p.use and p.curve != MESH]
+    for p in sorted(offered, key=lambda p: p.cost_s(EVALUATIONS[-1]))[:1]:
         words = f"{p.method}, {percent(p.worst_relative)} off, {time_in_words(p.trajectory_s)} a "
-        words += f"trajectory: `{p.use}`" if p.use else "trajectory: `model.frequencies(q, y)`"
-        yield Advice("thousands of evaluations elsewhere", words)
+        yield Advice("thousands of evaluations elsewhere", f"{words}trajectory: `{p.use}`")
     for p in [p for p in able if p.curve == MESH and p.use][:1]:
         words = f"write `{p.use}` for every link: {percent(p.worst_relative)} from the finest mesh"
         yield Advice("the mesh", words, p.use)

@@ -171,7 +171,7 @@ def _some(names: Sequence[str]) -> str:
         curve, _, size = name.rpartition(", ")
         kinds.setdefault(curve, []).append(size)
     shown = {k: own if len(own) < 3 else [f"{own[0]} to {own[-1]}"] for k, own in kinds.items()}
-    return "; ".join(f"{k}: {', '.join(own)}".removeprefix(": ") for k, own in shown.items())
+    return "; ".join(f"{k}: {', '.join(own)}".strip(": ") for k, own in shown.items())
 
 
 def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, list[str]]]:

@@ -65,7 +65,8 @@ class Method:
 def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
     """All methods but meshes, exact solvers first."""
     kind = "dense" if subject.model.pencil.is_dense else "sparse"
-    yield Method(EXACT, kind, lambda _: Built(lambda points: subject.exact(points.x)))
+    use = "model.frequencies(q, y)"
+    yield Method(EXACT, kind, lambda _: Built(lambda points: subject.exact(points.x)), use=use)
     yield Method(SCIPY, "one by one", partial(_scipy, subject))
     if subject.rows or subject.changes:
         yield from _series(subject, effort)

@@ -244,9 +244,12 @@ def _heat(matrix: Matrix, name: str, heading: str, levels: Sequence[tuple[float,
     kinds = tuple(", ".join(dict.fromkeys(f.kind for f in matrix.findings[c])) for c in failing)
     look = Look(graph.VERMILLION, 0.0, "solid", "o", 6.0)
     marks.append(Curve(at, look, "something fails by name", np.zeros(len(at)), names=kinds))
+    heads = np.arange(1.0, len(CURVES) + 1.0)
+    numbers = tuple(f"{k:g}" for k in heads)
+    marks.append(Curve(np.full(len(heads), 0.6), Look(graph.BLACK, 0.0), "", heads, marks=numbers))
     columns = "; ".join(f"{k}: {curve}" for k, curve in enumerate(CURVES, 1))
     caption = f"Columns: {columns}. Preparations are spread over {matrix.evaluations} trajectories."
-    room = np.array([0.6, -len(matrix.cases) + 0.4])
+    room = np.array([0.9, -len(matrix.cases) + 0.4])
     panel = Panel(
         "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
     )
