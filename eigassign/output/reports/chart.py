@@ -9,41 +9,28 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from eigassign.chart.advice import headline
-from eigassign.chart.methods import CURVES, FULL, LINEAR, MESH
+from eigassign.chart.methods import CURVES, MESH
 from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Matrix
-from eigassign.facts import percent
+from eigassign.facts import fact, percent
 from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 
-WINE, OLIVE, BROWN = "#882255", "#999933", "#8a5a2b"
-COLOURS = dict(
-    zip(
-        CURVES,
-        (
-            *(graph.BLUE, graph.VERMILLION, graph.SKY, graph.GREEN, graph.PURPLE, graph.ORANGE),
-            *(WINE, OLIVE, graph.BLACK, graph.GREY, BROWN),
-        ),
-        strict=True,
-    )
-)
+COLOURS = dict(zip(CURVES, (
+    *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
+), strict=True))  # fmt: skip
 WANTED = Look(graph.BLACK, 1.0, "fine")
-LEVELS = (  # of a heat map: up to which error or cost, how it looks and what it is called
-    (1e-6, "#1a6e3c", "≤ 0.0001 %"), (1e-4, "#56ae6b", "≤ 0.01 %"), (1e-2, "#c3dd8a", "≤ 1 %"),
-    (np.inf, "#d9694a", "over 1 %"),
-)  # fmt: skip
-COSTS = (
-    (0.01, "#1a6e3c", "≤ 1/100"), (0.1, "#56ae6b", "≤ 1/10"), (1.0, "#c3dd8a", "≤ 1"),
-    (np.inf, "#d9694a", "over 1"),
-)  # fmt: skip
+SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
+ERRORS = {1e-6: "≤ 0.0001 %", 1e-4: "≤ 0.01 %", 1e-2: "≤ 1 %", np.inf: "over 1 %"}
+COSTS = {0.01: "≤ 1/100", 0.1: "≤ 1/10", 1.0: "≤ 1", np.inf: "over 1"}
 SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
             "reach": "How far each method goes"}  # fmt: skip
 
@@ -54,9 +41,8 @@ def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
 
 
 def _pale(colour: str) -> str:
-    """The colour on white, at a third."""
-    parts = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(255 - (255 - part) / 3):02x}" for part in parts)
+    """The colour on white, at a half."""
+    return "#" + "".join(f"{(255 + int(colour[k : k + 2], 16)) // 2:02x}" for k in (1, 3, 5))
 
 
 def _mark(size: str) -> str:
@@ -68,7 +54,7 @@ def _plane(chart: Chart) -> FigurePlan:
     """A panel for each number of trajectories that a preparation is spread over."""
     asked, shown = chart.asked, [p for p in chart.points if p.worst_relative <= 1.0]
     panels = list[Panel]()
-    for k, one in enumerate(chart.fronts):
+    for one in chart.fronts:
         n, marks = one.evaluations, list[Mark]()
         marks.append(Rule(100.0 * asked.accuracy, WANTED, note="wanted"))
         for curve in CURVES:
@@ -76,13 +62,10 @@ def _plane(chart: Chart) -> FigurePlan:
             own.sort(key=lambda p: p.worst_relative * (p.curve == MESH))  # one is the case's own
             best = [p for p in own if p.method in one.methods]
             colour, shape = COLOURS[curve], "s" if curve == MESH else "o"
-            if own:
-                pale = Look(_pale(colour), 1.0, "solid", shape, 5.0)
-                marks.append(_curve(own, n, pale))
-            if own and not k:  # the legend shows full colours, in the first panel
-                marks.append(_curve(best, n, Look(colour, 0.0, "solid", shape, 7.0), curve))
-            elif best:
-                marks.append(_curve(best, n, Look(colour, 0.0, "solid", shape, 7.0)))
+            if own:  # the legend shows full colours, in the first panel
+                marks.append(_curve(own, n, Look(_pale(colour), 1.0, "solid", shape, 5.0)))
+                full = Look(colour, 0.0, "solid", shape, 7.0)
+                marks.append(_curve(best, n, full, "" if panels else curve))
         label = "one trajectory" if n == 1 else f"{n:,} trajectories"
         panels.append(Panel(f"worst error [%], {label}", tuple(marks), 3.4, True, 14))
     lost = len(chart.points) - len(shown)
@@ -109,13 +92,11 @@ def _curve(points: Sequence[ChartPoint], n: float, look: Look, label: str = "") 
 
 def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
     """A colour for each kind of method, dashes for its orders."""
-    looks, dashes = dict[str, Look](), ("dotted", "dash-dotted", "dashed", "solid")
+    looks = dict[str, Look]()
     for method in dict.fromkeys(row.method for row in rows):
-        kind = next(c for c in sorted(CURVES, key=len, reverse=True) if method.startswith(c))
-        count = sum(1 for look in looks.values() if look.colour == COLOURS[kind])
-        looks[method] = Look(
-            COLOURS[kind], 1.4, dashes[count % 4] if kind in (FULL, LINEAR) else "solid", "o", 4.0
-        )
+        colour = COLOURS[method.rpartition(", ")[0]]
+        dash = {"1": "dotted", "2": "dash-dotted", "4": "dashed"}.get(method[-1], "solid")
+        looks[method] = Look(colour, 1.4, dash if " order " in method else "solid", "o", 4.0)
     return looks
 
 
@@ -219,48 +200,44 @@ def write_chart(
 def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
     """Two heat maps: errors at equal cost, costs at equal accuracy."""
     wanted = percent(matrix.accuracy)
+    dearer, exact = "error_at_equal_cost", "Worst error for the time of exact solves"
+    cheaper, time = "cost_at_equal_accuracy", f"Time for {wanted}, of that of exact solves"
     return (
-        _heat(matrix, "errors", "Worst error for the time of exact solves", LEVELS,
-              lambda cell: cell.error_at_equal_cost),
-        _heat(matrix, "costs", f"Time for {wanted}, of that of exact solves", COSTS,
-              lambda cell: cell.cost_at_equal_accuracy),
-    )  # fmt: skip
+        _heat(matrix, "errors", exact, ERRORS, dearer),
+        _heat(matrix, "costs", time, COSTS, cheaper),
+    )
 
 
-def _heat(matrix: Matrix, name: str, heading: str, levels: Sequence[tuple[float, str, str]],
-          value: Callable[[Cell], float | None]) -> FigurePlan:  # fmt: skip
-    cells = [(CURVES.index(c.curve) + 1.0, -float(matrix.cases.index(c.case)), c, value(c))
-             for c in matrix.cells]  # fmt: skip
+def _heat(
+    matrix: Matrix, name: str, heading: str, levels: Mapping[float, str], fact: str
+) -> FigurePlan:
+    values = [getattr(cell, fact) for cell in matrix.cells]
+    level = np.searchsorted(list(levels), [np.inf if v is None else v for v in values])
+    level[[v is None for v in values]] = len(levels)
+    at = np.array([CURVES.index(cell.curve) + 1.0 for cell in matrix.cells])
+    below = np.array([-float(matrix.cases.index(cell.case)) for cell in matrix.cells])
+    told = [f"{c.case}: {c.curve}, {v}" for c, v in zip(matrix.cells, values, strict=True)]
     marks: list[Mark] = []
-    for k, (_, colour, label) in enumerate((*levels, (0.0, "#e9e9e9", "no answer"))):
-        own = [each for each in cells if k == _level(each[3], levels)]
-        at, below = (np.array([each[axis] for each in own]) for axis in (0, 1))
-        names = tuple(
-            f"{c.case}: {c.curve}, {'–' if v is None else f'{v:.2g}'}" for *_, c, v in own
-        )
-        marks.append(Curve(below, Look(colour, 0.0, "solid", "s", 15.0), label, at, names=names))
-    failing = [c for c in matrix.cases if matrix.findings[c]]
-    at = np.array([-float(matrix.cases.index(c)) for c in failing])
-    kinds = tuple(", ".join(dict.fromkeys(f.kind for f in matrix.findings[c])) for c in failing)
-    look = Look(graph.VERMILLION, 0.0, "solid", "o", 6.0)
-    marks.append(Curve(at, look, "something fails by name", np.zeros(len(at)), names=kinds))
+    for k, label in enumerate((*levels.values(), "no answer")):
+        own = np.flatnonzero(level == k)
+        look = Look(SHADES[k], 0.0, "solid", "s", 15.0)
+        names = tuple(told[i] for i in own)
+        marks.append(Curve(below[own], look, label, at[own], names=names))
+    failing = {c: ", ".join(f.kind for f in matrix.findings[c]) for c in matrix.cases}
+    rows = np.array([-float(k) for k, c in enumerate(matrix.cases) if failing[c]])
+    look, names = Look(graph.VERMILLION, 0.0, marker="o"), tuple(filter(None, failing.values()))
+    marks.append(Curve(rows, look, "something fails by name", 0.0 * rows, names=names))
     heads = np.arange(1.0, len(CURVES) + 1.0)
     numbers = tuple(f"{k:g}" for k in heads)
-    marks.append(Curve(np.full(len(heads), 0.6), Look(graph.BLACK, 0.0), "", heads, marks=numbers))
+    marks.append(Curve(0.0 * heads + 0.6, Look(graph.BLACK, 0.0), "", heads, marks=numbers))
     columns = "; ".join(f"{k}: {curve}" for k, curve in enumerate(CURVES, 1))
     caption = f"Columns: {columns}. Preparations are spread over {matrix.evaluations} trajectories."
-    room = np.array([0.9, -len(matrix.cases) + 0.4])
+    room = np.array([0.9, 0.4 - len(matrix.cases)])
     panel = Panel(
         "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
     )
     shows = Graph(heading, "method", np.zeros(0), (panel,), (-0.6, len(CURVES) + 0.6))
     return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
-
-
-def _level(value: float | None, levels: Sequence[tuple[float, str, str]]) -> int:
-    if value is None:
-        return len(levels)
-    return next(k for k, (most, *_) in enumerate(levels) if value <= most or k == len(levels) - 1)
 
 
 def matrix_tables(matrix: Matrix) -> tuple[Table, ...]:
@@ -274,20 +251,16 @@ def matrix_tables(matrix: Matrix) -> tuple[Table, ...]:
             Table(SECTIONS["fails"], ("case", "what", "where", "fail", "instead"), tuple(rows)),
         )
     ]
-    for title, value in (("Errors at equal cost", _error), ("Costs at equal accuracy", _cost)):
-        found = {(c.case, c.curve): value(c) for c in matrix.cells}
+    for title, name in (
+        ("Errors at equal cost", "error_at_equal_cost"),
+        ("Costs at equal accuracy", "cost_at_equal_accuracy"),
+    ):
+        text = fact(Cell, name).text
+        found = {(c.case, c.curve): text(getattr(c, name)) for c in matrix.cells}
         body = tuple((c, *(found[c, curve] for curve in CURVES)) for c in matrix.cases)
         tables.append(Table(title, ("case", *CURVES), body))
     tables.append(_in("fails", Table("Refused", ("case", "why"), matrix.refused)))
     return tuple(table for table in tables if table.rows)
-
-
-def _error(cell: Cell) -> str:
-    return "" if cell.error_at_equal_cost is None else f"{cell.error_at_equal_cost:.1e}"
-
-
-def _cost(cell: Cell) -> str:
-    return "" if cell.cost_at_equal_accuracy is None else f"{cell.cost_at_equal_accuracy:.2g}"
 
 
 def write_matrix(
