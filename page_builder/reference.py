@@ -321,6 +321,7 @@ FILES = {
     "update": "results.json of an update",
     "batch": "summary.json",
     "chart": "chart.json",
+    "charts": "matrix.json of several charts",
 }
 PLURALS = {"array": "list", "object": "mapping"}
 WORDS = {"string": "text", "boolean": "true or false", "integer": "whole number", "null": "null"}
@@ -328,7 +329,7 @@ RESULTS = """# Fields of result files
 
 A field is null where there is no such number; what is optional is left out then. Numbers are in SI
 units; a fraction of 0.01 is 1 %. {…} is an object with fields of its own. `eigassign schema run`
-prints the same as a JSON Schema for programs; so do `update`, `batch` and `chart`."""
+prints the same as a JSON Schema for programs; so do `update`, `batch`, `chart` and `charts`."""
 
 
 def results() -> str:

@@ -22,7 +22,7 @@ import re
 from eigassign.errors import StorageError, UsageError
 
 _DRAWING = ("out", "force", "figures", "allow_outside")
-LEFT_BY = ("run", "update", "batch", "chart")
+LEFT_BY = ("run", "update", "batch", "chart", "charts")
 
 
 @click.command(
@@ -198,8 +198,8 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
 def schema(of: str) -> int:
     """Print the JSON Schema of case files or results.
 
-    That of case files is for editors; run and update mean results.json, batch summary.json, and
-    chart chart.json.
+    That of case files is for editors; run and update mean results.json, batch summary.json, chart
+    chart.json, and charts the matrix.json of several cases.
     """
     if of == "case":
         from eigassign.case.schema.document import json_schema
@@ -211,14 +211,14 @@ def schema(of: str) -> int:
 
 
 def results_schema(left_by: str) -> dict[str, Any]:
-    """JSON Schema (2020-12) of the file that a run, an update, a batch or a chart leaves."""
-    from eigassign.chart.results import Chart
+    """JSON Schema (2020-12) of the file that a run, an update, a batch or charts leave."""
+    from eigassign.chart.results import Chart, Matrix
     from eigassign.output.batch.summary import SummaryDocument
     from eigassign.output.documents import schema_of
     from eigassign.study.results import RunResults
     from eigassign.study.updating.fit import UpdateResults
 
-    rows = (RunResults, UpdateResults, SummaryDocument, Chart)
+    rows = (RunResults, UpdateResults, SummaryDocument, Chart, Matrix)
     return schema_of(dict(zip(LEFT_BY, rows, strict=True))[left_by])
 
 
