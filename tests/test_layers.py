@@ -17,6 +17,7 @@ OWNERS = {
     "pydantic": {"case"},
     "pydantic_core": {"case"},
     "osqp": {"assignment"},
+    "sklearn": {"chart"},
     "h5py": {"output"},
     "matplotlib": {"output"},
     "markupsafe": {"output"},  # comes with Jinja

@@ -16,7 +16,7 @@ from eigassign.output import CaseOutcome, to_json, write_files
 from eigassign.study import ErrorRow, RunResults
 
 CASES = Path(__file__).parents[2] / "cases"
-FILES = ("run", "update", "batch", "chart")
+FILES = ("run", "update", "batch", "chart", "charts")
 TYPES = {
     "string": str, "boolean": bool, "integer": int, "number": (int, float), "array": list,
     "object": dict, "null": type(None),
