@@ -15,10 +15,12 @@ from eigassign.chart.results import (
     ChartPoint,
     Matrix,
     OrderRow,
+    Reach,
     machine,
 )
 from eigassign.facts import percent, time_in_words
 
+ALIKE = 1.25  # times that differ by less are alike: a busy machine's spread
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 
 
@@ -29,23 +31,31 @@ def advised(chart: Chart, orders: Sequence[OrderRow] = ()) -> Chart:
 
 def headline(chart: Chart) -> str:
     """How good the paper's method is here, how far it goes, and what to write, in sentences."""
-    paper = [p for p in chart.points if p.curve == LINEAR]
-    said = dict.fromkeys(
-        f.kind for f in chart.findings if f.kind not in ("refused", "out of memory")
-    )
-    lines = [f"Found: {', '.join(said)}."] if said else []
+    kinds = dict.fromkeys(f.kind for f in chart.findings)
+    said = ", ".join(kind for kind in kinds if kind not in ("refused", "out of memory"))
+    lines = [f"Found: {said}."] if said else []
+    paper = {p.size: p.worst_relative for p in chart.points if p.curve == LINEAR}
     if paper:
-        best = min(paper, key=lambda p: p.worst_relative)
-        line = f"The paper's method, series linearised in y, is {percent(best.worst_relative)} off"
-        line += f" at worst ({best.size})"
-        reach = [r for r in chart.reach if r.method.startswith(LINEAR) and r.half_width < 1.0]
-        reach = [r for r in reach if r.method.endswith("order 4")]
-        wanted = percent(chart.asked.accuracy)
-        far = "; ".join(f"{r.half_width:.2g} of the ranges of {r.varied}" for r in reach)
-        line += f"; order 4 is within {wanted} up to {far}." if far else "."
-        lines.append(line)
+        size = "order 4" if "order 4" in paper else next(reversed(paper))
+        line = f"The paper's method (series linearised in y, {size}) is {percent(paper[size])} off"
+        line += " at worst"
+        if min(paper.values()) > 0.5 * paper[size]:
+            line += ", and more orders do not help"
+        reach = [r for r in chart.reach if r.method == f"{LINEAR}, {size}"]
+        far = "; ".join(_far(r, chart.asked.varied) for r in reach if r.half_width < 1.0)
+        lines.append(
+            line
+            + (f"; it is within {percent(chart.asked.accuracy)} up to {far}." * bool(far) or ".")
+        )
     lines += [f"{one.words[:1].upper()}{one.words[1:]}." for one in chart.advice if one.key]
     return " ".join(lines)
+
+
+def _far(reach: Reach, names: Sequence[str]) -> str:
+    """``0.87 of the bounds of m1, m2``."""
+    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    of = {"q": "the motion", "y": f"the bounds of {shown}", "q and y": "motion and bounds together"}
+    return f"{reach.half_width:.2g} of {of[reach.varied]}"
 
 
 def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
@@ -69,8 +79,9 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
     if series and not full:
         words = f"solve exactly: no series that was charted is within {wanted}"
         yield Advice("the series (`expand`)", words)
-    offered = [p for p in able if p.use and p.curve != MESH]
-    for p in sorted(offered, key=lambda p: p.cost_s(EVALUATIONS[-1]))[:1]:
+    offered, n = [p for p in able if p.use and p.curve != MESH], EVALUATIONS[-1]
+    least = min((p.cost_s(n) for p in offered), default=0.0)
+    for p in [p for p in offered if p.cost_s(n) <= ALIKE * least][:1]:  # the simplest of the cheap
         words = f"{p.method}, {percent(p.worst_relative)} off, {time_in_words(p.trajectory_s)} a "
         yield Advice("thousands of evaluations elsewhere", f"{words}trajectory: `{p.use}`")
     for p in [p for p in able if p.curve == MESH and p.use][:1]:
@@ -97,6 +108,6 @@ def _cell(chart: Chart, curve: str) -> tuple[float | None, float | None]:
     def cost(p: ChartPoint) -> float:
         return p.cost_s(EQUAL) / exact_s
 
-    cheap = [p.worst_relative for p in own if cost(p) <= 1.0 or curve == EXACT]
+    cheap = [p.worst_relative for p in own if cost(p) <= ALIKE]
     right = [cost(p) for p in own if p.worst_relative <= chart.asked.accuracy]
     return min(cheap, default=None), min(right, default=None)

@@ -19,11 +19,9 @@ from eigassign._version import __version__
 from eigassign.chart.boxes import reaches, study_boxes
 from eigassign.chart.failures import find_failures, near_modes
 from eigassign.chart.methods import (
-    EXACT,
     KRIGING,
     MESH,
     NO_KRIGING,
-    SCIPY,
     Built,
     Method,
     list_meshes,
@@ -36,7 +34,6 @@ from eigassign.chart.results import (
     Asked,
     Chart,
     ChartPoint,
-    Finding,
     Front,
     machine,
 )
@@ -65,16 +62,16 @@ def compare_methods(
     tests = subject.tested(effort)
     exact, near = subject.exact(tests.x), near_modes(subject, tests)
     shapes = _by_shape(subject, tests) if near else np.full_like(exact, np.nan)
-    floor, made = (
-        rounding_error(pencil, subject.x0, max(subject.modes)),
-        dict[str, tuple[ChartPoint, Built]](),
-    )
+    floor = rounding_error(pencil, subject.x0, max(subject.modes))
+    made, builds = dict[str, tuple[ChartPoint, Built]](), list[Callable[[], object]]()
     for method in list_methods(subject, effort):
         if method.curve not in {row.curve for row, _ in made.values()}:
             progress(f"charting {method.curve}")
         try:
             one = _made(subject, method, tests, exact, shapes, floor)
-            made.setdefault(one[0].method, one)
+            if one[0].method not in made:
+                made[one[0].method] = one
+                builds.append(partial(method.build, subject.learnt(method.learns)))
         except (EigassignError, np.linalg.LinAlgError, MemoryError) as error:
             why = "the memory does not suffice" if isinstance(error, MemoryError) else str(error)
             skipped[f"{method.curve}, {method.size}"] = why
@@ -82,19 +79,19 @@ def compare_methods(
     made |= {one[0].method: one for one in _meshes(subject, effort, tests, floor)}
     progress("timing all in turns")
     along = subject.along(subject.initial)
-    times = _timed([partial(built.answer, along) for _, built in made.values()], effort.repeats)
+    answers = [partial(built.answer, along) for _, built in made.values()]
+    times = _timed([*answers, *builds], effort.repeats)
+    spent = [*times[len(answers) :], *(len(answers) - len(builds)) * [(0.0, 0.0)]]  # of a mesh none
     points = tuple(
-        replace(row, trajectory_s=least, spread_s=median - least)
-        for (row, _), (least, median) in zip(made.values(), times, strict=True)
+        replace(row, trajectory_s=least, spread_s=median - least, preparation_s=before)
+        for (row, _), (least, median), (before, _) in zip(made.values(), times, spent, strict=False)
     )
     progress("charting boxes")
     boxes = study_boxes(subject, effort, {name: built for name, (_, built) in made.items()}, floor)
-    findings = tuple(find_failures(subject, near, exact, points, boxes, skipped, accuracy))
-    if unfollowed:
-        findings = (_unfollowed(unfollowed), *findings)
+    found = find_failures(subject, near, exact, points, boxes, skipped, accuracy, unfollowed)
     question = Asked(
-        subject.modes, n_dof, len(np.unique(tests.design)), len(tests), len(along), accuracy,
-        floor, time.get_clock_info("process_time").resolution,
+        subject.modes, n_dof, subject.free, len(np.unique(tests.design)), len(tests), len(along),
+        accuracy, floor, time.get_clock_info("process_time").resolution,
     )  # fmt: skip
     constant, file = _constant(exact), case.file
     return Chart(
@@ -102,7 +99,7 @@ def compare_methods(
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
         asked=question, points=points, skipped=tuple(skipped.items()),
         fronts=tuple(front(points, n, accuracy, constant) for n in EVALUATIONS),
-        boxes=boxes, reach=reaches(boxes, accuracy), findings=findings,
+        boxes=boxes, reach=reaches(boxes, accuracy), findings=tuple(found),
         notes=() if any(p.curve == KRIGING for p in points) else (NO_KRIGING,),
         warnings=tuple(map(str, file.warnings)),
     )  # fmt: skip
@@ -112,18 +109,14 @@ def _made(
     subject: Subject, method: Method, tests: Points, exact: Floats, shapes: Floats, floor: float
 ) -> tuple[ChartPoint, Built]:
     """A method made, and asked at all test points."""
-    learnt = subject.learnt(method.learns) if method.learns else tests[:0]
-    built, spent = _run(partial(method.build, learnt))
-    if spent < ONCE_S:  # the first run warms up, and imports
-        spent = min(_run(partial(method.build, learnt))[1] for _ in range(1 + (spent < OFTEN_S)))
+    built = method.build(subject.learnt(method.learns))
     built.answer(subject.along(subject.initial))  # what cannot be timed is left out
     hz = asked(built.answer, tests, exact)
     size = built.size or method.size
     shaped = errors(hz, shapes)[0] if np.isfinite(shapes).all(axis=1).any() else None
     worst, rms, failed = errors(hz, exact)
     row = ChartPoint(
-        f"{method.curve}, {size}", method.curve, size,
-        0.0 if method.curve in (EXACT, SCIPY, MESH) else spent, 0.0, 0.0, max(worst, floor), rms,
+        f"{method.curve}, {size}", method.curve, size, 0.0, 0.0, 0.0, max(worst, floor), rms,
         None if shaped is None else max(shaped, floor), failed, method.use,
     )  # fmt: skip
     return row, built
@@ -171,35 +164,25 @@ def _meshes(
             yield _made(subject, method, few, limit, nowhere, floor)
 
 
-def _unfollowed(why: str) -> Finding:
-    """The finding of a path that cannot be followed."""
-    kind = "straight or folded arm"
-    return Finding(kind, "along the path", "all", why, "keep it within reach; charted at rest")
-
-
 # --- Times
 
 
-def _run(job: Callable[[], Built]) -> tuple[Built, float]:
-    start = time.process_time()
-    return job(), time.process_time() - start
-
-
 def _timed(jobs: Sequence[Callable[[], object]], repeats: int) -> list[tuple[float, float]]:
-    """Least and median seconds of each job by turns; short ones run many times at a turn."""
+    """Least and median seconds of each job by turns; short ones run many times at a turn.
+
+    All have run before, so that nothing is imported or made for the first time.
+    """
     spent, many = [list[float]() for _ in jobs], [1] * len(jobs)
-    for turn in range(repeats + 1):
+    for turn in range(repeats):
         for k, job in enumerate(jobs):
             before = min(spent[k], default=0.0)
-            if before > ONCE_S or (turn > 3 and before > OFTEN_S):
+            if before > ONCE_S or (turn > 2 and before > OFTEN_S):
                 continue
             start = time.process_time()
             for _ in range(many[k]):
                 job()
-            each = (time.process_time() - start) / many[k]
-            if turn or each > ONCE_S:  # the first run warms up
-                spent[k].append(each)
-            many[k] = max(many[k], int(LEAST_S / (each + 1e-7)))
+            spent[k].append((time.process_time() - start) / many[k])
+            many[k] = max(many[k], int(LEAST_S / (spent[k][-1] + 1e-7)))
     return [(min(own), float(np.median(own))) for own in spent]
 
 

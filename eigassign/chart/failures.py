@@ -35,7 +35,8 @@ WHY = {
     "too few samples to see a kink": "they see nothing between the points they learn from",
     "radius of convergence": "a higher order is worse than a lower one: beyond it terms grow",
     "singular": "the mechanism has no modes there: a dead point, or a part that nothing holds",
-    "basis without the mode": "a mode that comes down among poses and designs is in no vector",
+    "basis without the mode": "its shape at other poses or designs is not among the vectors, and "
+    "no residual shows it",
 }
 
 
@@ -108,6 +109,7 @@ def find_failures(
     boxes: Sequence[BoxRow],
     skipped: Mapping[str, str],
     accuracy: float,
+    unfollowed: str,
 ) -> Iterator[Finding]:
     """A finding for each thing at which methods fail in this case."""
     serves, wrong = _serves(points, accuracy), [p for p in points if p.worst_relative > accuracy]
@@ -116,13 +118,18 @@ def find_failures(
         given = {"why": WHY.get(kind, ""), "instead": serves, **more}
         return Finding(kind, where, _some(failing) or "none by more than is wanted", **given)
 
+    if unfollowed:
+        kind, instead = "straight or folded arm", "keep it within reach; here it is charted at rest"
+        yield finding(kind, "along the path", ["all"], why=unfollowed, instead=instead)
     series = [p.method for p in wrong if p.curve in (FULL, LINEAR)]
     for one in near:
-        where = _at(subject, one.x) if one.kind != "repeated modes" else "everywhere"
-        modes = one.lower, one.lower + 1
+        modes, kinked = (one.lower, one.lower + 1), [p.method for p in wrong if p.curve in LEARNING]
+        if one.kind == "repeated modes":
+            yield finding(one.kind, "everywhere", [], modes=modes, gap=one.gap)
+            continue
+        where = _at(subject, one.x)
         yield finding(one.kind, where, series, modes=modes, gap=one.gap)
-        kinked = [p.method for p in wrong if p.curve in LEARNING]
-        if kinked and one.kind != "repeated modes":
+        if kinked:
             yield finding("too few samples to see a kink", where, kinked, modes=modes)
     lowest = np.nanmin(exact, axis=0, initial=np.inf)
     for mode, low, middle in zip(

@@ -172,8 +172,7 @@ def _interpolated(subject: Subject, stations: int, _: Points) -> Built:
 
 def surrogates(subject: Subject, effort: Effort) -> Iterator[Method]:
     """Fits to exact solves at poses and designs spread over the case's ranges [11, 12]."""
-    room = (subject.bounds[1] > subject.bounds[0]).sum()
-    n = int(room) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
+    n = len(subject.free) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
     for degree in (1, 2, 3, 4):
         if (terms := comb(n + degree, degree)) <= 2 * max(effort.learnt):
             build = partial(_surface, subject, degree)
@@ -222,7 +221,7 @@ def _radial(subject: Subject, learnt: Points) -> Built:
     """scipy.interpolate.RBFInterpolator as it is: thin plate splines."""
     from scipy.interpolate import RBFInterpolator
 
-    return Built(_fitted(subject, learnt, RBFInterpolator))
+    return Built(_fitted(subject, learnt, RBFInterpolator), size=f"{len(learnt)} points")
 
 
 def _kriged(subject: Subject, learnt: Points) -> Built:
@@ -245,7 +244,8 @@ def _kriged(subject: Subject, learnt: Points) -> Built:
             hz, off = (np.reshape(each, (len(points), -1)) for each in both(points))
         return np.asarray(off / hz if claimed else hz)
 
-    return Built(partial(answer, claimed=False), partial(answer, claimed=True))
+    size = f"{len(learnt)} points"  # of few samples there are no more
+    return Built(partial(answer, claimed=False), partial(answer, claimed=True), size)
 
 
 # --- The mesh itself

@@ -88,9 +88,15 @@ class Subject:
         return rows if any(own.stop - own.start > 1 for own in rows) else ()
 
     @property
+    def free(self) -> tuple[str, ...]:
+        """The names of the design parameters that have room."""
+        room = zip(self.model.y_names, *self.bounds, strict=True)
+        return tuple(name for name, low, high in room if high > low)
+
+    @property
     def changes(self) -> bool:
         """True where a design parameter has room."""
-        return bool((self.bounds[1] > self.bounds[0]).any())
+        return bool(self.free)
 
     def split(self, x: Floats) -> tuple[Floats, Floats]:
         """q and y of x."""

@@ -23,7 +23,7 @@ SCHEMA = 8  # of chart.json
 EVALUATIONS = (1, 100, 10_000)  # trajectories over which a preparation is spread
 ACCURACY = 1e-2  # wanted of a frequency, where nothing is said
 Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
-RelativeError = Annotated[Share, Fact(digits=".2e", may_lack=True)]
+RelativeError = Annotated[Share, Fact(may_lack=True)]
 
 
 def machine() -> dict[str, Any]:
@@ -49,7 +49,7 @@ class ChartPoint:
     size: Annotated[str, Fact("order, number of vectors, stations, elements or points")]
     preparation_s: Annotated[Time, Fact("of all that comes before the first answer", "preparation")]
     trajectory_s: Annotated[Time, Fact("one design at all samples", "one trajectory")]
-    spread_s: Annotated[Seconds, Fact("median of the repeats above their least")]
+    spread_s: Annotated[Seconds, Fact("median of the repeats above their least", "spread")]
     worst_relative: Annotated[RelativeError, Fact("at the test points", "worst error")]
     rms_relative: Annotated[RelativeError, Fact(heading="rms error")]
     worst_by_shape: Annotated[
@@ -137,6 +137,7 @@ class Asked:
 
     modes: Annotated[tuple[int, ...], Fact(digits=lambda m: ", ".join(map(str, m)))]
     n_dof: int
+    varied: Annotated[tuple[str, ...], Fact("design parameters with room")]
     designs: int
     test_points: int
     trajectory_samples: int

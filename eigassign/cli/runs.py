@@ -291,6 +291,8 @@ def chart(
             folder, made = charting.chart(paths[0], options, effort, wanted)
             line, tables = headline(made), page.chart_tables(made)
         reporter.warn(made.warnings)
+        for note in made.notes:
+            reporter.stage(note)
 
     def told() -> None:
         print_verdict(line)

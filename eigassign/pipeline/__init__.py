@@ -7,7 +7,7 @@ Reading order:
     queries  check a case, draw it; its frequencies at one point
     urdf     a robot from URDF as the content of a case
     studies  measured frequencies to the parameters that explain them
-    charting speed against accuracy of every method, on one case or several
+    charting  speed against accuracy of every method, on one case or several
 """
 
 from eigassign.faces import face

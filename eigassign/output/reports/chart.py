@@ -10,12 +10,13 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from eigassign.chart.advice import headline
-from eigassign.chart.methods import CURVES, MESH
+from eigassign.chart.methods import CURVES, LINEAR, MESH
 from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Matrix
 from eigassign.facts import fact, percent
 from eigassign.output.documents import dumps, results_document
@@ -27,6 +28,7 @@ from eigassign.output.tables import Table, facts_table
 COLOURS = dict(zip(CURVES, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
+LEAST = 1e-10  # %, of claims: what is below is as good as nothing
 WANTED = Look(graph.BLACK, 1.0, "fine")
 SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
 ERRORS = {1e-6: "≤ 0.0001 %", 1e-4: "≤ 0.01 %", 1e-2: "≤ 1 %", np.inf: "over 1 %"}
@@ -96,7 +98,9 @@ def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
     for method in dict.fromkeys(row.method for row in rows):
         colour = COLOURS[method.rpartition(", ")[0]]
         dash = {"1": "dotted", "2": "dash-dotted", "4": "dashed"}.get(method[-1], "solid")
-        looks[method] = Look(colour, 1.4, dash if " order " in method else "solid", "o", 4.0)
+        is_linear = method.startswith(LINEAR)  # its points ring those of full series
+        dash, size = dash if " order " in method else "solid", 7.0 if is_linear else 4.0
+        looks[method] = Look(colour, 1.4, dash, "o", size, not is_linear)
     return looks
 
 
@@ -129,10 +133,10 @@ def _claims(chart: Chart) -> FigurePlan:
     for method, look in _looks(chart.boxes).items():
         own = [r for r in rows if r.method == method and r.claimed]
         x = 100.0 * np.array([r.worst_relative for r in own])
-        y = 100.0 * np.array([r.claimed for r in own], dtype=np.float64)
+        y = np.maximum(100.0 * np.array([r.claimed for r in own], dtype=np.float64), LEAST)
         if own:
-            marks.append(Curve(y, Look(look.colour, 0.0, "solid", "o", 4.0), method, x))
-    ends = np.array([1e-12, 1e2])
+            marks.append(Curve(y, replace(look, width=0.0), method, x))
+    ends = np.array([LEAST, 1e2])
     marks.append(Curve(ends, WANTED, "claimed = true", ends))
     heading = "Claimed and true errors"
     caption = (
@@ -168,7 +172,8 @@ def _tables(chart: Chart) -> Iterator[Table]:
     )
     points = sorted(chart.points, key=lambda p: p.worst_relative)
     clock = f"{chart.asked.clock_s:.0e} s"
-    caption = f"Least processor time of repeats in turns; the clock resolves {clock}."
+    caption = f"Least processor time of repeats in turns; the clock resolves {clock}. By shape: "
+    caption += "against the mode that has the shape, where modes meet and numbers change places."
     yield facts_table("All methods", points, names, caption)
     names = "method varied half_width worst_relative claimed"
     yield facts_table("All boxes", chart.boxes, names)
@@ -218,7 +223,7 @@ def _heat(
     below = np.array([-float(matrix.cases.index(cell.case)) for cell in matrix.cells])
     told = [f"{c.case}: {c.curve}, {v}" for c, v in zip(matrix.cells, values, strict=True)]
     marks: list[Mark] = []
-    for k, label in enumerate((*levels.values(), "no answer")):
+    for k, label in enumerate((*levels.values(), "none is")):
         own = np.flatnonzero(level == k)
         look = Look(SHADES[k], 0.0, "solid", "s", 15.0)
         names = tuple(told[i] for i in own)
@@ -227,16 +232,13 @@ def _heat(
     rows = np.array([-float(k) for k, c in enumerate(matrix.cases) if failing[c]])
     look, names = Look(graph.VERMILLION, 0.0, marker="o"), tuple(filter(None, failing.values()))
     marks.append(Curve(rows, look, "something fails by name", 0.0 * rows, names=names))
-    heads = np.arange(1.0, len(CURVES) + 1.0)
-    numbers = tuple(f"{k:g}" for k in heads)
-    marks.append(Curve(0.0 * heads + 0.6, Look(graph.BLACK, 0.0), "", heads, marks=numbers))
-    columns = "; ".join(f"{k}: {curve}" for k, curve in enumerate(CURVES, 1))
-    caption = f"Columns: {columns}. Preparations are spread over {matrix.evaluations} trajectories."
-    room = np.array([0.9, 0.4 - len(matrix.cases)])
+    caption = f"Preparations are spread over {matrix.evaluations} trajectories."
+    room = np.array([0.6, 0.4 - len(matrix.cases)])
     panel = Panel(
         "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
     )
-    shows = Graph(heading, "method", np.zeros(0), (panel,), (-0.6, len(CURVES) + 0.6))
+    ends = (-0.6, len(CURVES) + 0.6)
+    shows = Graph(heading, "", np.zeros(0), (panel,), ends, x_names=CURVES)
     return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
 
 
