@@ -18,6 +18,7 @@ for folder in (
     "assignment",
     "batch",
     "case",
+    "chart",
     "faults",
     "mechanism",
     "modal",

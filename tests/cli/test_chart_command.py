@@ -1,82 +1,112 @@
-"""The chart command: its folder, its JSON, its exit codes."""
+"""The chart command: its folder, its JSON, its exit codes; one case, or several side by side."""
 
+import csv
 import json
+import sys
 from pathlib import Path
 
 import pytest
+from charts import CANTILEVER, CASES
 
 from eigassign.cli import main
 
-ARM = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+Captured = pytest.CaptureFixture[str]
 
 
-@pytest.mark.slow
-def test_a_quick_chart_leaves_a_whole_folder_and_advises(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.fixture
+def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "cases" / "cantilever.yaml"
+    path.parent.mkdir()
+    path.write_text(CANTILEVER)
+    return path
+
+
+def test_a_quick_chart_leaves_a_folder_and_says_what_to_write(case: Path, capsys: Captured) -> None:
+    how = ["--quick", "--accuracy", "1e-3", "--figures", "none"]
+    assert main(["chart", str(case), *how]) == 0
+    told = capsys.readouterr()
+    folder = Path("results/cantilever_chart")
+    kept = json.loads((folder / "chart.json").read_text())
+    names = {p.name for p in folder.iterdir()}
+    assert names == {"chart.json", "report.html", "case.yaml", "run.json"}
+    assert kept["asked"]["accuracy"] == 1e-3
+    assert kept["quick"] is True
+    assert {p["curve"] for p in kept["points"]} >= {"Kriging", "Taylor", "mesh"}
+    assert told.out.startswith("The paper's method, series linearised in y, is ")
+    assert "write `elements: 2` for every link" in told.out
+    assert told.err.startswith("charting")
+    assert main(["chart", str(case), *how, "--json", "--quiet"]) == 0
+    shown = capsys.readouterr()
+    assert [p["method"] for p in json.loads(shown.out)["points"]] == [
+        p["method"] for p in kept["points"]
+    ]
+    assert shown.err == ""
+
+
+def test_without_scikit_learn_a_line_says_how_to_get_it(
+    case: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out = tmp_path / "chart"
-    asked = ["--accuracy", "1e-6"]
-    code = main(["chart", str(ARM), "--quick", "--json", "--quiet", "--out", str(out), *asked])
-    shown = json.loads(capsys.readouterr().out)
-    assert code == 0
-    kept = json.loads((out / "chart.json").read_text())
-    assert [p["method"] for p in shown["points"]] == [p["method"] for p in kept["points"]]
-    assert [a["accuracy"] for a in kept["advice"]] == [1e-6]
-    names = {p.name for p in out.iterdir()}
-    assert names >= {"chart.json", "report.html", "figures", "case.yaml", "run.json"}
-    assert len(list((out / "figures").glob("*.png"))) == 4
-    assert kept["machine"]["cores"] >= 1
+    monkeypatch.setitem(sys.modules, "sklearn", None)
+    assert main(["chart", str(case), "--quick", "--quiet", "--figures", "none"]) == 0
+    kept = json.loads(Path("results/cantilever_chart/chart.json").read_text())
+    assert kept["notes"] == ["Kriging needs scikit-learn: pip install 'eigassign[chart]'"]
+    assert not any(p["curve"] == "Kriging" for p in kept["points"])
 
 
-def test_a_case_without_a_trajectory_is_refused_and_leaves_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_folder_is_a_matrix_and_a_broken_case_does_not_stop_the_others(
+    case: Path, capsys: Captured
 ) -> None:
-    text = ARM.read_text()
-    start, end = text.index("trajectory:"), text.index("design:")
-    case = tmp_path / "still.yaml"
-    case.write_text(text[:start] + text[end:])
-    assert main(["chart", str(case), "--quick", "--out", str(tmp_path / "out")]) == 2
-    assert "trajectory" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    (case.parent / "broken.yaml").write_text("title: x")
+    still = (CASES / "stress" / "straight_arm.yaml").read_text()
+    (case.parent / "straight_arm.yaml").write_text(still)
+    assert main(["chart", "cases", "--quick", "--json", "--quiet", "--out", "all"]) == 0
+    kept = json.loads(Path("all/matrix.json").read_text())
+    assert json.loads(capsys.readouterr().out)["cells"] == kept["cells"]
+    assert {p.name for p in Path("all/figures").iterdir()} == {"errors.png", "costs.png"}
+    assert sorted(kept["cases"]) == ["cantilever", "straight_arm"]
+    ((name, why),) = kept["refused"]
+    assert name == "broken"
+    assert "mechanism: required key is missing" in why
+    assert [f["kind"] for f in kept["findings"]["straight_arm"]] == ["straight or folded arm"]
+    rows = list(csv.DictReader(Path("all/matrix.csv").read_text().splitlines()))
+    assert [(r["case"], r["curve"]) for r in rows] == [
+        (c["case"], c["curve"]) for c in kept["cells"]
+    ]
+    for row, cell in zip(rows, kept["cells"], strict=True):
+        for key in ("error_at_equal_cost", "cost_at_equal_accuracy"):
+            assert (float(row[key]) if row[key] else None) == cell[key]
+    page = Path("all/report.html").read_text()
+    assert "2 cases, methods fail by name in 1; 1 refused" in page
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("--accuracy", "0"), ("--accuracy", "1e-20"), ("--accuracy", "1"), ("--accuracy", "nan"),
-    ],
-)  # fmt: skip
-def test_requests_that_cannot_be_met_are_refused_by_name(
-    option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_cases_of_which_none_can_be_charted_are_refused(case: Path, capsys: Captured) -> None:
+    case.write_text("title: x")
+    (case.parent / "other.yaml").write_text("title: y")
+    for given in (["cases"], [str(case)], [str(case), "cases/other.yaml"]):
+        assert main(["chart", *given, "--quick", "--out", "out"]) == 2
+        assert "mechanism: required key is missing" in capsys.readouterr().err
+        assert not Path("out").exists()
+    Path("empty").mkdir()
+    assert main(["chart", "empty"]) == 2
+    assert "no case files (*.yaml, *.yml) in empty" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("value", ["0", "1e-20", "1", "nan"])
+def test_an_accuracy_that_cannot_be_met_is_refused_by_name(
+    value: str, case: Path, capsys: Captured
 ) -> None:
-    assert main(["chart", str(ARM), option, value, "--out", str(tmp_path / "out")]) == 2
-    assert f"'{option}'" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    assert main(["chart", str(case), "--accuracy", value, "--out", "out"]) == 2
+    assert "'--accuracy'" in capsys.readouterr().err
+    assert not Path("out").exists()
 
 
+@pytest.mark.parametrize("given", ["cases/cantilever.yaml", "cases"])
 def test_a_folder_of_something_else_is_not_replaced(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    given: str, case: Path, capsys: Captured
 ) -> None:
-    (tmp_path / "mine.txt").write_text("keep")
-    assert main(["chart", str(ARM), "--quick", "--out", str(tmp_path)]) == 3
-    assert str(tmp_path) in capsys.readouterr().err
-    assert (tmp_path / "mine.txt").read_text() == "keep"
-
-
-@pytest.mark.slow
-def test_the_terminal_begins_with_the_advice_of_the_page(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "chart"
-    case = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
-    asked = ["--quick", "--quiet", "--figures", "none", "--accuracy", "0.02"]
-    assert main(["chart", str(case), *asked, "--out", str(out)]) == 0
-    shown = capsys.readouterr().out
-    kept = json.loads((out / "chart.json").read_text())["advice"][0]
-    assert shown.startswith(f"Write `{kept['key']}` under `expansion`: ")
-    assert kept["key"].startswith("order: ")
-    first = shown.splitlines()[0].replace("`", "")
-    page = (out / "report.html").read_text().replace("<code>", "").replace("</code>", "")
-    assert first in page.partition("<details>")[0]
-    assert "What to write in the case" in shown
-    assert "Designs" not in shown
+    Path("mine").mkdir()
+    Path("mine/mine.txt").write_text("keep")
+    assert main(["chart", given, "--quick", "--out", "mine"]) == 3
+    assert "mine" in capsys.readouterr().err
+    assert [p.name for p in Path("mine").iterdir()] == ["mine.txt"]

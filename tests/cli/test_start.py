@@ -192,8 +192,9 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
     if "init" not in lines[0]:
         for template in ("planar_arm", "four_bar"):
             assert main(["init", template]) == 0
-        Path("cases").mkdir()
+        Path("cases/stress").mkdir(parents=True)
         shutil.copy(TWO_LINK, "cases")
+        shutil.copy(CASES / "stress" / "straight_arm.yaml", "cases/stress")
         for path in CASES.glob("arm_update.*"):
             shutil.copy(path, ".")
     for line in lines:

@@ -459,9 +459,10 @@ def test_a_chart_has_one_plot_and_draws_the_rest_where_it_is_unfolded(browser, t
     browser.get_log("browser")
     at(browser, out / "report.html", 1200)
     first = browser.find_element("css selector", ".plot")
-    assert first.get_attribute("data-figure") == "online_alone"
+    assert first.get_attribute("data-figure") == "plane"
     said = browser.find_element("css selector", ".verdict").text
-    assert said.startswith("Write order:")
+    assert said.startswith("The paper's method")
+    assert "Write order: 1 under expansion" in said
     assert sum(plot.is_displayed() for plot in browser.find_elements("css selector", ".plot")) == 1
     assert browser.execute_script("return document.documentElement.scrollHeight") < 1200
     browser.execute_script(
