@@ -3,7 +3,6 @@
 import re
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -43,48 +42,22 @@ def found(chart: Chart, kind: str) -> Finding:
     return one
 
 
-def random_arm(motion: str, design: str, seed: int) -> dict[str, Any]:
-    """Two rods; the elbow turns, or both joints, so that the tip moves; lengths or masses vary."""
+def random_arm(motion: str, design: str, seed: int) -> str:
+    """Two rods; the elbow turns once or twice, or the tip moves; a mass or a length varies."""
     draw = np.random.default_rng(seed).uniform
-    lengths, room = draw(0.4, 0.7, 2), draw(0.05, 0.3)
-    upper = {"length": lengths[0], "material": "m", "section": "s", "elements": 1}
-    varied = {
-        "none": {},
-        "mass": {"m": {"parameter": "bodies.tool.mass", "min": 0.1, "max": 0.1 + room}},
-        "length": {"l": {"parameter": "links.fore.length", "min": 0.5, "max": 0.5 + room}},
-    }
-    angles = {name: np.sort(draw(20.0, 160.0, 5)) for name in ("there", "more")}
+    text = (CASES.parent / "benchmarks" / "small_arm.yaml").read_text()
+    text = text.partition("trajectory:")[0].replace("0.5", f"{draw(0.5, 0.7)}")
+    angles = [np.sort(draw(20.0, 160.0, 5)) for _ in range(2)]
+    q = [", ".join(f"[0, {angle} deg]" for angle in own) for own in angles]
+    (x, y), end = draw([0.4, 0.3], [0.5, 0.35]), "samples: 6, branch: {elbow: [0, 180 deg]}}"
+    ranges = {"mass": "bodies.tool.mass, min: 0.1", "length": "links.fore.length, min: 0.4"}
     paths = {
-        name: {"q": [[0, f"{a} deg"] for a in own], "duration": 1} for name, own in angles.items()
-    }
-    start = np.array([0.45, 0.3]) + draw(-0.05, 0.05, 2)
-    moved = [list(start + k * np.array([-0.05, 0.04])) for k in range(3)]
-    tip = {
-        "tip": "fore.end",
-        "waypoints": moved,
-        "samples": 6,
-        "duration": 1,
-        "branch": {"elbow": [0, "180 deg"]},
-    }
-    trajectory = {
-        "one": paths["there"], "several": [{"name": k, **own} for k, own in paths.items()],
-        "tip": tip,
+        "none": "expansion: {q: [0, 1]}",
+        "one": f"trajectory: {{q: [{q[0]}], duration: 1}}",
+        "several": "trajectory: [" + ", ".join(
+            f"{{name: n{k}, q: [{own}], duration: 1}}" for k, own in enumerate(q)) + "]",
+        "tip": f"trajectory: {{tip: fore.end, waypoints: [[{x}, {y}], [{x - 0.1}, {y}]], {end}",
     }  # fmt: skip
-    case = {
-        "title": "Arm",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": draw(5e10, 2e11), "density": 2700}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {"upper": upper, "fore": {**upper, "length": lengths[1]}},
-            "joints": {
-                "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
-                "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
-            },
-            "bodies": {"tool": {"at": "fore.end", "mass": 0.1}},
-        },
-        "coordinates": {"q1": {"joint": "shoulder"}, "q2": {"joint": "elbow"}},
-        "design": varied[design],
-    }
-    given = trajectory.get(motion)
-    return {**case, "trajectory": given} if given else {**case, "expansion": {"q": [0, 1.0]}}
+    if design in ranges:
+        text += f"design: {{v: {{parameter: {ranges[design]}, max: {draw(0.5, 0.7)}}}}}\n"
+    return text + paths[motion]

@@ -13,7 +13,6 @@ import eigassign as ea
 from eigassign.chart import (
     Chart,
     advised,
-    build_matrix,
     build_subject,
     errors,
     headline,
@@ -104,22 +103,6 @@ def test_a_reader_sees_how_good_the_papers_method_is_and_how_far_it_goes(arm: Ch
     assert headline(charted("stress/mode_swaps")).startswith("Found: crossing, too few samples")
 
 
-def test_scenes_and_methods_are_put_side_by_side() -> None:
-    charts = {"arm": charted("two_link"), "still": charted("stress/straight_arm")}
-    made = build_matrix(charts, {"bad": "why"}, 1e-2, 1.0)
-    assert (made.cases, made.refused) == (("arm", "still"), (("bad", "why"),))
-    assert made.headline == "2 cases, methods fail by name in 1; 1 refused"
-    cells = {(c.case, c.curve): c for c in made.cells}
-    assert len(cells) == len(made.cells) == 22
-    for (name, curve), cell in cells.items():
-        own = [p for p in charts[name].points if p.curve == curve]
-        able = [p for p in own if p.worst_relative <= 1e-2]
-        assert (cell.cost_at_equal_accuracy is None) is (not able)
-        if cell.error_at_equal_cost is not None:
-            assert cell.error_at_equal_cost in [p.worst_relative for p in own]
-    assert cells["arm", "exact, eigassign"].cost_at_equal_accuracy == 1.0
-
-
 def test_a_folder_holds_every_point_and_the_page_begins_with_the_answer(
     arm: Chart, tmp_path: Path
 ) -> None:
@@ -140,9 +123,3 @@ def test_a_folder_holds_every_point_and_the_page_begins_with_the_answer(
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert figures == {"plane", "boxes", "claims"}
     assert f"{sum(p.worst_relative > 1.0 for p in chart.points)} over 100 % are not drawn" in page
-
-
-def test_a_case_of_which_nothing_varies_is_charted_with_its_mesh() -> None:
-    made = charted("stress/straight_arm")
-    assert {p.curve for p in made.points} == {"exact, eigassign", "exact, SciPy", "mesh"}
-    assert not made.boxes

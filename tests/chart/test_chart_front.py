@@ -1,6 +1,5 @@
 """Fronts follow from the numbers alone; the same chart has the same errors; failures have names."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,16 +98,10 @@ def test_the_same_chart_twice_has_the_same_methods_and_errors_to_the_last_digit(
     assert [f.kind for f in once.findings] == [f.kind for f in again.findings]
 
 
-def test_nothing_is_wrong_where_nothing_is_known_and_no_number_is_infinitely_wrong() -> None:
-    exact = np.array([[1.0, 2.0], [np.nan, 2.0], [4.0, 5.0]])
-    hz = np.array([[1.1, 2.0], [7.0, 9.0], [np.nan, 5.0]])
-    assert errors(hz, exact) == (np.inf, np.inf, 1)
-    assert errors(hz[:2], exact[:2]) == pytest.approx((0.1, 0.1 / math.sqrt(2), 0))
-
-
 # --- Failures by name
 
 KINDS = {
+    "../two_link": set[str](),
     "mode_swaps": {"crossing", "too few samples to see a kink"},
     "veering": {"veering", "too few samples to see a kink"},
     "exact_crossing": {"crossing", "too few samples to see a kink"},
@@ -124,10 +117,6 @@ def test_cases_of_one_trouble_have_its_name_and_no_other(name: str) -> None:
     findings = charted(f"stress/{name}").findings
     assert {each.kind for each in findings} == KINDS[name]
     assert all(each.where and each.methods and each.why and each.instead for each in findings)
-
-
-def test_the_papers_arm_has_no_trouble() -> None:
-    assert charted("two_link").findings == ()
 
 
 def test_modes_that_meet_are_told_with_place_and_gap() -> None:
