@@ -24,7 +24,6 @@ OWNERS = {
     "jinja2": {"output"},
     "platformdirs": {"output"},
     "click": {"cli"},
-    "sklearn": {"chart"},
 }
 EVERYWHERE = {"numpy", "scipy"}
 LATE = (  # what few cases or options need is imported when they do: a run of two_link has none

@@ -21,6 +21,7 @@ from eigassign.chart.results import (
 from eigassign.facts import percent, time_in_words
 
 ALIKE = 1.25  # times that differ by less are alike: a busy machine's spread
+ALIKE_DESIGNS = 1e-4  # of the bounds: the search ends within 1e-6
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 
 
@@ -39,7 +40,7 @@ def headline(chart: Chart) -> str:
         size = "order 4" if "order 4" in paper else next(reversed(paper))
         line = f"The paper's method (series linearised in y, {size}) is {percent(paper[size])} off"
         line += " at worst"
-        if min(paper.values()) > 0.5 * paper[size]:
+        if min(paper.values()) > 0.5 * paper[size] > 0.01 * chart.asked.accuracy:
             line += ", and more orders do not help"
         reach = [r for r in chart.reach if r.method == f"{LINEAR}, {size}"]
         far = "; ".join(_far(r, chart.asked.varied) for r in reach if r.half_width < 1.0)
@@ -67,6 +68,11 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
         same = f"to {moved:.0e} of the bounds" if moved > 1e-12 else "to the last digit"
         words = f"nothing: the design is the same {same} for orders {names}, since the search "
         words += "solves exactly"
+        if moved > ALIKE_DESIGNS:
+            words = (
+                f"the order counts: the design differs by up to {moved:.1g} of the bounds among "
+            )
+            words += f"orders {names}"
         words += f"; the one shot is off by {shots}" if shots else ""
         yield Advice("a design (`optimize`)", words)
     able = [p for p in chart.points if p.worst_relative <= accuracy]
@@ -98,6 +104,7 @@ def build_matrix(
         version=__version__, accuracy=accuracy, evaluations=EQUAL, machine=machine(),
         cases=tuple(charts), cells=tuple(cells), refused=tuple(refused.items()),
         findings={name: chart.findings for name, chart in charts.items()}, seconds=seconds,
+        notes=tuple(dict.fromkeys(note for chart in charts.values() for note in chart.notes)),
     )  # fmt: skip
 
 

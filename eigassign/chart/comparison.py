@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from eigassign._version import __version__
 from eigassign.chart.boxes import reaches, study_boxes
 from eigassign.chart.failures import find_failures, near_modes
 from eigassign.chart.methods import (
-    KRIGING,
     MESH,
     NO_KRIGING,
     Built,
@@ -100,7 +100,7 @@ def compare_methods(
         asked=question, points=points, skipped=tuple(skipped.items()),
         fronts=tuple(front(points, n, accuracy, constant) for n in EVALUATIONS),
         boxes=boxes, reach=reaches(boxes, accuracy), findings=tuple(found),
-        notes=() if any(p.curve == KRIGING for p in points) else (NO_KRIGING,),
+        notes=() if find_spec("sklearn") else (NO_KRIGING,),
         warnings=tuple(map(str, file.warnings)),
     )  # fmt: skip
 

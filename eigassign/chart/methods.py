@@ -211,8 +211,9 @@ def _surface(subject: Subject, degree: int, learnt: Points) -> Built:
         def terms(at: Floats) -> Floats:
             return np.asarray(np.prod(at[:, None, :] ** powers, axis=2))
 
-        coefficients = lstsq(terms(u), hz)[0]
-        return lambda at: np.asarray(terms(at) @ coefficients)
+        mean = hz.mean(axis=0)  # which too few points would not give
+        coefficients = lstsq(terms(u), hz - mean)[0]
+        return lambda at: np.asarray(mean + terms(at) @ coefficients)
 
     return Built(_fitted(subject, learnt, fit))
 
@@ -231,7 +232,9 @@ def _kriged(subject: Subject, learnt: Points) -> Built:
 
     def fit(u: Floats, hz: Floats) -> Any:
         kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(u.shape[1]), (1e-2, 1e3))
-        process = GaussianProcessRegressor(kernel, alpha=1e-10, normalize_y=True)
+        process = GaussianProcessRegressor(
+            kernel, alpha=1e-10, normalize_y=True, n_restarts_optimizer=2, random_state=0
+        )
         return partial(process.fit(u, hz).predict, return_std=True)
 
     with warnings.catch_warnings():

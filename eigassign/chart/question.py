@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,16 +144,29 @@ class Subject:
             k = np.rint(last * (share if self.changes else np.linspace(0, 1, count))).astype(int)
             q = self.path.q[k]
             if self.path.follows_design:
-                q = np.array([poses_at(self.path, y[i])[k[i]] for i in range(count)])
+                q = np.array([self._poses_at(y[i])[k[i]] for i in range(count)])
         x = np.hstack([q, y])
         once = np.sort(np.unique(x, axis=0, return_index=True)[1])
         return Points(x[once], k[once].astype(np.float64), once)
 
     def along(self, y: Floats) -> Points:
         """One trajectory, at its own samples, or a single pose, at design y."""
-        q = self.split(self.x0[None])[0] if self.path is None else poses_at(self.path, y)
+        q = self._poses_at(y)
         x = np.hstack([q, np.tile(y, (len(q), 1))])
         return Points(x, np.arange(len(q), dtype=np.float64), np.zeros(len(q), dtype=np.intp))
+
+    def _poses_at(self, y: Floats) -> Floats:
+        """q at every sample at design y, made once; of x0 without a path."""
+        if self.path is None:
+            return self.split(self.x0[None])[0]
+        key = y.tobytes()
+        if key not in self._followed:
+            self._followed[key] = poses_at(self.path, y)
+        return self._followed[key]
+
+    @cached_property
+    def _followed(self) -> dict[bytes, Floats]:
+        return {}
 
     def _designs(self, first: int, count: int) -> Floats:
         lower, upper = self.bounds

@@ -83,7 +83,7 @@ def chart_cases(
     common = Path(os.path.commonpath([path.absolute().parent for path in paths]))
     with run_folder(target, case_path=common, key="charts", force=options.force) as hidden:
         for k, path in enumerate(paths, 1):
-            name = path.stem if path.stem not in charts else str(path)
+            name = str(path) if path.stem in {*charts, *refused} else path.stem
             with stages(name, f"{name} ({k} of {len(paths)})"):
                 try:
                     case = load_case(path, options.allow_outside)

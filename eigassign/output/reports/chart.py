@@ -78,7 +78,7 @@ def _plane(chart: Chart) -> FigurePlan:
         "points, elements a link. Full colours: within what is wanted, and nothing is both quicker "
         "and more accurate. Squares: the error of the mesh itself."
     )
-    caption += f" {lost} over 100 % are not drawn." if lost else ""
+    caption += f" Not drawn: {lost} over 100 %." if lost else ""
     heading = "Error against time"
     shows = Graph(heading, "time of a trajectory [s]", np.zeros(0), tuple(panels),
                   x_logarithmic=True, beside=True)  # fmt: skip
@@ -131,7 +131,7 @@ def _claims(chart: Chart) -> FigurePlan:
     rows = [r for r in chart.boxes if r.claimed is not None and r.worst_relative < 1.0]
     marks: list[Mark] = []
     for method, look in _looks(chart.boxes).items():
-        own = [r for r in rows if r.method == method and r.claimed]
+        own = [r for r in rows if r.method == method and r.claimed is not None]
         x = 100.0 * np.array([r.worst_relative for r in own])
         y = np.maximum(100.0 * np.array([r.claimed for r in own], dtype=np.float64), LEAST)
         if own:
