@@ -95,7 +95,7 @@ def test_the_search_ends_at_one_design_with_all_orders_and_the_one_shot_does_not
 
 def test_a_reader_sees_how_good_the_papers_method_is_and_how_far_it_goes(arm: Chart) -> None:
     line = headline(arm)
-    worst = rows_of(arm, "Taylor, linearised in y")["order 4"].worst_relative
+    worst = rows_of(arm, "Taylor, linearised in y")["4"].worst_relative
     assert f"linearised in y, order 4) is {100 * worst:.3g}" in line
     assert "more orders do not help" in line
     reach = {r.varied: r.half_width for r in arm.reach if r.method.endswith("in y, order 4")}
