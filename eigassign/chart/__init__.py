@@ -5,9 +5,8 @@ Reading order:
     results     what a chart holds, as plain numbers, and words for these
     question    points to learn from, and others as a test
     methods     the list of methods
-    boxes       error against the size of the box
     failures    what makes methods fail, by name
-    comparison  every method put the same question; which no other beats
+    comparison  every method put the same question, in boxes too; which no other beats
     advice      what to write for which question; several cases side by side
 """
 
@@ -17,8 +16,7 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "advice": "advised build_matrix headline",
-        "boxes": "HALF_WIDTHS reaches study_boxes",
-        "comparison": "compare_methods front",
+        "comparison": "HALF_WIDTHS compare_methods front reaches study_boxes",
         "failures": "find_failures near_modes",
         "methods": "CURVES Built Method list_methods",
         "question": "QUICK Effort Points Subject build_subject errors",

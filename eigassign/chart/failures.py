@@ -64,7 +64,8 @@ def near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
     ]
     if model.n_dof > SOUGHT_DOF or not (subject.rows or subject.changes):
         return tuple(found)
-    beside = (np.diff(tests.design) == 0) & (np.abs(np.diff(tests.place)) < len(tests))
+    part = np.searchsorted([own.start for own in subject.rows], tests.place, side="right")
+    beside = (np.diff(tests.design) == 0) & (np.diff(part) == 0) & bool(subject.rows)
     q0, y = subject.split(subject.x0)[0], subject.split(tests.x)[1]
     y = y[np.unique(tests.design, return_index=True)[1]]
     designs = np.hstack([np.tile(q0, (len(y), 1)), y])
