@@ -15,7 +15,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property, reduce
@@ -58,18 +58,12 @@ from eigassign.case.rules.properties import (
     property_at,
     quantities,
     value_at,
+    walk,
     with_value,
 )
 from eigassign.case.schema.design import RESERVED, Design, Parameter, Tolerance
 from eigassign.case.schema.document import Document, validated
-from eigassign.case.schema.mechanism import (
-    Body,
-    Coordinate,
-    JointBase,
-    Mechanism,
-    Spring,
-    freedom_of,
-)
+from eigassign.case.schema.mechanism import Coordinate, Mechanism, freedom_of
 from eigassign.case.schema.parts import FrozenDict, Part, Quantity
 from eigassign.case.schema.study import (
     AssignmentKeys,
@@ -81,7 +75,6 @@ from eigassign.case.schema.study import (
 from eigassign.case.schema.targets import AnyTarget, TargetForm
 from eigassign.case.schema.trajectory import (
     Added,
-    AnyTrajectory,
     TrajectoryForm,
     named_trajectories,
 )
@@ -130,30 +123,15 @@ def plain(value: object) -> object:
     if isinstance(value, Tolerance):
         return value.written()
     if isinstance(value, Part):
-        fields = {
-            f.alias or name: getattr(value, name) for name, f in type(value).model_fields.items()
-        }
-        return plain({key: v for key, v in fields.items() if key not in _superfluous(value)})
+        fields = {f.alias or n: getattr(value, n) for n, f in type(value).model_fields.items()}
+        if fields.get("base", "ground") != "ground" and not any(fields["position"] or ()):
+            del fields["position"]  # of a joint at the node of a link
+        return plain(fields)
     if isinstance(value, Mapping):
         return {key: plain(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, (tuple, list)):
         return [plain(inner) for inner in value]
     return value
-
-
-def _superfluous(value: Part) -> set[str]:
-    """Keys that say nothing: zero offsets from a link's node, the other space's turn, a
-    trajectory that sets nothing."""
-    keys = set()
-    if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
-        keys.add("angle")
-    if isinstance(value, JointBase) and value.base != "ground" and not any(value.position or ()):
-        keys.add("position")
-    if isinstance(value, Body) and not any(value.offset or ()):
-        keys.add("offset")
-    if isinstance(value, AnyTrajectory) and not value.set:
-        keys.add("set")
-    return keys
 
 
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
@@ -550,19 +528,8 @@ def key_objection(tree: Tree, folder: Path, key: str, value: object) -> str | No
 
 def _nearest(tree: Tree, key: str) -> str | None:
     """The key of the file that was probably meant."""
-    names = (".".join(map(str, path)) for path in _leaves(tree, ()) if path[0] != "sweep")
+    given = (path for path, node in walk(tree) if not isinstance(node, Mapping))
+    names = (".".join(map(str, path)) for path in given if path[0] != "sweep")
     known = list(islice(names, 2000))  # a fraction of a second, however long the file
     longer = [name for name in known if name.endswith(f".{key}")]
     return next(iter(longer or get_close_matches(key, known, n=1, cutoff=0.6)), None)
-
-
-def _leaves(node: Any, path: KeyPath) -> Iterator[KeyPath]:
-    if isinstance(node, Mapping):
-        inner: Any = node.items()
-    elif isinstance(node, tuple) and any(isinstance(v, (Mapping, tuple)) for v in node):
-        inner = enumerate(node)
-    else:
-        yield path
-        return
-    for step, value in inner:
-        yield from _leaves(value, (*path, step))

@@ -263,7 +263,7 @@ def _values(row: list[str], columns: Sequence[_Heading], n: int) -> Iterator[flo
             raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number{mixed}")
         si = column.unit.to_si(value)
         try:
-            require_size(si, column.dimension, shown(cell))
+            require_size(si, column.dimension, cell)
         except QuantityError as error:
             raise ValueError(f"column {column.name}: {error}") from None
         if column.bare and column.dimension == DIMENSIONS["angle"] and abs(si) > TWO_TURNS:

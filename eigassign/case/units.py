@@ -197,18 +197,18 @@ def read_quantity(value: object, dimension: Dimension | None) -> float:
         raise QuantityError(f"{_expected(dimension)}, got {shown(value)}")
     else:
         si = float(value) if abs(value) < 1.7e308 else math.inf
-    require_size(si, dimension, shown(value))
+    require_size(si, dimension, value)
     return si
 
 
-def require_size(si: float, dimension: Dimension | None, given: str) -> None:
+def require_size(si: float, dimension: Dimension | None, given: object) -> None:
     """Raises QuantityError for a number that is not finite, or too large to calculate with."""
     if not math.isfinite(si):
-        raise QuantityError(f"must be a finite number, got {given}")
+        raise QuantityError(f"must be a finite number, got {shown(given)}")
     known = dimension or PLAIN
     if abs(si) > known.largest:
         most = f"{known.largest:g} {known.si}".rstrip()
-        raise QuantityError(f"too large to calculate with, got {given}; at most {most}")
+        raise QuantityError(f"too large to calculate with, got {shown(given)}; at most {most}")
 
 
 def number_and_unit(value: object) -> tuple[Fraction, str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import cache, reduce
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
@@ -98,6 +98,7 @@ def _parts(case: Any, group: str) -> Mapping[str, Any]:
 def _numbers(case: Any, group: str, name: str) -> dict[str, Quantity]:
     """The numbers of one part that can vary, by the keys that lead to them."""
     part, mechanism = _parts(case, group)[name], case.mechanism
+    model: type[Part] = type(part)
     spatial = mechanism.space == "spatial"
     if group == "coordinates":
         given = [key for key in DRIVEN if getattr(part.drive, key, None) is not None]
@@ -110,7 +111,7 @@ def _numbers(case: Any, group: str, name: str) -> dict[str, Quantity]:
         fixed.add("poissons_ratio")
     found = {
         key: kind
-        for key, kind in quantities(type(part)).items()
+        for key, kind in quantities(model).items()
         if key not in fixed and isinstance(getattr(part, key), float)
     }
     n = 3 if spatial else 2
@@ -141,6 +142,7 @@ def is_place(path: str) -> bool:
     return key in ("length", "angle", *_VECTORS.get(group, ()))
 
 
+@cache
 def quantities(model: type[Part]) -> dict[str, Quantity]:
     """The real-valued properties that a mechanism can be built with as variables."""
     found = {k: _quantity(f.annotation, f.metadata) for k, f in model.model_fields.items()}
@@ -199,20 +201,26 @@ def with_value(part: Any, path: Sequence[str | int], value: float) -> Any:
 # --- Looking into a document
 
 
-def walk(part: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object]]:
+def walk(part: object, path: KeyPath = ()) -> list[tuple[KeyPath, object]]:
     """Key path and content of everything from ``part`` down, but for bare numbers."""
-    yield path, part
-    inner: Any = ()
+    found: list[tuple[KeyPath, object]] = []
+    _walk(part, path, found)
+    return found
+
+
+def _walk(part: object, path: KeyPath, found: list[tuple[KeyPath, object]]) -> None:
+    found.append((path, part))
     if isinstance(part, Part):
-        fields = type(part).model_fields.items()
-        inner = [(field.alias or name, getattr(part, name)) for name, field in fields]
-    elif isinstance(part, Mapping):
-        inner = part.items()
+        for key, field in type(part).model_fields.items():
+            apart = key == "entries" and isinstance(part, Design)  # they stand in it directly
+            _walk(getattr(part, key), path if apart else (*path, field.alias or key), found)
+    elif isinstance(part, dict):
+        for key, each in part.items():
+            _walk(each, (*path, key), found)
     elif isinstance(part, tuple):
-        inner = ((k, each) for k, each in enumerate(part) if type(each) is not float)
-    for key, each in inner:  # the entries of a design stand in it directly
-        apart = isinstance(part, Design) and key == "entries"
-        yield from walk(each, path if apart else (*path, key))
+        for k, each in enumerate(part):
+            if type(each) is not float:
+                _walk(each, (*path, k), found)
 
 
 def followed_modes(document: Document) -> list[tuple[KeyPath, FollowedMode]]:
@@ -223,14 +231,17 @@ def followed_modes(document: Document) -> list[tuple[KeyPath, FollowedMode]]:
 
 def coordinate_lists(document: Document) -> Iterator[tuple[KeyPath, Sequence[float]]]:
     """Key path and content of whatever has an entry for each coordinate."""
-    for path, row in walk(document):
-        match [key for key in path if isinstance(key, str)]:
-            case (
-                ["expansion" | "measurements", "q"]
-                | ["trajectory", "q" | "points" | "start"]
-                | ["targets", *_, "at", "q"]
-            ) if isinstance(row, tuple) and not any(isinstance(each, tuple) for each in row):
-                yield path, row
+    for group in ("expansion", "measurements", "trajectory", "targets"):
+        for path, row in walk(getattr(document, group), (group,)):
+            if not isinstance(row, tuple) or any(isinstance(each, tuple) for each in row):
+                continue
+            match [key for key in path if isinstance(key, str)]:
+                case (
+                    ["expansion" | "measurements", "q"]
+                    | ["trajectory", "q" | "points" | "start"]
+                    | ["targets", *_, "at", "q"]
+                ):
+                    yield path, row
 
 
 def freedoms(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
@@ -324,7 +335,7 @@ def _read(value: object, kind: Quantity | None) -> float:
         message = "terms of different dimensions: give a plain number in SI units, got "
         raise QuantityError(message + shown(given))
     if kind is not None and kind.rate:
-        return replace(kind, dimension=None).checked(read_rate(given, kind.dimension), shown(given))
+        return replace(kind, dimension=None).checked(read_rate(given, kind.dimension), given)
     if kind is not None and kind is not ANY:
         return kind.read(given)
     return read_quantity(given, None)

@@ -18,9 +18,9 @@ import inspect
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeAlias, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -210,16 +210,16 @@ class Quantity:
         if self.elsewhere and isinstance(value, (str, int, float)) and not isinstance(value, bool):
             try:
                 si = (read_rate if self.rate else read_quantity)(value, None)
-                self.checked(si, "")
+                self.checked(si, value)
             except QuantityError:
                 return Written(math.nan, value)
             bare = self.at_most is not None and not isinstance(value, str)
             return si if bare else Written(si, value)
         if self.dimension is None and isinstance(value, str):
             raise QuantityError(f"expected a number without unit, got text {shown(value)}")
-        return self.checked(read_quantity(value, self.dimension), shown(value))
+        return self.checked(read_quantity(value, self.dimension), value)
 
-    def checked(self, si: float, given: str) -> float:
+    def checked(self, si: float, given: object) -> float:
         """``si`` if it is within the limits. Raises QuantityError.
 
         Nothing but 0 may be too small to calculate with.
@@ -232,13 +232,13 @@ class Quantity:
             ("<=", self.at_most, self.at_most is None or si <= self.at_most),
         ):
             if not holds:
-                raise QuantityError(f"must be {sign} {limit:g}{unit}, got {given}")
+                raise QuantityError(f"must be {sign} {limit:g}{unit}, got {shown(given)}")
         known, positive = self.dimension or PLAIN, 0 in (self.above, self.at_least)
         least = known.smallest if positive else _NOTHING
         if 0 < abs(si) < least:
             zero = "" if self.above == 0 else "0 or "
-            message = f"too small to calculate with, got {given}; {zero}at least {least:g}{unit}"
-            raise QuantityError(message)
+            message = f"too small to calculate with, got {shown(given)}; {zero}at least "
+            raise QuantityError(f"{message}{least:g}{unit}")
         return si
 
     def _validate(self, value: object) -> float:
@@ -278,31 +278,19 @@ def quantity(dimension: str, above: float | None = None, at_least: float | None 
 _NAME = re.compile(r"[^\W\d][\w-]{0,63}")
 
 
-class FrozenDict(Mapping[str, V]):
+class FrozenDict(dict[str, V]):
     """An immutable, hashable, picklable mapping that keeps the order of the file."""
 
-    __slots__ = ("_items",)
-    _items: dict[str, V]
+    __slots__ = ()
 
-    def __init__(self, items: Mapping[str, V] | None = None) -> None:
-        object.__setattr__(self, "_items", dict(items or {}))
-
-    def __setattr__(self, name: str, value: object) -> None:
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
         raise TypeError("a case file's mapping is immutable")
 
-    __delattr__ = None  # type: ignore[assignment]
+    __setitem__ = __delitem__ = __ior__ = __setattr__ = _refuse
+    clear = pop = popitem = setdefault = update = property()  # it has none
 
-    def __getitem__(self, key: str) -> V:
-        return self._items[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def __hash__(self) -> int:
-        return hash(tuple(self._items.items()))
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self.items()))
 
     def __eq__(self, other: object) -> bool:
         """Equal when keys, values *and order* agree: the order of q and y carries meaning."""
@@ -310,11 +298,11 @@ class FrozenDict(Mapping[str, V]):
             return NotImplemented
         return list(self.items()) == list(other.items())
 
-    def __reduce__(self) -> tuple[type[FrozenDict[V]], tuple[dict[str, V]]]:
-        return type(self), (self._items,)
+    def __ne__(self, other: object) -> bool:
+        return not self == other
 
-    def __repr__(self) -> str:
-        return repr(self._items)
+    def __reduce__(self) -> tuple[type[FrozenDict[V]], tuple[dict[str, V]]]:
+        return type(self), (dict(self),)
 
 
 Frozen = AfterValidator(FrozenDict)
@@ -439,10 +427,10 @@ def space_of(info: ValidationInfo) -> str | None:
 
 
 def only_in(space: str, message: str, neutral: object = None) -> Any:
-    """Validator of a key that belongs to one space; in the other it may be ``neutral``."""
+    """Validator of a key that belongs to one space; in the other it may be ``neutral`` or 0."""
 
     def belongs(value: object, info: ValidationInfo) -> object:
-        if value != neutral and space_of(info) not in (None, space):
+        if value not in (neutral, 0.0) and space_of(info) not in (None, space):
             raise wrong(message)
         return value
 
