@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.trajectory import TIME, TIP_COLUMNS
-from eigassign.study.results import RunResults, TargetStudy, TrajectoryRow
+from eigassign.study.results import RunResults, StaticRow, TargetStudy, TrajectoryRow
 
 Floats = NDArray[np.float64]
 Column = tuple[str, Sequence[object]]  # heading, one entry a sample
@@ -33,9 +33,9 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
     }
     files["frequencies.csv"] = _number_text(frequency_columns(results))
     if results.drives:
-        files["drives.csv"] = _number_text([*_samples(results), *_exerted(results)])
+        files["drives.csv"] = _number_text([*_samples(results), *_both(results.drives)])
     if results.statics:
-        files["statics.csv"] = _number_text([*_samples(results), *_given(results)])
+        files["statics.csv"] = _number_text([*_samples(results), *_both(results.statics)])
     return files
 
 
@@ -61,23 +61,15 @@ def frequency_columns(results: RunResults) -> list[Column]:
 
 def _samples(results: RunResults) -> Iterator[Column]:
     if len(results.trajectories) > 1:
-        yield "trajectory", results.trajectory_names
+        yield "trajectory", [row.name for row in results.trajectories for _ in range(row.samples)]
     yield from _motion(results, slice(0, results.time_s.size))
 
 
-def _exerted(results: RunResults) -> Iterator[Column]:
-    """What each drive exerts before and after."""
-    for row in results.drives:
+def _both(rows: Sequence[StaticRow]) -> Iterator[Column]:
+    """What drives exert, or stiffnesses, compliances and sags, before and after."""
+    for row in rows:
         for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
-            quantity = "force" if row.unit == "N" else "torque"
-            yield f"{row.name} {quantity} {when} [{row.unit}]", curve.tolist()
-
-
-def _given(results: RunResults) -> Iterator[Column]:
-    """Stiffnesses, compliances and sags before and after."""
-    for row in results.statics:
-        for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
-            yield f"{row.name} {when} [{row.unit}]", curve.tolist()
+            yield f"{row.name}{row.quantity} {when} [{row.unit}]", curve.tolist()
 
 
 def _motion(results: RunResults, rows: slice) -> Iterator[Column]:

@@ -24,7 +24,6 @@ from eigassign.facts import (
 )
 from eigassign.study.results import (
     MET,
-    Comparison,
     DesignRow,
     ErrorSummary,
     LeverRow,
@@ -138,21 +137,8 @@ def _design(results: RunResults) -> Iterator[Table]:
         caption = f"{what} costs {number(price)} in all. {caption}".strip()
     names = "name parameter handy initial optimal lower upper lies_on chosen"
     priced = " cost" * (price is not None)
-    made = facts_table("Design", results.design, names + priced, caption, cost=cost)
-    if results.design and (mass := results.mass) is not None:
-        named = any(each.name == "mass" for each in results.design)
-        own = {
-            "name": "total mass" if named else "mass",
-            "parameter": "of all links and bodies",
-            "unit": "kg",
-            "initial": number(mass.initial),
-            "optimal": number(mass.optimal),
-            "lower": "" if mass.lower is None else number(mass.lower),
-            "upper": "" if mass.upper is None else number(mass.upper),
-            cost: "" if mass.price is None else number(mass.cost),
-        }
-        made = made._replace(rows=(*made.rows, tuple(own.get(c, "") for c in made.columns)))
-    yield made
+    rows = (*results.design, *filter(None, [results.mass])) if results.design else ()
+    yield facts_table("Design", rows, names + priced, caption, cost=cost)
     yield _combinations(results)
 
 
@@ -344,18 +330,16 @@ def _approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and everywhere."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error of the frequency, against exact solves."
-    rows = []
-    for study in results.studies:
-        places: list[tuple[str, Comparison]] = []
-        if study.over_time is not None:
-            places.append((f"along {results.along}, initial design", study.over_time))
-        for where, values in places:
-            worst = (percent(values.worst["taylor"]), percent(values.worst["linearised"]))
-            rows.append((f"mode {study.mode}", where, str(study.order), *worst))
-        if study.stated is not None:
-            worst = (percent(study.stated["taylor"]), percent(study.stated["linearised"]))
-            where = "between samples, all over the bounds, with a margin"
-            rows.append((f"mode {study.mode}", where, str(study.order), *worst))
+    where = {
+        "over_time": f"along {results.along}, initial design",
+        "everywhere": "between samples, all over the bounds, with a margin",
+    }
+    rows = [
+        (f"mode {study.mode}", where[place], str(study.order), *map(percent, worst.values()))
+        for study in results.studies
+        for place, worst in study.max_relative.items()
+        if worst is not None
+    ]
     return Table("Approximation", columns, tuple(rows), caption)
 
 

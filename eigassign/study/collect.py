@@ -106,7 +106,8 @@ def _answer(
     answer, targets, solved = assigned.answer, assigned.targets, assigned.solved
     row = assignment_row(scene, assigned, accuracy, motion)
     rows, limits, mass = design_rows(scene, answer.y), scene.file.design.mass, scene.model.mass
-    asked = (None, None) if limits is None else (limits.min, limits.max, limits.price)
+    asked = (None,) * 3 if limits is None else (limits.min, limits.max, limits.price)
+    name = "total mass" if any(one.name == "mass" for one in rows) else "mass"
     on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}
     return {
         "design": tuple(replace(one, lies_on=on.get(one.name, "")) for one in rows),
@@ -117,7 +118,7 @@ def _answer(
         "solver": None if answer.one_shot is None else solver_row(answer.one_shot),
         "assignment": row,
         "meaning": assigned.meaning,
-        "mass": MassRow(mass(scene.initial), mass(answer.y), *asked),
+        "mass": MassRow(mass(scene.initial), mass(answer.y), *asked, name),
         "drives": _drives(scene, answer.y),
         "statics": tuple(_statics(scene, answer.y)),
     }
@@ -153,7 +154,7 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
         return file.design.torque[name].max if name in file.design.torque else None
 
     return tuple(
-        DriveRow(name, unit, of, limit(name), load(tau), load(tau_y), before, after)
+        DriveRow(name, unit, limit(name), before, after, of, load(tau), load(tau_y))
         for name, unit, tau, tau_y, before, after in zip(
             *(file.coordinates, file.drive_units), *(c.T for c in (*along, *curves)), strict=True
         )

@@ -126,19 +126,15 @@ class ModeStudy(Brief):
     everywhere: Unwritten[Comparison | None] = None  # between the samples, all over the bounds
 
     @property
-    def stated(self) -> Mapping[str, float] | None:
-        """The errors of both expansions that are stated: the worst ``everywhere``, with margin."""
-        if (found := self.everywhere) is None:
-            return None
-        return {name: MARGIN * error for name, error in found.worst.items()}
-
-    @property
     def max_relative(
         self,
     ) -> Annotated[Mapping[str, Mapping[str, Share] | None], _OF_EXPANSIONS]:
         """The largest errors of both expansions by where they were looked for."""
-        along = None if self.over_time is None else self.over_time.worst
-        return {"over_time": along, "everywhere": self.stated}
+        places = {"over_time": (self.over_time, 1.0), "everywhere": (self.everywhere, MARGIN)}
+        return {
+            place: None if found is None else {k: times * e for k, e in found.worst.items()}
+            for place, (found, times) in places.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -208,18 +204,25 @@ class DesignRow:
 
 @dataclass(frozen=True)
 class MassRow:
-    """Mass of all links and bodies before and after, and its limits if any, in kg."""
+    """Mass of all links and bodies before and after, and its limits if any, in kg.
+
+    It is a row of the table of design parameters, by a ``name`` that no parameter has.
+    """
 
     initial: Kilograms
     optimal: Kilograms
     lower: Kilograms | None
     upper: Kilograms | None
     price: Annotated[float | None, Fact("of one kg")] = None
+    name: Key = "mass"
+    parameter = "of all links and bodies"
+    handy = ("kg", 1.0)
+    lies_on = chosen = ""
 
     @property
-    def cost(self) -> float:
-        """Price of the change; 0 without a price."""
-        return (self.price or 0.0) * (self.optimal - self.initial)
+    def cost(self) -> float | None:
+        """Price of the change; None without a price."""
+        return None if self.price is None else self.price * (self.optimal - self.initial)
 
 
 @dataclass(frozen=True)
@@ -232,29 +235,6 @@ class DriveLoad:
 
 
 @dataclass(frozen=True, repr=False)
-class DriveRow(Brief):
-    """What the drive of one coordinate exerts, positive along it, before and after; (n_t,) curves.
-
-    The links are rigid: torque in N m, or force in N, of weight and motion as ``of`` says. Springs
-    of `springs` rest in the unloaded pose and carry nothing.
-    """
-
-    name: Key
-    unit: str
-    of: Annotated[str, Fact("weight, motion or both")]
-    limit: Annotated[InUnit | None, Fact("of its magnitude")]
-    initial: DriveLoad
-    optimal: DriveLoad
-    initial_curve: Annotated[Floats, Fact("before", unit=OF_ROW)]
-    optimal_curve: Annotated[Floats, Fact("with the answer", unit=OF_ROW)]
-
-    @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
-        """The unit that people read it in, and the size of that in SI."""
-        return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
-
-
-@dataclass(frozen=True, repr=False)
 class StaticRow(Brief):
     """A stiffness, compliance or sag that a target limits, before and after; (n_t,) curves.
 
@@ -263,9 +243,42 @@ class StaticRow(Brief):
 
     name: Key
     unit: str
-    limit: InUnit
+    limit: Annotated[InUnit | None, Fact("of the magnitude")]
     initial_curve: Annotated[Floats, Fact("before", unit=OF_ROW, may_lack=True)]
     optimal_curve: Annotated[Floats, Fact("with the answer", unit=OF_ROW, may_lack=True)]
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read it in, and the size of that in SI."""
+        return handy_unit(self.unit, self.limit or 0.0)
+
+    @property
+    def quantity(self) -> str:
+        """What it is, where its name does not say it."""
+        return ""
+
+
+@dataclass(frozen=True, repr=False)
+class DriveRow(StaticRow):
+    """What the drive of one coordinate exerts, positive along it, before and after; (n_t,) curves.
+
+    The links are rigid: torque in N m, or force in N, of weight and motion as ``of`` says. Springs
+    of `springs` rest in the unloaded pose and carry nothing.
+    """
+
+    of: Annotated[str, Fact("weight, motion or both")]
+    initial: DriveLoad
+    optimal: DriveLoad
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read it in, and the size of that in SI."""
+        return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
+
+    @property
+    def quantity(self) -> str:
+        """The word for what it exerts."""
+        return " force" if self.unit == "N" else " torque"
 
 
 @dataclass(frozen=True)
@@ -675,7 +688,6 @@ class AssignmentRow(Brief):
     active: Annotated[tuple[ActiveLimit, ...], Fact("limits that the answer lies on")]
     one_shot: Annotated[Floats | None, Fact("the paper's design")]
     max_error: Annotated[Share, Fact("the largest error that is accepted")]
-    max_error_given: Annotated[bool, Fact("the case says so")]
     clearances: Annotated[tuple[ClearanceRow, ...], Fact("of bands to keep out of")] = ()
     model_error: Annotated[Share | None, Fact("how much too high mesh and reduced links are")]
     conflict: Annotated[tuple[str, ...], Fact("limits that contradict each other")] = ()
@@ -884,23 +896,6 @@ class TrajectoryRow(Brief):
 
 
 @dataclass(frozen=True)
-class CoordinateRow:
-    """A coordinate at all samples."""
-
-    unit: str
-    values: Annotated[Floats, Fact(unit=OF_ROW)]
-
-
-@dataclass(frozen=True)
-class MotionRow:
-    """The samples, of several trajectories one after the other."""
-
-    time_s: Annotated[Floats, Fact("from the start of its trajectory", unit="s")]
-    trajectory: OfSamples
-    coordinates: Mapping[str, CoordinateRow]
-
-
-@dataclass(frozen=True)
 class MeshError:
     """The largest relative error of the mesh in frequency; infinite where it is too coarse."""
 
@@ -1022,20 +1017,6 @@ class RunResults(Origin):
     def frequencies(self) -> Curves | None:
         """Those of the first target."""
         return self.targets[0].frequencies if self.targets else None
-
-    @property
-    def trajectory_names(self) -> list[str]:
-        """The name of each sample's trajectory."""
-        return [row.name for row in self.trajectories for _ in range(row.samples)]
-
-    @property
-    @told("trajectory")
-    def motion(self) -> MotionRow:
-        """All samples."""
-        names = self.trajectory_names if len(self.trajectories) > 1 else None
-        each = zip(self.q_names, self.q_units, self.q.T, strict=True)
-        own = {name: CoordinateRow(unit, values) for name, unit, values in each}
-        return MotionRow(self.time_s, names, own)
 
     @property
     def along(self) -> str:

@@ -284,7 +284,6 @@ def _assignment(n_y: int, prefix: str) -> AssignmentRow:
         active=(ActiveLimit(f"{prefix}m2", "bound", "lower", 0.01),) if n_y > 1 else (),
         one_shot=np.full(n_y, 0.2),
         max_error=0.02,
-        max_error_given=False,
         clearances=(),
         model_error=3e-4,
     )

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import angle_unit, handy_unit
+from eigassign.case.units import angle_unit
 from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
@@ -29,7 +29,7 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.study.results import DriveRow, ModeRow, RunResults, StaticRow, TargetStudy
+from eigassign.study.results import ModeRow, RunResults, StaticRow, TargetStudy
 
 Floats = NDArray[np.float64]
 
@@ -80,9 +80,9 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
     Before and after, with its limit, one panel for each.
     """
     drives, panels = name == "drives", list[Panel]()
-    rows: Sequence[DriveRow | StaticRow] = results.drives if drives else results.statics
+    rows: Sequence[StaticRow] = results.drives if drives else results.statics
     for k, row in enumerate(rows, 1):
-        unit, size = row.handy if isinstance(row, DriveRow) else handy_unit(row.unit, row.limit)
+        unit, size = row.handy
         values = [curve / size for curve in (row.initial_curve, row.optimal_curve)]
         edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
         edges = [edge for edge in edges if any((edge * v > 0.0).any() for v in values)]

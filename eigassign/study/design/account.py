@@ -119,7 +119,6 @@ def assignment_row(
         active=tuple(active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=largest,
-        max_error_given=keys.max_error is not None,
         model_error=raised if np.isfinite(raised) else None,
         conflict=conflicting,
         limits=limits,
