@@ -4,9 +4,6 @@ The matrices are read from files and refused where they cannot be those of a par
 of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that K N = 0.
 
 In a plane its nodes keep u_x, u_y and θ_z; u_z, θ_x and θ_y are held.
-
-The free-free modes K φ = λ M φ are solved as M φ = μ (K + s M) φ, μ = 1 / (λ + s), with s near
-the highest λ that is looked at, so that rigid-body modes and elastic ones are both accurate.
 """
 
 from __future__ import annotations
@@ -19,17 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import LinAlgError, eigh
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, MechanismError
+from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.craig_bampton import (
-    DENSE,
     coefficients,
     held_factor,
     is_semidefinite,
-    kept_factor,
-    largest_modes,
 )
 from eigassign.mechanism.elements.links import (
     Entries,
@@ -234,16 +227,9 @@ def _term(coefficient: Scalar, matrix: sparse.csr_array) -> Term:
     return Term(1.0, sparse.csr_array(matrix * coefficient))
 
 
-_ELASTIC = 3  # free-free frequencies that are shown
-_RIGID = 1e-6  # of the highest λ looked at, three or more beyond the rigid ones: below none bends
-_NOISE = 1e-13  # of the mean of K over that of M: round-off of what does not bend at all
-_MASSLESS = 1e-10  # of the largest μ: what moves no mass has μ = 0
 _NOWHERE = 1e-9  # of a part's size: a centre of mass as near to an axis is shown on it
 _THIN = 1e-5  # kg/m³ of a cube as large as the part: a wire of 10 g/m has that from 30 m on
 _FAR = 10.0  # radii of gyration: the ends of a bar are 1.7 from its centre
-_FAST = 3e4  # m/s: of the lowest free frequency × size, half a wave at twice the speed in diamond
-_SEEN = 1e-6  # relative: uncertainty of a frequency that is worth a word
-_UNKNOWN = 0.1  # and from which on no frequency is known
 
 
 def part_lines(case: CaseFile) -> tuple[str, ...]:
@@ -291,65 +277,19 @@ def free_part_lines(
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
     strain = rigid_strain(K, N)
-    free, lowest = _free_modes(K, M, strain, len(J))
     lines = [
         f"{title}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m, about it "
         f"{about} kg m2",
-        f"{title}: {free}strain under rigid motion {strain:.1g} (accepted up to {STRAIN_FREE:g})",
+        f"{title}: strain under rigid motion {strain:.1g} (accepted up to {STRAIN_FREE:g})",
     ]
     if far > _FAR * gyration:
         lines.append(
             f"{title}: its nodes are up to {far:.3g} m from its centre of mass, a part of about "
             f"{2.0 * gyration:.2g} m: see the positions and their units"
         )
-    if (size > 1.0 and m < _THIN * size**3) or lowest * size > _FAST:
+    if size > 1.0 and m < _THIN * size**3:
         lines.append(
-            f"{title}: no part has {m:.3g} kg, nodes up to {far:.3g} m from their centre and "
-            f"frequencies from {lowest:.3g} Hz on: if its files are in mm, write units: mm-t-s or "
-            "mm-kg-ms"
+            f"{title}: no part has {m:.3g} kg and nodes up to {far:.3g} m from their centre: if "
+            "its files are in mm, write units: mm-t-s or mm-kg-ms"
         )
     return lines
-
-
-def _free_modes(
-    K: sparse.csr_array, M: sparse.csr_array, strain: float, expected: int
-) -> tuple[str, float]:
-    """The number of rigid modes and the lowest elastic frequencies, in words, and the first in Hz.
-
-    Nothing and 0 where they fail.
-    """
-    try:
-        lam, phi = _lowest(K, M, expected + 2 * _ELASTIC)
-    except (LinAlgError, ArithmeticError, AccuracyError, IndexError):
-        return "", 0.0
-    least = max(_RIGID * lam[-1], _NOISE * K.trace() / M.trace())
-    rigid = int((lam < least).sum())
-    why = "is it in pieces?" if rigid > expected else "is it supported, or has it too few digits?"
-    loose = "" if rigid == expected else f" ({expected} expected: {why})"
-    hz = np.sqrt(lam[rigid:][:_ELASTIC]) / (2.0 * np.pi)
-    text = f"free: {rigid} rigid modes{loose}"
-    if len(hz):
-        text += f", then {', '.join(f'{f:.5g}' for f in hz)} Hz"
-        # entries that are wrong by ε √(K_ii K_jj), each by itself, change λ by ε φᵀ diag(K) φ
-        shape = phi[:, rigid]
-        unsure = 0.5 * strain * (K.diagonal() @ shape**2) / (shape @ (K @ shape))
-        how = f"by {100 * unsure:.1g} %" if unsure < _UNKNOWN else "beyond any use"
-        text += f" (uncertain {how}: few digits)" if unsure > _SEEN else ""
-    return f"{text}; ", float(hz[0]) if len(hz) else 0.0
-
-
-def _lowest(K: sparse.csr_array, M: sparse.csr_array, count: int) -> tuple[Floats, Floats]:
-    """The ``count`` lowest λ at most, ascending, and their modes; s is near them at last."""
-    s = 1e-6 * float(K.trace() / M.trace())
-    for _ in range(2):
-        A = sparse.csc_array(K + s * M)
-        if A.shape[0] <= DENSE:
-            mu, phi = eigh(M.toarray(), A.toarray())
-            mu, phi = mu[::-1][:count], phi[:, ::-1][:, :count]
-        elif (factor := kept_factor(A)) is None:
-            raise AccuracyError("a part without mass is loose")
-        else:
-            mu, phi = largest_modes(factor, A.T, lambda v: np.asarray(M @ v), count)
-        lam = 1.0 / mu[mu > _MASSLESS * mu[0]] - s
-        s = max(s, float(lam[-1]))
-    return np.asarray(lam), np.asarray(phi)

@@ -28,7 +28,6 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.clearance import finer_path
 from eigassign.study.design.conclusions import Conflict, conflict
-from eigassign.study.design.followed import require_one_shape
 from eigassign.study.design.robust import robust_optimum
 from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
 from eigassign.study.results import RobustRow, SolverRow
@@ -80,11 +79,9 @@ class Answer(NamedTuple):
 def find_answer(scene: Scene, progress: Progress) -> Answer:
     """The design asked for by the case's method.
 
-    Raises CaseError where a mode to be followed has no shape of its own; under `method: one_shot`
-    InfeasibleError where bounds and linear constraints contradict each other, AccuracyError
-    where it cannot be vouched for.
+    Raises, under `method: one_shot`, InfeasibleError where bounds and linear constraints contradict
+    each other, AccuracyError where it cannot be vouched for.
     """
-    require_one_shape(scene)
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
     plain = all(one.in_one_shot for one in (*scene.wanted, *scene.limits))

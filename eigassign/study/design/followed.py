@@ -22,12 +22,11 @@ from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.targets import FollowedMode
-from eigassign.errors import CaseError, LostModeError
+from eigassign.errors import LostModeError
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.tracking import (
-    COINCIDENT,
     EXTRA,
     FollowedShape,
     ModesAtPoint,
@@ -185,40 +184,6 @@ def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[st
         y = named_design(file, mode)
         hz = model.frequencies(named_pose(file, mode, path, y), y, mode.like)[0, -1]
         yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
-
-
-def require_one_shape(scene: Scene) -> None:
-    """Raise CaseError where a mode coincides with another at the pose that names it by chance.
-
-    Modes that coincide everywhere, by symmetry, have a common frequency that can be followed.
-    """
-    for follower in followers(scene, scene.wanted):
-        like, lam = follower.mode.like, follower.start.at.lam
-        twins = np.flatnonzero(_alike(lam, lam[like - 1])) + 1
-        if len(twins) > 1 and not _always(scene, follower, len(twins)):
-            own = [one for one in scene.wanted if follower.mode in one.followed]
-            keys = ("gap.between" if len(one.terms) > 1 else "mode" for one in own)
-            places = (f"{one.place}.{key}" for one, key in zip(own, keys, strict=True))
-            message = (
-                f"modes {' and '.join(map(str, twins))} coincide there, so that mode {like} has "
-                "no shape of its own: name it at another pose or design"
-            )
-            raise CaseError(tuple(scene.file.problem(key, message) for key in places))
-
-
-def _alike(lam: Floats, own: Floats | float) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(lam / own - 1.0) <= COINCIDENT)
-
-
-def _always(scene: Scene, follower: Follower, twins: int) -> bool:
-    """True where so many modes coincide at all samples needed, at the initial design."""
-    try:
-        found = follow_all(scene.model, scene.path, [follower], scene.initial, 1)
-    except LostModeError:
-        return False
-    needed = follower.needed
-    alike = _alike(found.modes.lam[needed], found.followed.lam[needed])
-    return bool((alike.sum(axis=1) >= twins).all())
 
 
 # --- All of them, with the modes that they are found among

@@ -111,25 +111,11 @@ def test_a_part_of_half_a_kilometre_and_grams_is_doubted(tmp_path: Path, units: 
     assert "write units" not in "".join(lines(tmp_path, {**link, "units": units}, "planar"))
 
 
-def test_a_part_that_rings_faster_than_any_metal_is_doubted(tmp_path: Path) -> None:
-    """In kg, ms and kN what is in t, s and N: a thousand times as fast, and nothing strains."""
-    link = of_dmig(tmp_path, *in_units("spatial", *SYSTEMS["mm-t-s"]), labels_of("spatial"))
-    rows = "".join(f"{n},{1e3 * x!r},0,0\n" for n, (x, *_) in PLACES.items())
-    texts(tmp_path, nodes_csv=f"id,x,y,z\n{rows}")
-    link |= {"nodes_file": "nodes.csv"}
-    assert "write units: mm-t-s" in lines(tmp_path, {**link, "units": "mm-kg-ms"})[-1]
-    assert "write units" not in "".join(lines(tmp_path, {**link, "units": "mm-t-s"}))
-
-
-def test_few_digits_and_weak_supports_are_told(tmp_path: Path) -> None:
+def test_few_digits_are_told(tmp_path: Path) -> None:
     K, M = exported("planar")
-    for share, said in ((5e-6, "for few digits alone"), (3.5e-6, "3 expected: is it supported")):
-        held = K.copy()
-        held[0, 0] *= 1.0 + share
-        link = of_calculix(tmp_path, held, M, labels_of("planar"))
-        strains = share > 4e-6
-        found = refusal if strains else lambda *given: lines(*given)[1]
-        assert said in found(tmp_path, link, "planar")
+    K[0, 0] *= 1.0 + 5e-6
+    link = of_calculix(tmp_path, K, M, labels_of("planar"))
+    assert "for few digits alone" in refusal(tmp_path, link, "planar")
 
 
 # What check says
@@ -142,39 +128,7 @@ def test_check_says_what_the_part_is(tmp_path: Path, space: str) -> None:
     across = 0.972 * LENGTH**2 / 12
     about = [float(v) for v in re.search("about it (.*) kg m2", first)[1].split(",")]
     assert about[-1] == pytest.approx(across, rel=2e-3)  # thick, and of lumped turning
-    hz = [float(v) for v in re.search("modes, then (.*) Hz", second)[1].split(",")]
-    wide, high = 22.3733 / (2 * np.pi) * np.sqrt(70e9 / 2700 / 12) * np.array([0.02, 0.03]) / 0.36
-    assert f"free: {3 if space == 'planar' else 6} rigid modes" in second
-    assert hz[0] == pytest.approx(high if space == "planar" else wide, rel=2e-3)
     assert float(re.search("strain under rigid motion (.*?) ", second)[1]) < 1e-8
-
-
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_free_frequencies_need_no_certain_stiffness(tmp_path: Path, scale: float) -> None:
-    K, M = exported("planar")
-    link = of_calculix(tmp_path, scale * K, M, labels_of("planar"))
-    found = float(re.search("modes, then (.*?),", lines(tmp_path, link, "planar")[1])[1])
-    link = of_calculix(tmp_path, K, M, labels_of("planar"))
-    exact = float(re.search("modes, then (.*?),", lines(tmp_path, link, "planar")[1])[1])
-    assert found == pytest.approx(exact * np.sqrt(scale), rel=1e-4)
-
-
-@pytest.mark.parametrize("lumped", [True, False])
-def test_a_part_of_few_masses_has_as_few_modes(tmp_path: Path, lumped: bool) -> None:
-    """One element with masses at its ends alone: three rigid modes, one of its length."""
-    K, M = (A[:6, :6].copy() for A in exported("planar"))
-    K[3:, 3:] = np.abs(K[:3, :3]) * [[1, 1, 1], [1, 1, -1], [1, -1, 1]]
-    M = np.diag([0.5, 0.5, 0.0] * 2) if lumped else np.diag([0.5, 0.5, 1e-5] * 2)
-    texts(tmp_path, p_sti=coordinate(K), p_mas=coordinate(M))
-    h = LENGTH / ELEMENTS
-    nodes = {"start": {"position": [0, 0], "dofs": [0, 1, 2]},
-             "end": {"position": [h, 0], "dofs": [3, 4, 5]}}  # fmt: skip
-    link = {"stiffness": "p.sti", "mass": "p.mas", "nodes": nodes}
-    along = np.sqrt(2 * K[0, 0] / 0.5) / (2 * np.pi)
-    found = lines(tmp_path, link, "planar")[1]
-    assert "3 rigid modes, then" in found
-    if lumped:
-        assert f"then {along:.5g} Hz;" in found
 
 
 # What CalculiX 2.20 wrote
@@ -187,12 +141,9 @@ CALCULIX = {
 
 
 def test_a_part_of_calculix_has_the_frequencies_that_it_printed(tmp_path: Path) -> None:
-    """Free-free, of the matrices; and of the part between soft springs, as check says them."""
     for file in CCX.glob("rig.*"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
-    first, second = lines(tmp_path, CALCULIX)
-    hz = [float(v) for v in re.search("6 rigid modes, then (.*) Hz", second)[1].split(",")]
-    np.testing.assert_allclose(hz, PRINTED_HZ[:3], rtol=1e-5)  # five digits are shown
+    first = lines(tmp_path, CALCULIX)[0]
     assert f"{7850 * 0.12 * 0.012 * 0.02:.4g} kg, centre of mass at (0.06, 0, 0) m" in first
     K, M = (read_matrix(tmp_path / f"rig.{kind}", "key").toarray() for kind in ("sti", "mas"))
     turned = np.linalg.inv(np.linalg.cholesky(M))

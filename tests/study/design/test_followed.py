@@ -5,20 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rail_and_mast import HEIGHT, LAMP, OUT, alone, case
+from rail_and_mast import LAMP, OUT, alone, case
 from redesigned_arms import extrapolated
 from scipy.optimize import brentq
 
 from eigassign import Case
 from eigassign.assignment import Solved
 from eigassign.case import parse
-from eigassign.errors import CaseError, LostModeError
+from eigassign.errors import LostModeError
 from eigassign.pipeline import Stages, prepare
 from eigassign.study import (
     Scene,
     find_answer,
     followers,
-    require_one_shape,
     response_of,
     solve_design,
 )
@@ -124,20 +123,6 @@ def test_where_a_target_does_not_hold_its_mode_need_not_be_known() -> None:
     assert (found.numbers[known] == [2, 1]).all()
 
 
-def test_a_mode_that_coincides_with_another_has_no_shape_to_name() -> None:
-    lamp = brentq(
-        lambda m: MAST.frequencies([], [m], 1)[0, 0] - RAIL.frequencies([0.5], [0.035], 1)[0, 0],
-        0.2, 3.0, xtol=1e-15,
-    )  # fmt: skip
-    mode = {"like": 1, "at": {"q": [0.5]}, "design": {"height": 0.035, "lamp": lamp}}
-    scene = scene_of(
-        case([{"mode": mode, "frequency": 25.0}], design={"height": HEIGHT, "lamp": LAMP})
-    )
-    with pytest.raises(CaseError, match="modes 1 and 2 coincide there") as caught:
-        require_one_shape(scene)
-    assert caught.value.problems[0].path == "targets[0].mode"
-
-
 def test_modes_that_coincide_by_symmetry_are_followed_together() -> None:
     """The screw's shaft is round: its bending modes come in pairs on either side of the nut."""
     text = (Path(__file__).parents[3] / "cases" / "ball_screw.yaml").read_text()
@@ -149,14 +134,10 @@ def test_modes_that_coincide_by_symmetry_are_followed_together() -> None:
         return scene_of(Case(parse(new.encode(), "case.yaml")))
 
     scene = with_target("0.2")
-    require_one_shape(scene)
     found = solved(scene, scene.initial)
     hz = scene.model.frequencies(scene.path.q, scene.initial, 20)
     for k, number in enumerate(found.numbers[:, 0]):
         np.testing.assert_allclose(hz[k, number - 1 : number + 1], found.followed[k, 0], rtol=1e-8)
-    halfway = with_target("0.5")
-    with pytest.raises(CaseError, match="modes 3 and 4 and 5 and 6 coincide there"):
-        require_one_shape(halfway)
 
 
 def test_a_band_of_a_followed_mode_lets_the_others_pass() -> None:
