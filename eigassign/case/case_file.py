@@ -51,7 +51,6 @@ from eigassign.case.rules.consistency import (
 from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, implausible
 from eigassign.case.rules.properties import (
     below,
-    followed_designs,
     is_place,
     known_property,
     properties_of,
@@ -458,8 +457,6 @@ def checked(
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(tuple(dict.fromkeys(problems))[:MOST_PROBLEMS])
-    for place, value in [*followed_designs(document)]:
-        document = with_value(document, place, value)
     doubts = [*implausible(document), *unreadable([each for each in named if each.spare])]
     warnings = [source.problem(*finding) for finding in doubts]
     case = CaseFile(

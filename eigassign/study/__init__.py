@@ -24,7 +24,7 @@ __all__, __getattr__, __dir__ = face(
         "built_case": "BuiltCase build_model load_case settle_model",
         "design.answer": "Answer find_answer",
         "design.clearance": "check_band",
-        "design.followed": "followers named_design named_pose solve_design",
+        "design.followed": "followers named_pose solve_design",
         "design.judgement": "Facts Verdict verdict",
         "design.search.optimum": "Found find_optimum",
         "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),

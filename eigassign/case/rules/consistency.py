@@ -273,18 +273,6 @@ def a_mode_has_one_frequency_at_a_time(document: Document) -> Iterator[Finding]:
                 seen.setdefault(each, []).append((first, last))
 
 
-def followed_modes_are_of_possible_designs(document: Document) -> Iterator[Finding]:
-    """Where a mode is named by its shape, the design has parameters, and choices that they have."""
-    entries = document.design.entries
-    for path, mode in followed_modes(document):
-        for name, value in mode.design.items():
-            place, entry = (*path, "design", name), entries.get(name)
-            if entry is None:
-                yield place, unknown("design parameter", name, entries)
-            elif isinstance(entry, Choices) and value not in entry.choices:
-                yield place, unknown("choice", str(value), entry.choices)
-
-
 def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
     """The paper's program has wanted frequencies, bounds, linear constraints, no more."""
     assignment, design = document.assignment, document.design
@@ -369,7 +357,6 @@ RULES: tuple[Rule, ...] = (
     times_are_of_trajectories,
     what_sags_has_a_weight,
     a_mode_has_one_frequency_at_a_time,
-    followed_modes_are_of_possible_designs,
     one_shot_has_a_quadratic_program,
     objectives_have_what_they_take,
     robust_designs_have_tolerances,

@@ -8,23 +8,29 @@ table of all.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from eigassign.case.reader import Finding, KeyPath
-from eigassign.case.rules.properties import ANY, coordinate_lists, limits, property_at, value_at
+from eigassign.case.rules.properties import (
+    ANY,
+    coordinate_lists,
+    limits,
+    property_at,
+    value_at,
+    walk,
+)
 from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
-from eigassign.case.schema.trajectory import Added, TipTrajectory, named_trajectories
+from eigassign.case.schema.trajectory import Added, named_trajectories
 from eigassign.case.units import TWO_TURNS
 
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
 _ROUND_OFF = 1e-9  # of the terms of a limit
-LARGEST_ERROR = 0.5
 SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
 # I / A² has no dimension: 1/12 for a square, a/12 and 1/(12 a) for a flat bar of aspect a on edge
 # and on its flat, D/(8π t) for a thin tube. The limits are a bar of aspect 1200 (or a tube of
@@ -144,15 +150,17 @@ def _outside(value: float, low: float, high: float, unit: str) -> str:
 
 def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
     """Where the file gives a property, its group and key, and each number there."""
-    for group in ("materials", "sections", "links", "joints"):
-        for name, part in getattr(document.mechanism, group).items():
-            for key in type(part).model_fields:
-                for value in _flat(getattr(part, key)):
-                    yield ("mechanism", group, name, key), group, key, value
-    for place, _, motion in named_trajectories(document.trajectory):
-        for key in ("waypoints", "angle", "orientation") * isinstance(motion, TipTrajectory):
-            for value in _flat(getattr(motion, key)):
-                yield (*place, key), "trajectory", key, value
+    for path, value in walk(document):
+        place = path[:4]
+        match [key for key in path if isinstance(key, str)]:
+            case ["mechanism", group, _, key, *_]:
+                pass
+            case ["trajectory", "waypoints" | "angle" | "orientation" as key]:
+                group, place = "trajectory", path[: path.index(key) + 1]
+            case _:
+                continue
+        numbers = value if isinstance(value, tuple) else (value,)
+        yield from ((place, group, key, n) for n in numbers if isinstance(n, float))
     joints, turning = document.mechanism.joints, []
     for k, c in enumerate(document.coordinates.values()):
         kind = joints[c.joint].type
@@ -162,9 +170,9 @@ def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
         angles = [abs(row[k]) for k in turning]
         place = place[:-1] if isinstance(place[-1], int) else place
         yield place, "trajectory", "angle", max(angles, default=0.0)
-    for place, path, value in _varied(document):
-        group, _, key, *_ = path.split(".")
-        yield place, group, key, value
+    for place, varied, number in _varied(document):
+        group, _, key, *_ = varied.split(".")
+        yield place, group, key, number
 
 
 def _varied(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
@@ -182,15 +190,6 @@ def _varied(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
     for place, _, motion in named_trajectories(document.trajectory):
         for path, value in motion.set.items():
             yield (*place, "set", path), path, value.add if isinstance(value, Added) else value
-
-
-def _flat(value: object) -> Iterator[float]:
-    """The numbers of a nest of lists and mappings."""
-    if isinstance(value, (tuple, Mapping)):
-        for inner in value.values() if isinstance(value, Mapping) else value:
-            yield from _flat(inner)
-    elif isinstance(value, float):
-        yield value
 
 
 # --- Sections, links and bodies
@@ -247,15 +246,6 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
 # --- What is asked
 
 
-def errors_that_are_accepted_are_small(document: Document) -> Iterator[Finding]:
-    """A tolerance of 2 is meant as 2 %."""
-    for part in ("assignment", "validation"):
-        accepted = getattr(document, part).max_error
-        if accepted is not None and accepted > LARGEST_ERROR:
-            message = f"{100 * accepted:g} % accepts nearly anything: usual is 2 %, which is 0.02"
-            yield (part, "max_error"), message
-
-
 def starts_outside(document: Document) -> Iterator[Finding]:
     """The design that the file has is inside its bounds; a list need not have it."""
     design = document.design
@@ -278,6 +268,5 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     bare_sections_can_exist,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
-    errors_that_are_accepted_are_small,
     starts_outside,
 )

@@ -304,26 +304,11 @@ def values_are_what_they_are_of(document: Document) -> Iterator[Finding]:
     """Each has the dimension, and keeps the limits, that the other key gives it."""
     amounts = ((path, v.amount if isinstance(v, Tolerance) else v) for path, v in walk(document))
     written = [(path, value) for path, value in amounts if isinstance(value, Written)]
-    texts = [(path, value) for path, value in _posed(document) if isinstance(value, str)]
-    for path, value in (*written, *texts):
+    for path, value in written:
         try:
             _read(value, _kind_at(document, path))
         except QuantityError as error:
             yield path, str(error)
-
-
-def followed_designs(document: Document) -> Iterator[tuple[KeyPath, float]]:
-    """The values, in SI, of parameters where a mode is named by its shape; not those of choices."""
-    for path, value in _posed(document):
-        yield path, _read(value, _kind_at(document, path))
-
-
-def _posed(document: Document) -> Iterator[tuple[KeyPath, float | str]]:
-    entries = document.design.entries
-    for path, mode in followed_modes(document):
-        for name, value in mode.design.items():
-            if name in entries and not isinstance(entries[name], Choices):
-                yield (*path, "design", name), value
 
 
 def _read(value: object, kind: Quantity | None) -> float:
@@ -381,8 +366,6 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
         case ["design", name, "tolerance", *own]:
             return amount(of(own[0]) if own else parameter(name), above=0)
         case ["design", name, _]:
-            return parameter(name)
-        case ["targets", *_, "design", name]:
             return parameter(name)
         case ["measurements", "deviation"]:
             return amount(FREQUENCY, above=0)

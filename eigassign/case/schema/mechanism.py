@@ -218,13 +218,11 @@ TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", 
 
 
 _Acceleration: TypeAlias = Annotated[
-    tuple[Annotated[float, quantity("acceleration")], ...],
-    Components(),
+    Components[Annotated[float, quantity("acceleration")]],
     must(any, "pulls nowhere: write none to leave gravity out"),
 ]
 _AboutAxes: TypeAlias = Annotated[
-    tuple[TurningStiffness, ...],
-    Components(),
+    Components[TurningStiffness],
     only_in("spatial", "planar: one number, about z, got a list"),
 ]
 
@@ -264,7 +262,7 @@ class Spring(Placed):
     """
 
     between: tuple[str, str]
-    translational: OneOrList[Stiffness, Annotated[tuple[Stiffness, ...], Components()]] = 0.0
+    translational: OneOrList[Stiffness, Components[Stiffness]] = 0.0
     rotational: OneOrList[TurningStiffness, _AboutAxes] = 0.0
     angle: Annotated[Angle, IN_PLANE] = 0.0
     orientation: Annotated[Orientation | None, IN_SPACE] = None

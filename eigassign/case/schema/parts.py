@@ -458,32 +458,25 @@ class Placed(Part):
         return {**default, **value}
 
 
-class Components:
-    """A component along each axis: two in a plane, three in space."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
-        def fits(value: Any, info: ValidationInfo) -> Any:
-            space = space_of(info) or ""
-            axes = _AXES.get(space)
-            if axes and isinstance(value, tuple) and len(value) != len(axes):
-                needed = f"{space}: needs {len(axes)} components ({', '.join(axes)})"
-                raise wrong(f"{needed}, got {len(value)}")
-            return value
-
-        return core_schema.with_info_before_validator_function(fits, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        return {**handler(schema), "minItems": 2, "maxItems": 3}
+def _one_for_each_axis(value: Any, info: ValidationInfo) -> Any:
+    space = space_of(info) or ""
+    axes = _AXES.get(space)
+    if axes and isinstance(value, tuple) and len(value) != len(axes):
+        needed = f"{space}: needs {len(axes)} components ({', '.join(axes)})"
+        raise wrong(f"{needed}, got {len(value)}")
+    return value
 
 
-Vector: TypeAlias = Annotated[tuple[Annotated[float, PLACE], ...], Components()]
+Components: TypeAlias = Annotated[  # two in a plane, three in space
+    tuple[T, ...], Field(min_length=2, max_length=3), BeforeValidator(_one_for_each_axis)
+]
+Vector: TypeAlias = Components[Annotated[float, PLACE]]
 Angle: TypeAlias = Annotated[float, ANGLE]
 Orientation: TypeAlias = tuple[Angle, Angle, Angle]  # rad, about x, y, z: R = Rz Ry Rx
 
 
 Direction: TypeAlias = Annotated[
-    tuple[Annotated[float, Quantity()], ...],
-    Components(),
+    Components[Annotated[float, Quantity()]],
     must(
         lambda direction: any(abs(v) >= _SHORTEST for v in direction),
         "has no direction: all components are zero",

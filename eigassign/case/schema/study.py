@@ -21,6 +21,7 @@ from eigassign.case.schema.parts import (
     NumberOr,
     OneOrList,
     Part,
+    Quantity,
     ValueOr,
     one_of,
     quantity,
@@ -28,9 +29,10 @@ from eigassign.case.schema.parts import (
 )
 from eigassign.case.schema.targets import Frequency, HighestTarget, Mode, Modes
 from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
-from eigassign.case.units import QuantityError, number_and_unit
+from eigassign.case.units import PLAIN, QuantityError, number_and_unit
 
 Auto: TypeAlias = Literal["auto"]
+MaxError: TypeAlias = Annotated[float, Quantity(PLAIN, above=0, at_most=1)]  # 2 is meant as 2 %
 Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
 MOST_MEASUREMENTS = 10_000  # of one case
 
@@ -97,7 +99,7 @@ class AssignmentKeys(Part):
     starts: NumberOr[Annotated[int, Field(ge=1, le=1000)], Auto] = "auto"
     steps: Annotated[int, Field(ge=1, le=1_000_000)] = 100
     seconds: Annotated[float, DURATION] | None = None
-    max_error: Annotated[float, quantity("fraction", above=0)] | None = None
+    max_error: MaxError | None = None
     robust: bool = False
 
     @property
@@ -133,7 +135,7 @@ class ValidationKeys(Part):
         max_error: how far an expansion may be from exact, relative in Hz
     """
 
-    max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
+    max_error: MaxError = 0.02
 
 
 class Measurement(Part):

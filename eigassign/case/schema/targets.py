@@ -14,12 +14,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
 from pydantic import Field, field_validator, model_validator
 
 from eigassign.case.reader import KeyPath, listed, shown, suggestion
-from eigassign.case.schema.design import YValue
 from eigassign.case.schema.parts import (
-    ByReference,
     Direction,
-    FrozenDict,
-    NumberOr,
     OneOrList,
     Part,
     Quantity,
@@ -107,27 +103,23 @@ class Pose(Part):
 
 
 class FollowedMode(Part):
-    """The mode whose shape is that of a mode at a pose and design, whatever its number.
+    """The mode whose shape is that of a mode at a pose of the design in the file.
 
     Keys:
         like: number of the mode there
         at: the pose
-        design: values of parameters and names of choices there; the others are as in the file
     """
 
     like: Mode
     at: Pose
-    design: ByReference[NumberOr[YValue, str]] = FrozenDict()
 
     @property
     def name(self) -> str:
         """The mode in words, and where it is named, in SI units."""
         q = " ".join(f"{value:.6g}" for value in self.at.q or ())
-        where = [f"t = {self.at.time:g} s" if self.at.q is None else f"q = {q}"]
-        where[0] += f" of {self.at.trajectory!r}" if self.at.trajectory else ""
-        for key, value in self.design.items():
-            where.append(f"{key} = {value}" if isinstance(value, str) else f"{key} = {value:g}")
-        return f"the mode like mode {self.like} ({', '.join(where)})"
+        where = f"t = {self.at.time:g} s" if self.at.q is None else f"q = {q}"
+        where += f" of {self.at.trajectory!r}" if self.at.trajectory else ""
+        return f"the mode like mode {self.like} ({where})"
 
 
 AnyMode: TypeAlias = int | FollowedMode

@@ -1,7 +1,7 @@
 """Modes that targets follow by their shape, at the samples of the trajectories and any design.
 
-From the pose and design that name a mode, the design changes first, in a straight line and at that
-pose. Then the shape goes from sample to sample: from the pose's time to both ends of its own
+From the pose that names a mode, the design of the file changes first, in a straight line and at
+that pose. Then the shape goes from sample to sample: from the pose's time to both ends of its own
 trajectory, of others from their samples nearest to the pose. The way depends on nothing but the
 design, so that frequencies and slopes do not either; where modes only cross, the way is all the
 same. How a shape is carried, and when it is lost, is for `modal.exact.tracking` to say.
@@ -20,7 +20,6 @@ from eigassign.assignment.program import frozen
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.design import Choices
 from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import LostModeError
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
@@ -137,22 +136,6 @@ class Follower:
         yield tuple(range(nearest + 1, last + 1)), nearest
 
 
-def named_design(file: CaseFile, followed: FollowedMode) -> Floats:
-    """y (n_y,) at which mode `like` has the shape to follow; what it leaves out as in the file."""
-    y = initial_design(file)
-    start = 0
-    for name, entry in file.design.entries.items():
-        given = followed.design.get(name)
-        columns = slice(start, start + (len(entry.properties) if isinstance(entry, Choices) else 1))
-        if isinstance(entry, Choices):
-            if isinstance(given, str):
-                y[columns] = [entry.choices[given][p] for p in entry.properties]
-        elif given is not None:
-            y[columns] = given
-        start = columns.stop
-    return frozen(y)
-
-
 def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories, y: Floats) -> Floats:
     """q (n_q,) at which it has that shape, of design y where coordinates follow the design.
 
@@ -172,7 +155,7 @@ def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ..
         for one in wanted:
             if mode in one.followed:
                 needed[one.rows] = True
-        y = named_design(file, mode)
+        y = frozen(initial_design(file))
         pose = partial(named_pose, file, mode, path)
         found.append(Follower(mode, scene.model, path, y, pose, needed))
     return tuple(found)
@@ -181,7 +164,7 @@ def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ..
 def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[str]:
     """Say which frequency each followed mode has where it is named."""
     for mode in followed_modes(file):
-        y = named_design(file, mode)
+        y = initial_design(file)
         hz = model.frequencies(named_pose(file, mode, path, y), y, mode.like)[0, -1]
         yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
 

@@ -68,12 +68,6 @@ def test_a_constraint_does_not_name_choices(tmp_path: Path) -> None:
     check(text, "design.constraints.budget.terms.d", message, tmp_path)
 
 
-def test_a_followed_mode_is_named_at_one_of_the_choices(tmp_path: Path) -> None:
-    target = "{mode: {like: 1, at: {time: 0}, design: {¦d: z}}, frequency: 3}"
-    text = edited(D, f"  d: {{choices: {{x: {{{ONE}}}}}}}\n").replace(T, f"  - {target}\n")
-    check(text, "targets[0].mode.design.d", "unknown choice 'z'; known: x", tmp_path)
-
-
 def test_a_part_is_of_a_named_trajectory_where_there_are_several(tmp_path: Path) -> None:
     motion = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
     several = "trajectory:\n" + 2 * "  - {q: [[0, 0], [1, 1]], duration: 1}\n"

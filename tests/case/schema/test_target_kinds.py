@@ -25,7 +25,7 @@ KINDS = {
     "harmonic": "{keep_out: {harmonic: 2, of: 25 Hz, margin: 5 %}}",
     "harmonic in time": "{keep_out: {harmonic: 0.5, of: {time: [0, 1], frequency: [9, 10]}, margin: 0.1}}",
     "gap": "{gap: {between: [1, 3], at_least: 20 Hz}}",
-    "followed from a time": "{mode: {like: 2, at: {time: 0.2 s}, design: {m: 10 g}}, frequency: 20}",
+    "followed from a time": "{mode: {like: 2, at: {time: 0.2 s}}, frequency: 20}",
     "followed from a pose": "{mode: {like: 2, at: {q: [10 deg, 1]}}, at_least: 20}",
 }  # fmt: skip
 ASSIGNMENTS = (
@@ -97,7 +97,7 @@ def test_requirements_are_called_by_what_they_ask_for() -> None:
         "every mode clear of 2 times 25 Hz ± 5 %",
         "every mode clear of 0.5 times its profile ± 10 %",
         "modes 1 and 3 at least 20 Hz apart",
-        "the mode like mode 2 (t = 0.2 s, m = 0.01) at 20 Hz",
+        "the mode like mode 2 (t = 0.2 s) at 20 Hz",
         "the mode like mode 2 (q = 0.174533 1) at least 20 Hz",
     ]
 
@@ -110,17 +110,8 @@ def test_values_are_read_in_si() -> None:
     band, followed = harmonic.keep_out, from_time.mode
     assert (band.harmonic, band.margin) == (0.5, 0.1)
     assert (band.of.time, band.of.frequency) == ((0, 1), (9, 10))
-    assert (followed.like, followed.at.time, followed.design) == (2, 0.2, {"m": 0.01})
+    assert (followed.like, followed.at.time) == (2, 0.2)
     assert from_pose.mode.at.q == (math.radians(10), 1.0)
-
-
-def test_a_followed_mode_may_be_named_at_a_choice() -> None:
-    old = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
-    new = "  d: {choices: {thin: {sections.rod.diameter: 2 cm}, thick: {sections.rod.diameter: 4 cm}}}\n"
-    target = "{mode: {like: 1, at: {time: 0}, design: {d: thick}}, frequency: 9}"
-    case = parse(edited(old, new).replace(T, f"  - {target}\n").encode(), "case.yaml")
-    assert case.targets[0].mode.design == {"d": "thick"}
-    assert parse(case.resolved().encode(), "case.yaml") == case
 
 
 @pytest.mark.parametrize("given", ASSIGNMENTS)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rail_and_mast import LAMP, OUT, alone, case
+from chains import Tree, case_of
+from rail_and_mast import LAMP, OUT, alone, case, tree
 from redesigned_arms import extrapolated
 from scipy.optimize import brentq
 
@@ -33,6 +34,14 @@ def scene_of(given: Case) -> Scene:
     return prepare(given, Stages(lambda line: None), None)
 
 
+def named_at(height: float, lamp: float, targets: list[Tree], **more: object) -> Case:
+    """The case whose file has this design."""
+    found = tree(targets, **more)
+    found["mechanism"]["sections"]["rail"]["height"] = height
+    found["mechanism"]["bodies"]["lamp"]["mass"] = lamp
+    return case_of(found)
+
+
 def solved(scene: Scene, y: tuple[float, ...] | np.ndarray) -> Solved:
     return solve_design(scene, followers(scene, scene.wanted), np.array(y))
 
@@ -56,13 +65,12 @@ def test_each_curve_is_that_of_its_half_whatever_its_number(y: tuple[float, floa
 
 def test_it_does_not_matter_on_how_many_samples_or_trajectories_or_from_where() -> None:
     two = [{"name": "out", **OUT}, {"name": "back", **OUT, "points": [[0.9], [0.5]]}]
-    design = {"height": 0.045, "lamp": 2.5}  # the mast is the lower one there
     targets = [
-        {"mode": {"like": 2, "at": {"time": 0.31, "trajectory": "back"}, "design": design},
-         "frequency": 25.0},
-        {"mode": {"like": 1, "at": {"q": [0.4]}, "design": design}, "frequency": 25.0},
-    ]  # fmt: skip
-    scene = scene_of(case(targets, trajectory=two))
+        {"mode": {"like": 2, "at": {"time": 0.31, "trajectory": "back"}}, "frequency": 25.0},
+        {"mode": {"like": 1, "at": {"q": [0.4]}}, "frequency": 25.0},
+    ]
+    # the mast is the lower one there
+    scene = scene_of(named_at(0.045, 2.5, targets, trajectory=two))
     some = replace(scene, trajectory=scene.path.chosen([0, 30, 33, 61]))
     for each in (scene, some):
         found = solved(each, (0.036, 1.9))
