@@ -29,8 +29,7 @@ __all__, __getattr__, __dir__ = face(
         "requirements.quantity": "limit_between",
         "requirements.requirement": "Frequencies Requirement Solved",
         "requirements.sampling": (
-            "design_limits followed_modes requirements_of sample_target time_weights "
-            "trapezoidal_weights"
+            "design_limits followed_modes requirements_of time_weights trapezoidal_weights"
         ),
     },
 )

@@ -259,8 +259,8 @@ def _finer_meshes(file: CaseFile, accuracy: float) -> Iterator[Try]:
         highest = max(modes_at(trial, trial.x(q, y)))
         beyond = BEYOND * float(trial.frequencies(q, y, highest).max())
     ends = corners(len(y))
-    x = at_corners(file, path, q0, y, ends, max(1, LOOKS // (1 + len(ends))))[0]
-    x = standing(np.vstack([x, scattered(file, path, q0, LOOKS // 3)[0]]), trial)
+    x = at_corners(file, path, q0, y, ends, max(1, LOOKS // (1 + len(ends))))
+    x = standing(np.vstack([x, scattered(file, path, q0, LOOKS // 3)]), trial)
     for count in ELEMENTS:
         model = meshed(count, beyond)
         lost = rounding_error(model.pencil, x[0], max(modes_at(model, x)))
@@ -286,7 +286,7 @@ def _less_reduced(file: CaseFile, links: WholeLinks, names: Sequence[str]) -> It
         upright = build_model(with_reduction(file, at_nodes), links)
     path, q0 = _path(file, upright)
     few = POSES if whole.pencil.is_dense else FEW_POSES
-    x = spread(standing(at_corners(file, path, q0, initial_design(file))[0], upright), few)
+    x = spread(standing(at_corners(file, path, q0, initial_design(file)), upright), few)
     modes = modes_that_matter(file, _bands_hz(file, path))(whole, x)
     exact, pick = standing_frequencies(whole.pencil, x, max(modes)), np.array(modes) - 1
     for frequency in exact[0].max() / np.pi * 2.0 ** np.arange(10):

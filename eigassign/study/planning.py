@@ -327,10 +327,10 @@ def at_corners(
     y0: Floats,
     at_upper: ArrayLike = ENDS,
     samples: int | Ints = SAMPLES,
-) -> tuple[Floats, Floats]:
+) -> Floats:
     """x (n, n_x) at y0 and corners of the bounds, a row of ``at_upper`` (k, n_y or 1) each.
 
-    Each at these ``samples`` of the trajectory, or at up to so many; and which (n,) they are.
+    Each at these ``samples`` of the trajectory, or at up to so many.
     """
     lower, upper = _bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
@@ -339,8 +339,7 @@ def at_corners(
     if trajectory is not None:
         rows = trajectory.spread(samples) if isinstance(samples, int) else samples
     q = [q0[None] if trajectory is None else poses_at(trajectory, y)[rows] for y in designs]
-    x = np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
-    return x, np.tile(rows, len(designs)).astype(np.float64)
+    return np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
 
 
 def unseen(
@@ -361,8 +360,8 @@ def unseen(
     if trajectory is not None:
         S = joint_map(model)
         rows = farthest(trajectory.q @ S.T, about @ S.T, MOST_CORNERS // len(at_upper))
-    outer = at_corners(file, trajectory, about[0], y0, at_upper, rows)[0]
-    return np.vstack([outer, scattered(file, trajectory, about[0], SCATTERED, first)[0]])
+    outer = at_corners(file, trajectory, about[0], y0, at_upper, rows)
+    return np.vstack([outer, scattered(file, trajectory, about[0], SCATTERED, first)])
 
 
 def nearest_rows(rows: Floats, values: Floats) -> Ints:
@@ -396,17 +395,16 @@ def farthest(points: Floats, about: Floats, count: int) -> Ints:
 
 def scattered(
     file: CaseFile, trajectory: Trajectories | None, q0: Floats, count: int, first: int = 1
-) -> tuple[Floats, Floats]:
+) -> Floats:
     """Points ``first``, … of a fixed sequence (`kronecker`) between samples and within the bounds.
 
-    x (count, n_x), and where (count,) along the samples of the initial design. SciPy's sequences
-    would do as well, at half a second for their import.
+    x (count, n_x). SciPy's sequences would do as well, at half a second for their import.
     """
     lower, upper = _bounds(file)
     u = kronecker(first + count, 1 + len(lower))[first:]
     y = lower + u[:, 1:] * (upper - lower)
     if trajectory is None:
-        return np.hstack([np.tile(q0, (count, 1)), y]), np.zeros(count)
+        return np.hstack([np.tile(q0, (count, 1)), y])
     starts = np.concatenate(
         [np.arange(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows]
     )
@@ -415,7 +413,7 @@ def scattered(
     start = starts[k.astype(int)]
     end, q = np.minimum(start + 1, last[start]), trajectory.q
     between = q[start] + share[:, None] * (q[end] - q[start])
-    return np.hstack([between, y]), start + share * (end - start)
+    return np.hstack([between, y])
 
 
 def poses_at(trajectory: Trajectories, y: Floats) -> Floats:

@@ -355,8 +355,8 @@ def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     lower, upper = scene.bounds
     if np.any(upper > lower):
         ends = corners(len(lower), MOST_CORNERS)
-        outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)[0]
-        inner = scattered(file, None, scene.q0, SCATTERED)[0]
+        outer = at_corners(file, None, scene.q0, scene.expansions.full.y0, ends)
+        inner = scattered(file, None, scene.q0, SCATTERED)
         yield DESIGN_BOX, as_listed(file, np.vstack([outer, inner]))
     if scene.trajectory is not None:
         yield BETWEEN, unseen_points(scene)

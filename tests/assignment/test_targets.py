@@ -5,10 +5,9 @@ from hypothesis import strategies as st
 
 from eigassign.assignment import (
     hz_from_lam,
-    sample_target,
     trapezoidal_weights,
 )
-from eigassign.errors import AccuracyError, UsageError
+from eigassign.errors import AccuracyError
 
 repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=50)
 
@@ -32,43 +31,6 @@ def test_trapezoidal_weights_integrate_straight_lines_exactly(steps, offset, slo
     exact = offset * time[-1] + 0.5 * slope * time[-1] ** 2
     scale = (abs(offset) + abs(slope) * time[-1]) * time[-1]
     assert integral == pytest.approx(exact, abs=1e-13 * scale)  # round-off of some 20 terms
-
-
-@pytest.mark.parametrize(
-    ("time", "words"),
-    [
-        ([], "no samples"),
-        ([0.0, 1.0, 1.0], "sample 2 is not later"),
-        ([0.0, 2.0, 1.0], "sample 2 is not later"),
-        ([0.0, np.nan], "sample 1 is not later"),
-    ],
-)
-def test_times_that_do_not_increase_are_refused(time, words):
-    with pytest.raises(UsageError, match=words):
-        trapezoidal_weights(time)
-
-
-def test_a_target_is_constant_or_runs_linearly_in_hz_between_its_knots():
-    np.testing.assert_array_equal(sample_target([0.0, 0.4, 1.0], 190.0), [190.0, 190.0, 190.0])
-    sampled = sample_target([0.0, 0.25, 0.5, 0.75, 1.0], [100.0, 200.0, 150.0], [0.0, 0.5, 1.0])
-    np.testing.assert_allclose(sampled, [100.0, 150.0, 200.0, 175.0, 150.0])
-
-
-@pytest.mark.parametrize(
-    ("frequency", "knots", "words"),
-    [
-        (0.0, None, "above 0 Hz"),
-        (-3.0, None, "above 0 Hz"),
-        (np.nan, None, "nan Hz at 0"),
-        ([100.0, 0.0], [0.0, 1.0], "0.0 Hz at 1"),
-        ([100.0, 100.0], [0.0, 0.9], "does not cover"),
-        ([100.0, 100.0], [0.1, 1.0], "does not cover"),
-        ([100.0, 100.0], [1.0, 0.0], "not later"),
-    ],
-)
-def test_an_impossible_target_is_refused(frequency, knots, words):
-    with pytest.raises(UsageError, match=words):
-        sample_target([0.0, 0.5, 1.0], frequency, knots)
 
 
 @pytest.mark.parametrize("bad", [-1e-3, np.nan, np.inf])

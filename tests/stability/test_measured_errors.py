@@ -37,7 +37,7 @@ def shares(
     """Yield error / stated error of answers between samples and anywhere within the bounds."""
     file = model.poses.case
     x = unseen(file, model, path, q0[None], y0)
-    at = scattered(file, path, q0, EACH, int(rng.integers(1000, 1_000_000)))[0]
+    at = scattered(file, path, q0, EACH, int(rng.integers(1000, 1_000_000)))
     q, y = np.split(at, [len(q0)], axis=1)
     exact = model.frequencies(q, y, max(modes))[:, np.array(modes) - 1]
     for approximation in approximations(model, q0, y0, modes, rng):

@@ -31,7 +31,7 @@ from eigassign.case.schema.targets import (
     FrequencyProfile,
     StaticTarget,
 )
-from eigassign.errors import CaseError, UsageError
+from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 
@@ -121,60 +121,23 @@ def trapezoidal_weights(time_s: ArrayLike) -> Floats:
 
     The weight of sample k is (t_{k+1} − t_{k−1})/2, one-sided at both ends; samples need not be
     evenly spaced. A single sample has weight 1: the integral becomes the value there.
-
-    Raises:
-        UsageError: no samples, or times that do not increase.
     """
-    time = _increasing(time_s)
+    time = np.asarray(time_s, dtype=np.float64)
     if time.size == 1:
         return frozen([1.0])
     steps = np.diff(time)
     return frozen(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
 
 
-def sample_target(
-    time_s: ArrayLike, frequency_hz: ArrayLike, knot_time_s: ArrayLike | None = None
-) -> Floats:
-    """The wanted frequency in Hz at the samples, (n_t,).
+def time_weights(path: Trajectories, rows: slice | None = None) -> Floats:
+    """ω (n,) in s of the integral over these rows, or all, of every trajectory for itself.
 
-    ``frequency_hz`` is one number, held throughout; or values at ``knot_time_s``, between which
-    the frequency in Hz runs linearly in time. Nothing is extrapolated.
-
-    Raises:
-        UsageError: a frequency that is not positive, knots that do not increase, or knots that do
-            not cover the samples.
+    By the trapezoidal rule, with the weight of each.
     """
-    time, values = _increasing(time_s), np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    bad = ~(np.isfinite(values) & (values > 0.0))
-    if bad.any():
-        k = int(bad.argmax())
-        raise UsageError(f"target frequency: {values[k]} Hz at {k}; must be above 0 Hz")
-    knots = time[:1] if knot_time_s is None else _increasing(knot_time_s)
-    slack = 1e-12 * np.abs(knots).max()  # rounding of a time grid's end
-    if knot_time_s is not None and not (
-        knots[0] - slack <= time[0] and time[-1] <= knots[-1] + slack
-    ):
-        raise UsageError(
-            f"target time: {knots[0]:g} … {knots[-1]:g} s does not cover the trajectory's "
-            f"{time[0]:g} … {time[-1]:g} s"
-        )
-    return frozen(np.interp(time, knots, values))
-
-
-def _increasing(time_s: ArrayLike) -> Floats:
-    time = np.asarray(time_s, dtype=np.float64)
-    if time.size == 0:
-        raise UsageError("time: no samples")
-    late = ~(np.diff(time) > 0.0)
-    if late.any():
-        sample = int(late.argmax()) + 1
-        raise UsageError(f"time: sample {sample} is not later than the one before it")
-    return time
-
-
-def time_weights(path: Trajectories) -> Floats:
-    """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
-    return path.weights(trapezoidal_weights)
+    rows = slice(0, len(path.q)) if rows is None else rows
+    parts, time_s = {part.name: part.weight for part in path.parts}, path.time_s[rows]
+    along = _along(path, rows)
+    return np.concatenate([parts[name] * trapezoidal_weights(time_s[own]) for name, own in along])
 
 
 def _of_target(
@@ -204,7 +167,7 @@ def _of_target(
             along=along,
             weight=target.weight,
             trajectory=target.trajectory,
-            seconds=None if target.during is None else _seconds(path, rows),
+            seconds=None if target.during is None else time_weights(path, rows),
             followed=tuple(sorted(followed, key=own.index)),
         )
 
@@ -244,22 +207,23 @@ def _along(path: Trajectories, rows: slice) -> Iterator[tuple[str, slice]]:
             yield part.name, slice(first - rows.start, last - rows.start)
 
 
-def _seconds(path: Trajectories, rows: slice) -> Floats:
-    """ω (n,) in s of the integral over these rows of every trajectory, and no more."""
-    parts = {part.name: part.weight for part in path.parts}
-    time_s = path.time_s[rows]
-    along = _along(path, rows)
-    return np.concatenate([parts[name] * trapezoidal_weights(time_s[own]) for name, own in along])
-
-
 def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:
-    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time."""
-    knots = (curve.frequency, curve.time) if isinstance(curve, FrequencyProfile) else (curve, None)
-    found = []
+    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time.
+
+    A profile runs linearly in time between its points, and is not extrapolated.
+    """
+    if not isinstance(curve, FrequencyProfile):
+        return np.full(rows.stop - rows.start, float(curve))
+    found, knots = [], np.array(curve.time)
+    slack = 1e-12 * np.abs(knots).max()  # rounding of a time grid's end
     for name, own in _along(path, rows):
-        try:
-            found.append(sample_target(path.time_s[rows][own], *knots))
-        except UsageError as error:
+        time = path.time_s[rows][own]
+        if not knots[0] - slack <= time[0] <= time[-1] <= knots[-1] + slack:
             which = f" (trajectory {name!r})" if path.several else ""
-            raise CaseError((file.problem(key, f"{error}{which}"),)) from error
+            message = (
+                f"target time: {knots[0]:g} … {knots[-1]:g} s does not cover the trajectory's "
+                f"{time[0]:g} … {time[-1]:g} s{which}"
+            )
+            raise CaseError((file.problem(key, message),))
+        found.append(np.interp(time, knots, curve.frequency))
     return np.concatenate(found)

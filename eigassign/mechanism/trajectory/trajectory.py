@@ -406,15 +406,6 @@ class Trajectories(Brief):
         pairs = zip(self.parts, self.rows, strict=True)
         return next(pair for pair in pairs if pair[1].start <= k < pair[1].stop)
 
-    def weights(self, integral: Callable[[Floats], Floats]) -> Floats:
-        """ω (n,) with ``ω @ g`` ≈ Σ weight · ∫ g dt over every trajectory for itself.
-
-        ``integral`` gives the weights of one trajectory from its times, such as the trapezoidal
-        rule's.
-        """
-        shares = [part.weight * integral(part.trajectory.time_s) for part in self.parts]
-        return _stacked([np.asarray(share) for share in shares])
-
     def spread(self, count: int) -> Ints:
         """Numbers of about ``count`` samples: of each trajectory its share, with both its ends."""
         n = len(self.time_s)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_arms import serial_arm
 
-from eigassign.assignment import trapezoidal_weights
+from eigassign.assignment import time_weights
 from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import TrajectoryError, UsageError
 from eigassign.mechanism import (
@@ -320,7 +320,7 @@ def test_weights_integrate_each_trajectory_by_itself_and_by_its_weight(
     for part, weight in zip(path.parts, weights, strict=True):
         a, b = part.trajectory.time_s[[0, -1]]
         expected += weight * (offset * (b - a) + slope * (b**2 - a**2) / 2)
-    assert path.weights(trapezoidal_weights) @ g == pytest.approx(expected, abs=1e-11)
+    assert time_weights(path) @ g == pytest.approx(expected, abs=1e-11)
 
 
 def test_the_tip_is_stacked_only_if_all_have_one() -> None:
