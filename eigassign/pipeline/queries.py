@@ -45,6 +45,7 @@ from eigassign.study.design.judgement import far_off
 from eigassign.study.meaning import levers
 from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.results import LeverRow, WeightRow
+from eigassign.study.scene import Scene
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -230,10 +231,9 @@ def _checked(case: BuiltCase) -> CheckAnswer:
         needed = expansion_needed(file)
         plan = plan_expansion(file, model, trajectory, needed=needed)
         y = case.initial_design
-        notes += (*plan.notes, *truncation_lines(model, plan.modes, trajectory, plan.q0, [y]))
-        notes += tuple(
-            mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"), model)
-        )
+        scene = Scene(file, model, y, trajectory, plan, None, plan.notes)
+        notes += (*scene.notes, *truncation_lines(scene))
+        notes += tuple(mesh_lines(judged_mesh(scene, y, "initial"), model))
         q = plan.q0[None] if trajectory is None else trajectory.q[:1]
         weight = study_weight(file, model, plan.modes, q, y, "initial")  # quick
         notes += weight.lines

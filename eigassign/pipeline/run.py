@@ -27,7 +27,7 @@ from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks import study_accuracy, truncation_notes, weight_at
+from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
 from eigassign.study.collect import collect_results
 from eigassign.study.design.account import VerifiedAssignment
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
@@ -317,7 +317,7 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
         with stages("validation", "comparing both expansions with exact frequencies"):
             rows = validate_expansions(scene)
             weight = weight_at(scene, scene.initial, "initial")
-            notes = (*scene.notes, *weight.lines, *truncation_notes(scene))
+            notes = (*scene.notes, *weight.lines, *truncation_lines(scene))
     along = [(row.worst_taylor, row.mode) for row in rows if row.where.startswith(TRAJECTORY)]
     warnings = (*scene.warnings, *reach_warnings(scene, along), *weight.warnings)
     return Validation(rows, notes, warnings, stages.total_s)

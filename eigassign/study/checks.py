@@ -28,7 +28,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.facts import about
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
-from eigassign.mechanism.trajectory.trajectory import Trajectories, rates
+from eigassign.mechanism.trajectory.trajectory import rates
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.solver import rounding_error
 from eigassign.modal.model import Model
@@ -303,24 +303,23 @@ FEW = 3  # of a model of more than `LARGE` degrees of freedom, and against whole
 LARGE = 10_000
 
 
-def judged_mesh(
-    model: Model,
-    modes: Sequence[int],
-    trajectory: Trajectories | None,
-    q0: Floats,
-    y: Floats,
-    design: str,
-) -> MeshError | None:
+def judged_mesh(scene: Scene, y: Floats, design: str) -> MeshError | None:
     """What the mesh leaves out at poses of the trajectory, or at q0, for one design y (n_y,).
 
     ``design`` is what it is called. None without beams or solids.
     """
+    model, modes = scene.model, scene.modes
     if not model.is_meshed and model.solids is None:
         return None
-    q = q0[None] if trajectory is None else judged_poses(model, poses_at(trajectory, y))
+    q = judged_poses(model, _poses(scene, y))
     worst = q if model.solids is not None else q[model.coarsest(q, y, modes)]
     error = model.discretisation_error(worst, y, modes).max(axis=0)
-    return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
+    return MeshError(modes, tuple(float(e) for e in error), len(q), design)
+
+
+def _poses(scene: Scene, y: Floats) -> Floats:
+    """q (n, n_q) at which design y is judged: of the trajectory, or q0."""
+    return scene.q0[None] if scene.trajectory is None else poses_at(scene.trajectory, y)
 
 
 def judged_poses(model: Model, q: Floats, most: int = MESH_POSES) -> Floats:
@@ -387,20 +386,18 @@ def finer(model: Model) -> str:
     return f"{solids}give the links more elements, raise reduce_to, or write auto for them"
 
 
-def truncation_lines(
-    model: Model,
-    modes: Sequence[int],
-    trajectory: Trajectories | None,
-    q0: Floats,
-    designs: Sequence[Floats],
-) -> Iterator[str]:
-    """By how much reduced links raise frequencies at the worst poses, or q0, of designs."""
+def truncation_lines(scene: Scene, optimum: Floats | None = None) -> Iterator[str]:
+    """By how much reduced links raise frequencies at the worst poses, initially and at the optimum.
+
+    Poses are those of the trajectory, or q0.
+    """
+    model, modes = scene.model, scene.modes
     if not model.is_reduced:
         return
     found = []
-    for y in np.unique(designs, axis=0):
-        q = q0[None] if trajectory is None else poses_at(trajectory, y)
-        found.append(model.truncation_error(worst_poses(model, q, y, max(modes)), y, modes))
+    for y in np.unique([scene.initial, *([] if optimum is None else [optimum])], axis=0):
+        q = worst_poses(model, _poses(scene, y), y, max(modes))
+        found.append(model.truncation_error(q, y, modes))
     error = np.concatenate(found)
     where = f"over {len(error)} poses and designs" if len(error) > 1 else "at one pose"
     for mode, worst in zip(modes, error.max(axis=0), strict=True):
@@ -428,29 +425,25 @@ def study_accuracy(
     are expanded are asked for by targets.
     """
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
-    given = scene.model, scene.modes, scene.trajectory, scene.q0
-    first = None if optimum is None else judged_mesh(*given, scene.initial, "initial")
-    mesh = judged_mesh(*given, y, design)
+    first = None if optimum is None else judged_mesh(scene, scene.initial, "initial")
+    mesh = judged_mesh(scene, y, design)
     weight = weight_at(scene, y, design, more)
     lines = [line for each in (first, mesh) for line in mesh_lines(each, scene.model)]
     lines += weight.lines
-    lines += truncation_notes(scene, optimum)
+    lines += truncation_lines(scene, optimum)
     return Accuracy(mesh, weight, (*lines, _rounding_note(scene, y)))
 
 
 def weight_at(scene: Scene, y: Floats, design: str, more: Collection[int] = ()) -> WeightStudy:
     """`study_weight` of the expanded and ``more`` modes at the poses where the mesh is judged."""
-    q = scene.q0[None]
-    if scene.trajectory is not None:
-        q = judged_poses(scene.model, poses_at(scene.trajectory, y), WEIGHT_POSES)
+    q = judged_poses(scene.model, _poses(scene, y), WEIGHT_POSES)
     return study_weight(scene.file, scene.model, sorted({*scene.modes, *more}), q, y, design)
 
 
 def _rounding_note(scene: Scene, y: Floats) -> str:
     """`rounding_line` of some poses of design y, and of the first one of the initial design."""
-    pencil, q = scene.model.pencil, scene.q0[None]
-    if scene.trajectory is not None:
-        q = spread(poses_at(scene.trajectory, y), ROUNDED if pencil.is_dense else 1)
+    pencil = scene.model.pencil
+    q = spread(_poses(scene, y), ROUNDED if pencil.is_dense else 1)
     x = scene.model.x(q, y)
     if pencil.is_dense:
         x = np.unique(np.vstack([x, scene.model.x(q[:1], scene.initial)]), axis=0)
@@ -464,9 +457,3 @@ def rounding_line(lost: float) -> str:
     if not np.isfinite(lost):
         return "round-off of the exact frequencies: not known; they may be only round-off"
     return f"round-off of the exact frequencies: below {lost:.1g}, relative"
-
-
-def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
-    """`truncation_lines` along the trajectory, at the initial design and the optimum."""
-    designs = [scene.initial, *([] if optimum is None else [optimum])]
-    return list(truncation_lines(scene.model, scene.modes, scene.trajectory, scene.q0, designs))

@@ -63,16 +63,18 @@ def plan_expansion(
 ) -> Plan:
     """Settle the expansion; ``order`` and ``modes`` override the file's.
 
-    Where one that is not ``needed`` is not found within `LOOKS`, its order is 0, and a note says
-    why. Raises CaseError at the key at fault: modes that the model does not have, an automatic
-    expansion point without a trajectory to be central in, an order of which the memory would not
-    suffice; UsageError for such an ``order``.
+    An automatic order meets the series' share of the accuracy at exact solves between the samples
+    and all over the bounds. Where one that is not ``needed`` does not, its order is 0, and a note
+    says why. Raises AccuracyError, naming the pose, where one that is needed does not; CaseError at
+    the key at fault: modes that the model does not have, an automatic expansion point without a
+    trajectory to be central in, an order of which the memory would not suffice; UsageError for such
+    an ``order``.
     """
     q0, q_note = _q0(file, model, trajectory)
     y0, y_note = _y0(file, model, q0)
     chosen, modes_note = _modes(file, modes)
     _check_modes(file, model, chosen)
-    notes = [q_note, y_note, modes_note]
+    notes = tuple(filter(None, (q_note, y_note, modes_note)))
     wanted: int | str = file.expansion.order if order is None else order
     if isinstance(wanted, int):
         try:  # the linearised series is made of any order; the full one, see `pipeline.stages`
@@ -81,9 +83,18 @@ def plan_expansion(
             raise (
                 _wrong(file, "expansion.order", str(error)) if order is None else error
             ) from None
-        return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
-    found = choose_order(file, model, trajectory, q0, y0, chosen, needed)
-    return found._replace(notes=tuple(note for note in (*notes, *found.notes) if note))
+        return Plan(q0, y0, wanted, chosen, notes)
+    try:
+        x = unseen(file, model, trajectory, q0[None], y0)
+        accuracy, most = SERIES * asked_accuracy(file), np.inf if needed else GIVEN_UP
+        found = raise_order(model.pencil, x, np.append(q0, y0), accuracy, chosen, most=most)
+    except EigassignError as error:  # an accuracy that is not met, or a design without a pose
+        if needed:
+            raise
+        why = f"there is no expansion, and so no one-shot design: {error}"
+        return Plan(q0, y0, 0, chosen, (*notes, why))
+    more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
+    return Plan(q0, y0, found.order, chosen, (*notes, *found.reasons), more_q)
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:
@@ -266,34 +277,6 @@ def expansion_needed(file: CaseFile) -> bool:
     return file.assignment.method == "one_shot" or not file.has_question
 
 
-def choose_order(
-    file: CaseFile,
-    model: Model,
-    trajectory: Trajectories | None,
-    q0: Floats,
-    y0: Floats,
-    modes: tuple[int, ...],
-    needed: bool = True,
-) -> Plan:
-    """Order and expansion points that meet the series' share of the accuracy.
-
-    By exact solves between the samples and all over the bounds of the design. Raises AccuracyError,
-    naming the pose, where no order and number of points will do; where they are not ``needed``, the
-    order is then 0.
-    """
-    try:
-        x = unseen(file, model, trajectory, q0[None], y0)
-        accuracy, most = SERIES * asked_accuracy(file), np.inf if needed else GIVEN_UP
-        found = raise_order(model.pencil, x, np.append(q0, y0), accuracy, modes, most=most)
-    except EigassignError as error:  # an accuracy that is not met, or a design without a pose
-        if needed:
-            raise
-        why = f"there is no expansion, and so no one-shot design: {error}"
-        return Plan(q0, y0, 0, modes, (why,))
-    more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
-    return Plan(q0, y0, found.order, modes, found.reasons, more_q)
-
-
 # --- Poses of the trajectory at designs all over their bounds
 
 ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
@@ -308,13 +291,13 @@ def standing(x: Floats, model: Model) -> Floats:
     return x[kept] if kept.any() else x
 
 
-def far_from_buckling(model: Model, x: Floats, most: float = STANDS) -> NDArray[np.bool_]:
-    """Mask of samples x (n, n_x) with stated weight up to ``most`` of what buckles or falls."""
+def far_from_buckling(model: Model, x: Floats) -> NDArray[np.bool_]:
+    """Mask of samples x (n, n_x) with stated weight up to `STANDS` of what buckles or falls."""
     n_q, kept = len(model.q_names), np.ones(len(x), dtype=bool)
     for k, one in enumerate(x if model.pencil.weight is not None else ()):
         try:
             model.require_standing(one[:n_q], one[n_q:])
-            kept[k] = buckling(model, one[:n_q], one[n_q:])[0] <= most
+            kept[k] = buckling(model, one[:n_q], one[n_q:])[0] <= STANDS
         except MechanismError:
             kept[k] = False
     return kept
