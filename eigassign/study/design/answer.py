@@ -116,7 +116,6 @@ def assign_design(scene: Scene) -> Assignment:
     """
     file, path = scene.file, scene.path
     l0, slope = scene.expansions.linear_in_design(path)
-    _require_near(scene, l0)
     column = scene.expansions.column
     goals = [
         (own, LinearModel(l0[own.rows, k], slope[own.rows, k]))
@@ -132,19 +131,6 @@ def assign_design(scene: Scene) -> Assignment:
         scene.constraints,
         tuple(file.design.parameters),
     )
-
-
-def _require_near(scene: Scene, l0: Floats) -> None:
-    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
-    bad = np.argwhere(~(l0 > 0.0))
-    if len(bad):
-        k, column = (int(i) for i in bad[0])
-        problem = scene.file.problem(
-            "expansion.q",
-            f"gives mode {scene.expansions.modes[column]} a negative λ at {scene.path.where(k)}, "
-            "too far from the motion: give a pose of the trajectory, or auto",
-        )
-        raise AccuracyError(str(problem))
 
 
 def solver_row(assignment: Assignment) -> SolverRow:
