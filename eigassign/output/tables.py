@@ -23,7 +23,6 @@ from eigassign.facts import (
     verdict_word,
 )
 from eigassign.study.results import (
-    MET,
     DesignRow,
     ErrorSummary,
     LeverRow,
@@ -31,6 +30,7 @@ from eigassign.study.results import (
     TargetStudy,
     ValidationRow,
     WeightRow,
+    violated,
 )
 
 Floats = NDArray[np.float64]
@@ -199,35 +199,26 @@ def _met(satisfied: bool) -> str:
     return "met" if satisfied else "VIOLATED"
 
 
-def violated(worst: float) -> str:
-    """``violated by 1.55 %``; ``met`` where no more than round-off is left."""
-    return f"violated by {percent(worst)}" if worst > MET else "met"
-
-
 def _combinations(results: RunResults) -> Table:
     """The best combinations of the catalogues, solved exactly."""
     row = results.assignment
     if row is None or row.catalogue is None:
         return Table("Combinations", (), ())
     wanted = any(target.asked.is_goal for target in results.targets)
-    best = row.catalogue.best
+    best, caption = row.catalogue.best, f"{capital(row.optimality.words)}."
     own = {each.name: each for each in results.design}
-    facts: dict[str, tuple[str, Callable[[float], str]]] = {
-        "worst error": ("error", percent),
-        "mass [kg]": ("mass", number),
-        "price": ("price", number),
-        "objective": ("objective", number),
-    }
-    if row.objective == "lightest" or (results.price is not None and not wanted and not row.aim):
-        del facts["objective"]  # which is the mass, or the price
-    shown = {name: fact for name, fact in facts.items() if getattr(best[0], fact[0]) is not None}
+    # of the lightest, or cheapest, the objective is the mass, or the price
+    plain = results.price is not None and not wanted and not row.aim
+    plain = plain or row.objective == "lightest"
+    names = "error mass price violation" if plain else "error mass price objective violation"
+    made = facts_table(
+        "Combinations", best, names, caption, error="worst error", violation="limits"
+    )
     rows = tuple(
-        (str(k), *(_choice(own.get(name), choice) for name, choice in one.choices.items()),
-         *(said(getattr(one, fact)) for fact, said in shown.values()), violated(one.violation))
-        for k, one in enumerate(best, 1)
-    )  # fmt: skip
-    columns = ("combination", *best[0].choices, *shown, "limits")
-    return Table("Combinations", columns, rows, f"{capital(row.optimality.words)}.")
+        (str(k), *(_choice(own.get(name), choice) for name, choice in one.choices.items()), *cells)
+        for k, (one, cells) in enumerate(zip(best, made.rows, strict=True), 1)
+    )
+    return made._replace(columns=("combination", *best[0].choices, *made.columns), rows=rows)
 
 
 def _choice(row: DesignRow | None, choice: str) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import RIDING, SLIDING
 from eigassign.mechanism.kinematics.forward import LinkFrames
@@ -34,7 +35,6 @@ from eigassign.study.results import (
     ModePictures,
     Motion,
     MovingMode,
-    frozen,
 )
 
 Floats = NDArray[np.float64]

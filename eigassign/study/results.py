@@ -55,19 +55,17 @@ WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is k
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 
 
-def frozen(array: Floats) -> Floats:
-    """The numbers, contiguous, in an array that cannot be written to."""
-    array = np.ascontiguousarray(array)
-    array.setflags(write=False)
-    return array
-
-
 def _lowest(hz: Floats) -> str:
     return number(float(hz.min()))
 
 
 def _highest(hz: Floats) -> str:
     return number(float(hz.max()))
+
+
+def violated(worst: float) -> str:
+    """``violated by 1.55 %``; ``met`` where no more than round-off is left."""
+    return f"violated by {percent(worst)}" if worst > MET else "met"
 
 
 def _metres(along: Floats) -> str:
@@ -545,11 +543,11 @@ class CombinationRow:
 
     choices: Mapping[str, str]
     design: Floats
-    objective: float
-    violation: Violation
+    objective: Annotated[float, Fact(digits=number)]
+    violation: Annotated[Violation, Fact(digits=violated)]
     error: Share | None = None
     mass: Kilograms | None = None
-    price: float | None = None
+    price: Annotated[float | None, Fact(digits=number)] = None
 
 
 @dataclass(frozen=True)
@@ -936,7 +934,6 @@ class WeightRow:
     poses: Annotated[int, Fact("at which it was judged")]
     design: Annotated[str, Fact("of which it is: initial, optimal or updated")]
     sag: Annotated[tuple[SagRow, ...], Fact("of named nodes, the farthest first")] = ()
-    turn: Annotated[float | None, Fact("of a node under the weight at most", unit="rad")] = None
     buckling: Annotated[Share | None, Fact("the weight, relative to that which buckles")] = None
     struts: Annotated[
         Share | None, Fact("what imported matrices may put frequencies off, from 2 % of it on")

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.requirements import Tolerances
-from eigassign.assignment.program import LinearConstraint
+from eigassign.assignment.program import LinearConstraint, frozen
 from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity, StaticLimit
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import design_limits, requirements_of
@@ -60,7 +60,6 @@ from eigassign.study.results import (
     Comparison,
     ModeStudy,
     ValidationRow,
-    frozen,
 )
 
 Floats = NDArray[np.float64]

@@ -36,10 +36,7 @@ LINEARISED = Look(graph.BLUE, 1.4, "dashed")
 def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> FigurePlan:
     """Exact, Taylor and linearised frequency along the trajectory, and the magnitudes of errors."""
     title = f"Mode {study.mode}: expansion against exact along {results.along}, initial design"
-    taylor, linearised = (
-        percent(comparison.worst["taylor"]),
-        percent(comparison.worst["linearised"]),
-    )
+    taylor, linearised = map(percent, comparison.worst.values())
     frequencies = (
         Curve(comparison.exact_hz, EXACT, "exact"),
         Curve(comparison.taylor_hz, TAYLOR, f"Taylor, order {study.order} (worst {taylor})"),
@@ -47,10 +44,7 @@ def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> 
     )
     errors = tuple(
         Curve(100.0 * np.where(np.isfinite(error), np.abs(error), np.nan), look)
-        for error, look in (
-            (comparison.errors["taylor"], TAYLOR),
-            (comparison.errors["linearised"], LINEARISED),
-        )
+        for error, look in zip(comparison.errors.values(), (TAYLOR, LINEARISED), strict=True)
     )
     panels = (
         Panel("frequency [Hz]", frequencies, 1.9),
@@ -72,19 +66,13 @@ def reach_figures(results: RunResults) -> Iterator[FigurePlan]:
     number = 0
     for target in results.targets:
         shown = reach.get(target.label)
-        if shown is None or not target.asked.terms:
-            continue
-        for along in target.along:
+        for along in target.along if shown is not None and target.asked.terms else ():
             number += 1
-            yield ranges(results, target, along, shown, number)
+            yield _range(results, target, along, shown, number)
 
 
-def ranges(
-    results: RunResults,
-    target: TargetStudy,
-    along: TargetAlong,
-    row: RangeRow,
-    number: int,
+def _range(
+    results: RunResults, target: TargetStudy, along: TargetAlong, row: RangeRow, number: int
 ) -> FigurePlan:
     """The answer inside the frequencies of all designs within the bounds."""
     several = len(results.trajectories) > 1

@@ -30,8 +30,8 @@ from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figure
 from eigassign.output.result_files import sample_files
-from eigassign.output.tables import SECTIONS, TONES, Table, headline, run_tables, violated
-from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetStudy
+from eigassign.output.tables import SECTIONS, TONES, Table, headline, run_tables
+from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetStudy, violated
 
 if TYPE_CHECKING:
     from jinja2 import Environment
