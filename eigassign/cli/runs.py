@@ -197,7 +197,8 @@ def validate(
     the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case.
     """
     from eigassign.batch.plan import cases_in
-    from eigassign.output.batch.summary import write_junit
+    from eigassign.output.batch.summary import junit_xml
+    from eigassign.output.store.atomic import replace_synced
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
@@ -220,7 +221,7 @@ def validate(
             codes.append(0 if answer.passed else 1)
             tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows), ""))
         if junit:
-            write_junit(junit, tests)
+            replace_synced(junit, junit_xml(tests))
     if as_json:
         print_json([*rows, *failures])
     else:

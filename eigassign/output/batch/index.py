@@ -23,10 +23,10 @@ from eigassign.output.batch.summary import (
     CaseOutcome,
     Test,
     bare_names,
+    junit_xml,
     quantity,
     summary_csv,
     summary_json,
-    write_junit,
 )
 from eigassign.output.reports.page import TEMPLATES, inside, page_of
 from eigassign.output.store.atomic import replace_synced
@@ -172,7 +172,7 @@ def write_files(folder: Path, rows: Sequence[CaseOutcome], keys: Sequence[str] =
     replace_synced(folder / "summary.csv", summary_csv(rows).encode())
     replace_synced(folder / "summary.json", summary_json(rows).encode())
     replace_synced(folder / "index.html", index_page(rows, folder, keys))
-    write_junit(folder / "junit.xml", map(_test, rows))
+    replace_synced(folder / "junit.xml", junit_xml(map(_test, rows)))
 
 
 def _test(row: CaseOutcome) -> Test:

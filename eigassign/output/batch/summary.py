@@ -10,16 +10,17 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import count
-from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
+
+from pydantic import TypeAdapter
 
 from eigassign._version import __version__
 from eigassign.case.units import QuantityError, read_quantity
-from eigassign.errors import StorageError
 from eigassign.facts import Fact, Seconds, Share, verdict_word
 from eigassign.files import name_of, printable
-from eigassign.output.store.atomic import replace_synced
+from eigassign.output.documents import results_document
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.results import RunResults
 
@@ -39,7 +40,10 @@ class CaseOutcome:
     design, by name.
     """
 
+    index: Annotated[int, Fact("place in the batch")] = field(default=0, kw_only=True)
     name: Annotated[str, Fact("of the case, and of its variant", "case")]
+    key: Annotated[str, Fact("of what was computed")] = field(default="", kw_only=True)
+    values: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     path: Annotated[str, Fact("of the case file")]
     status: Status
     seconds: Annotated[Seconds, Fact(heading="time")]
@@ -56,12 +60,9 @@ class CaseOutcome:
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
     frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
     verdict: str = ""
-    values: Mapping[str, Any] = field(default_factory=dict)
     units: Annotated[Mapping[str, str], Fact("SI, of values and design")] = field(
         default_factory=dict
     )
-    index: Annotated[int, Fact("place in the batch")] = 0
-    key: Annotated[str, Fact("of what was computed")] = ""
 
     @property
     def word(self) -> Annotated[str, Fact(heading="verdict")]:
@@ -70,26 +71,21 @@ class CaseOutcome:
 
 
 _WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", "error": "Failed"}
-_STATUSES = get_args(Status)
+_SURROGATE = re.compile(r"\\ud[89a-f][0-9a-f]{2}")
 NUMBERS = (  # that every case has, or lacks
     "initial_max_relative", "predicted_max_relative", "exact_max_relative", "exact_rms_relative",
     "initial_violation", "exact_violation", "mass", "price",
-)  # fmt: skip
-_ORDER = (
-    "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
-    "predicted_max_relative", "exact_max_relative", "exact_rms_relative", "initial_violation",
-    "exact_violation", "mass", "price", "design", "units", "frequencies", "seconds", "path",
-    "run_folder",
 )  # fmt: skip
 
 
 def to_plain(outcome: CaseOutcome) -> dict[str, Any]:
     """The outcome as JSON has it, ``index`` first; a number that is not finite is None."""
-    plain = {name: getattr(outcome, name) for name in _ORDER}
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in plain.items()
-    }
+    return dict(results_document(outcome, may_lack=True))
+
+
+@cache
+def _outcomes() -> TypeAdapter[CaseOutcome]:
+    return TypeAdapter(CaseOutcome)
 
 
 def from_plain(row: Any) -> CaseOutcome:
@@ -97,23 +93,11 @@ def from_plain(row: Any) -> CaseOutcome:
 
     Raises ValueError or TypeError for anything else.
     """
-    found = CaseOutcome(**row)
-    if {type(found.values), type(found.units)} != {dict}:
-        raise ValueError("no outcome of a case")
-    places = [found.path, "" if found.run_folder is None else found.run_folder]
-    texts = [found.name, found.message, found.verdict, found.key, *map(name_of, places)]
-    texts += [*found.units, *found.units.values()]
-    given = (getattr(found, name) for name in NUMBERS)
-    numbers = [found.seconds, *(number for number in given if number is not None)]
-    for name, number in found.design:
-        texts.append(name)
-        numbers.append(number)
-    for name, lowest, mean, highest in found.frequencies:
-        texts.append(name)
-        numbers += (lowest, mean, highest)
-    right = found.status in _STATUSES and type(found.index) is int
-    if not right or {*map(type, texts)} != {str} or not {*map(type, numbers)} <= {int, float}:
-        raise ValueError("no outcome of a case")
+    found, text = CaseOutcome(**row), json.dumps(row)
+    # names of files may hold what is no Unicode, which pydantic refuses
+    _outcomes().validate_json(_SURROGATE.sub("?", text), strict=True)
+    for place in (found.path, found.run_folder or ""):
+        name_of(place)
     return found
 
 
@@ -280,14 +264,6 @@ def junit_xml(tests: Iterable[Test]) -> bytes:
     header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
     end = "</testsuite></testsuites>\n"
     return "".join([header, 'skipped="0">\n', *lines, end]).encode()
-
-
-def write_junit(path: Path, tests: Iterable[Test]) -> None:
-    """A file of all ``tests``; raises StorageError where it cannot be written."""
-    try:
-        replace_synced(path, junit_xml(tests))
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _escaped(text: str) -> str:
