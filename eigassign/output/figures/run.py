@@ -65,10 +65,10 @@ def reach_figures(results: RunResults) -> Iterator[FigurePlan]:
     reach = {row.label: row for row in results.meaning.reach}
     number = 0
     for target in results.targets:
-        shown = reach.get(target.label)
-        for along in target.along if shown is not None and target.asked.terms else ():
-            number += 1
-            yield _range(results, target, along, shown, number)
+        if (shown := reach.get(target.label)) is not None and target.asked.terms:
+            for along in target.along:
+                number += 1
+                yield _range(results, target, along, shown, number)
 
 
 def _range(
