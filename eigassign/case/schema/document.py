@@ -6,10 +6,11 @@ To add a key: give `Document` a field, with a model of what stands below it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import (
@@ -33,6 +34,7 @@ from eigassign.case.schema.targets import TargetForm
 from eigassign.case.schema.trajectory import TrajectoryForms
 
 P = TypeVar("P", bound=Part)
+typed = cache(TypeAdapter)  # what reads values of a type
 _ONE_LINE = must(str.isprintable, "expected one line of printable text")
 
 

@@ -10,13 +10,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from itertools import count
 from typing import Annotated, Any, Literal
 
-from pydantic import TypeAdapter
-
 from eigassign._version import __version__
+from eigassign.case.schema.document import typed
 from eigassign.case.units import QuantityError, read_quantity
 from eigassign.facts import Fact, Seconds, Share, verdict_word
 from eigassign.files import name_of, printable
@@ -83,11 +81,6 @@ def to_plain(outcome: CaseOutcome) -> dict[str, Any]:
     return dict(results_document(outcome, may_lack=True))
 
 
-@cache
-def _outcomes() -> TypeAdapter[CaseOutcome]:
-    return TypeAdapter(CaseOutcome)
-
-
 def from_plain(row: Any) -> CaseOutcome:
     """The outcome that `to_plain` wrote, with lists for tuples.
 
@@ -95,7 +88,7 @@ def from_plain(row: Any) -> CaseOutcome:
     """
     found, text = CaseOutcome(**row), json.dumps(row)
     # names of files may hold what is no Unicode, which pydantic refuses
-    _outcomes().validate_json(_SURROGATE.sub("?", text), strict=True)
+    typed(CaseOutcome).validate_json(_SURROGATE.sub("?", text), strict=True)
     for place in (found.path, found.run_folder or ""):
         name_of(place)
     return found
