@@ -9,14 +9,12 @@ from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, u
 from eigassign.case.rules.properties import freedoms, guessed, walk
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import (
-    BareSection,
     BeamLink,
     FrameBeam,
     FrameLink,
     Link,
     RigidLink,
     SolidLink,
-    SuperelementLink,
     Taper,
 )
 from eigassign.case.schema.mechanism import (
@@ -157,34 +155,7 @@ def tapers_run_between_like_sections(document: Document) -> Iterator[Finding]:
                 yield (*path, "section"), f"{message}{a!r} and {b!r} are not"
 
 
-def bare_sections_have_the_moments_of_their_space(document: Document) -> Iterator[Finding]:
-    """One second moment of area in a plane; two, and the torsion constant, in space."""
-    missing = "required key is missing: second moment of area (in m4 when bare; or mm4, cm4)"
-    for name, section in document.mechanism.sections.items():
-        if not isinstance(section, BareSection):
-            continue
-        path: KeyPath = ("mechanism", "sections", name)
-        if document.mechanism.space == "planar":
-            if not section.in_plane:
-                yield (*path, "bending_inertia"), missing
-        elif section.bending_inertia is None:
-            for key in ("inertia_y", "inertia_z", "torsion_constant"):
-                if getattr(section, key) is None:
-                    yield (*path, key), missing
-        else:
-            message = "is for planar mechanisms: in space write inertia_z (bending in the local "
-            yield (*path, "bending_inertia"), message + "x-y plane) and inertia_y (x-z)"
-
-
 # --- Links
-
-
-def rigid_links_have_one_end(document: Document) -> Iterator[Finding]:
-    """The node `end` of a rigid link is given by its length or by its place."""
-    for name, link in document.mechanism.links.items():
-        if isinstance(link, RigidLink) and link.length is not None and "end" in link.nodes:
-            message = "the node 'end' is given by length already: leave one of them out"
-            yield ("mechanism", "links", name, "nodes", "end"), message
 
 
 def frames_hang_together(document: Document) -> Iterator[Finding]:
@@ -221,28 +192,6 @@ def beams_have_no_more_elements_than_can_be_meant(document: Document) -> Iterato
             f"the mechanism has {total} elements: more than {raised(MOST_ELEMENTS):g} take "
             f"minutes and hundreds of MB; {how_to_raise(total, MOST_ELEMENTS)}",
         )
-
-
-def superelements_have_a_row_for_each_freedom(document: Document) -> Iterator[Finding]:
-    """A node of a superelement has as many rows as degrees of freedom."""
-    planar = document.mechanism.space == "planar"
-    wanted = "u_x, u_y, θ_z" if planar else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
-    n = len(wanted.split())
-    for name, link in document.mechanism.links.items():
-        for node, body in link.nodes.items() if isinstance(link, SuperelementLink) else ():
-            if body.dofs is not None and len(body.dofs) != n:
-                path: KeyPath = ("mechanism", "links", name, "nodes", node, "dofs")
-                yield path, f"needs {n} entries, the rows of {wanted}; got {len(body.dofs)}"
-
-
-def springs_join_two_nodes(document: Document) -> Iterator[Finding]:
-    """A spring runs from a node to another one, and has a stiffness."""
-    for name, spring in document.mechanism.springs.items():
-        path: KeyPath = ("mechanism", "springs", name)
-        if spring.between[0] == spring.between[1]:
-            yield (*path, "between"), "both ends are the same node"
-        if not {"translational", "rotational"} & spring.model_fields_set:
-            yield path, "a spring needs translational, rotational or both"
 
 
 _JOINTS = ("mechanism", "joints")

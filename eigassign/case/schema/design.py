@@ -26,6 +26,7 @@ from eigassign.case.schema.parts import (
     Part,
     Quantity,
     Told,
+    ValueOr,
     distinct,
     must,
     needs_one_of,
@@ -100,10 +101,7 @@ def _several(given: tuple[str | Mapping[str, float], ...]) -> tuple[str | Mappin
 Factor: TypeAlias = Annotated[
     float, Quantity(), must(bool, "must not be 0: leave out what stays as it is")
 ]
-OneOfSeveral: TypeAlias = Annotated[
-    str | Annotated[Mapping[str, Factor], Field(min_length=1), Frozen],
-    Told(lambda value: isinstance(value, Mapping)),
-]
+OneOfSeveral: TypeAlias = ValueOr[str, Annotated[Mapping[str, Factor], Field(min_length=1), Frozen]]
 
 
 class Parameter(Part):

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from eigassign.case.schema.parts import (
     LENGTH,
@@ -35,6 +35,7 @@ from eigassign.case.schema.parts import (
     one_of,
     only_in,
     quantity,
+    space_of,
     wrong,
 )
 
@@ -128,6 +129,19 @@ class BareSection(SectionBase):
     shear_coefficient: Annotated[float, Quantity(above=0)] | None = None
 
     _bends_one_way = one_of("bending_inertia", "inertia_z", needed=False)
+
+    @model_validator(mode="after")
+    def _has_the_moments_of_its_space(self, info: ValidationInfo) -> Self:
+        spatial = space_of(info) == "spatial"
+        if spatial and self.bending_inertia is not None:
+            message = "is for planar mechanisms: in space write inertia_z (bending in the local "
+            raise wrong(message + "x-y plane) and inertia_y (x-z)", "bending_inertia")
+        needed = ("inertia_y", "inertia_z", "torsion_constant") if spatial else ("bending_inertia",)
+        for key in needed if spatial or (space_of(info) and not self.in_plane) else ():
+            if getattr(self, key) is None:
+                message = "required key is missing: second moment of area (in m4 when bare; or mm4,"
+                raise wrong(f"{message} cm4)", key)
+        return self
 
     @property
     def in_plane(self) -> float:
@@ -309,6 +323,13 @@ class RigidLink(Part):
     inertia: Inertia = 0.0
     center: Vector | None = None
 
+    @model_validator(mode="after")
+    def _has_one_end(self) -> Self:
+        if self.length is not None and "end" in self.nodes:
+            message = "the node 'end' is given by length already: leave one of them out"
+            raise wrong(message, "nodes", "end")
+        return self
+
 
 class FrameBeam(Part):
     """A beam of a frame; its local x runs from one node to the other.
@@ -373,7 +394,11 @@ class SuperelementNode(Part):
     dofs: Annotated[tuple[Dof, ...], Field(min_length=3, max_length=6)] | None = None
 
     @model_validator(mode="after")
-    def _is_found(self) -> Self:
+    def _is_found(self, info: ValidationInfo) -> Self:
+        rows = "u_x, u_y, θ_z" if space_of(info) == "planar" else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
+        n = rows.count(",") + 1
+        if self.dofs is not None and space_of(info) and len(self.dofs) != n:
+            raise wrong(f"needs {n} entries, the rows of {rows}; got {len(self.dofs)}", "dofs")
         for key in ("position", "dofs"):
             if self.id is None and getattr(self, key) is None:
                 raise wrong(f"required key is missing: {key}, or id, the node's number", key)

@@ -267,6 +267,14 @@ class Spring(Placed):
     angle: Annotated[Angle, IN_PLANE] = 0.0
     orientation: Annotated[Orientation | None, IN_SPACE] = None
 
+    @model_validator(mode="after")
+    def _joins_two_nodes(self) -> Self:
+        if self.between[0] == self.between[1]:
+            raise wrong("both ends are the same node", "between")
+        if not {"translational", "rotational"} & self.model_fields_set:
+            raise wrong("a spring needs translational, rotational or both")
+        return self
+
 
 class Assembly(Part):
     """On which branch the loops are closed; not needed where they close in one way only.

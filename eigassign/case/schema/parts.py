@@ -364,7 +364,7 @@ OneOrList: TypeAlias = Annotated[
 NumberOr: TypeAlias = Annotated[  # a number or a word, such as auto
     T | L, Told(lambda value: isinstance(value, str), "a whole number")
 ]
-ValueOr: TypeAlias = Annotated[T | P, Told(lambda value: isinstance(value, Mapping))]
+ValueOr: TypeAlias = Annotated[T | L, Told(lambda value: isinstance(value, Mapping))]
 
 
 def mapping(value: object) -> Mapping[str, object]:
