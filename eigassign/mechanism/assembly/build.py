@@ -95,7 +95,12 @@ def build_pencil(
     if g is not None:
         known = parameters.with_passive(motion.passive)
         scene = Loaded(case, known, motion, by_name(motion, links), nodes, bent)
-        add_weight(weight, scene, g, lambda: _in_few_elements(scene, parameters))
+
+        def coarse() -> Loaded:
+            few, nodes = local_links(in_few_elements(case), parameters, motion)
+            return replace(scene, links=by_name(motion, few), nodes=nodes)
+
+        add_weight(weight, scene, g, coarse)
     add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     K, M = stiffness.finish(nodes.count), mass.finish(nodes.count)
     if g is not None:
@@ -103,12 +108,6 @@ def build_pencil(
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
     return _compile(K, M, K_g, case, parameters, motion, nodes.count)
-
-
-def _in_few_elements(scene: Loaded, parameters: ModelParameters) -> Loaded:
-    """The mechanism in as few elements as may be."""
-    links, nodes = local_links(in_few_elements(scene.case), parameters, scene.motion)
-    return replace(scene, links=by_name(scene.motion, links), nodes=nodes)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -254,14 +253,12 @@ def by_name(motion: Kinematics, links: Sequence[LocalLink]) -> dict[str, LocalLi
 def rigid_links(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> list[LocalLink]:
     """Every link by itself in as few elements as may be: enough for its rigid motions."""
     meshes = _meshes(in_few_elements(case), parameters, motion)
-    return [_unjoined(meshes[p.link], p) for p in motion.placements]
-
-
-def _unjoined(mesh: LinkMesh, placement: Placement) -> LocalLink:
-    """A link's matrices alone, none of its nodes joined to others."""
-    own = np.arange(mesh.n_local)
-    twist = placement.twist[: mesh.rigid[0].matrix.shape[1]]
-    return LocalLink(mesh.stiffness, mesh.mass, mesh.rigid, twist, own, {})
+    found = []
+    for p in motion.placements:  # none of its nodes joined to others
+        mesh = meshes[p.link]
+        twist, own = p.twist[: mesh.rigid[0].matrix.shape[1]], np.arange(mesh.n_local)
+        found.append(LocalLink(mesh.stiffness, mesh.mass, mesh.rigid, twist, own, {}))
+    return found
 
 
 def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> LocalLink:

@@ -79,7 +79,10 @@ def _add_whole(
     if link.twist.shape[1]:
         T = [[(n_u + k, rate) for k, rate in enumerate(row)] for row in link.twist.tolist()]
         for coefficient, momentum in numbers.momenta:
-            _add_mixed(target, coefficient, momentum, link, T)  # Qᵀ a N T and its transpose
+            for column, row in zip(momentum.T, T, strict=True):  # Qᵀ a N T and its transpose
+                target.add_coupling(coefficient, column, link.own, row)
+                for s, c_s in link.carried.items():
+                    target.add_product(coefficient * float(column[s]), c_s, row)
         target.add_corner(n_u, multiply(link.twist.T, multiply(numbers.inertia, link.twist)))
 
 
@@ -152,16 +155,6 @@ def _add_elastic(target: AffineEntries, a: Term, a_s: Floats, link: LocalLink) -
         target.add_square(a.coefficient * float(a_row[s]), c_s)
         for t, c_t, _ in rows[n + 1 :]:
             target.add_product(a.coefficient * float(a_row[t]), c_s, c_t)
-
-
-def _add_mixed(
-    M: AffineEntries, coefficient: Scalar, g: Floats, link: LocalLink, T: Sequence[Row]
-) -> None:
-    """Qᵀ g T and its transpose, g (n_local, n_twist)."""
-    for g_column, row in zip(g.T, T, strict=True):
-        M.add_coupling(coefficient, g_column, link.own, row)
-        for s, c_s in link.carried.items():
-            M.add_product(coefficient * float(g_column[s]), c_s, row)
 
 
 # --- B of a single link as numbers

@@ -148,7 +148,7 @@ class _Symbols(NamedTuple):
 
 
 def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: LinkFrames) -> _Symbols:
-    mesh = mesh if mesh.reduction is None else mesh.reduction.mesh
+    mesh = mesh.whole
     strands = tuple(mesh.strands) or _spokes(placement.link, mesh, poses)
     arrays = [
         placement.world_rotation,

@@ -107,7 +107,11 @@ class NodeMotions:
             X = carried(placement.rotation, placement.lever)
             return self.joined(placement.edge, X, placement.freedoms)
         if "@origin" in mesh.nodes:
-            return self._on_rigid(node, placement.edge.follower, mesh)
+            # another point of the same body: v + ω × (X − X_root)
+            here = np.zeros(3, dtype=object) if node[1] == "@origin" else mesh.positions[node[1]]
+            root = placement.edge.follower
+            lever = here - mesh.positions[root[1]]
+            return apply(carried(np.eye(3).astype(object), lever), self.rows(root))
         slots = mesh.nodes[node[1]]
         own = self.own[node[0]]
         return [{int(own[s]): 1.0} if s >= 0 else {} for s in slots]
@@ -125,13 +129,6 @@ class NodeMotions:
         """The motion that a loop's joint demands of its follower node."""
         loop = next(one for one in self.motion.loops if one.edge == edge)
         return self.joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
-
-    def _on_rigid(self, node: NodeName, root: NodeName, mesh: LinkMesh) -> MotionRows:
-        """Another point of the same rigid body: v + ω × (X − X_root)."""
-        here = np.zeros(3, dtype=object) if node[1] == "@origin" else mesh.positions[node[1]]
-        lever = here - mesh.positions[root[1]]
-        eye = np.eye(3).astype(object)
-        return apply(carried(eye, lever), self.rows(root))
 
 
 def combined(row: MotionRow, other: MotionRow, factor: Scalar) -> MotionRow:
@@ -318,8 +315,13 @@ class SpringEnds:
         if node == GROUND:
             return [{} for _ in range(6)]
         placement = self.motion.placement(node[0])
-        rigid = shifted(placement.twist, self._local(node))
-        rows = [dict(row) for row in self.elastic(node)]
-        for a, k in zip(*np.nonzero(present(rigid)), strict=True):
-            rows[a][self.first + int(k)] = rigid[a, k]
+        rows = whole_rows(self.elastic(node), placement.twist, self._local(node), self.first)
         return apply(carried(placement.world_rotation.T, np.zeros(3, dtype=object)), rows)
+
+
+def whole_rows(elastic: MotionRows, twist: Objects, place: Objects, first: int) -> MotionRows:
+    """Rows over [u; q̇] of a node at ``place`` in its link, the q̇ numbered from ``first`` on."""
+    rows, rigid = [dict(row) for row in elastic], shifted(twist, place)
+    for a, k in zip(*np.nonzero(present(rigid)), strict=True):
+        rows[a][first + int(k)] = rigid[a, k]
+    return rows

@@ -125,7 +125,9 @@ def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
     return f"holds {have}, no {words[kind]}: {own}"
 
 
-def guarded(read: Callable[[], T], file: Path, key: str) -> T:
+def guarded(
+    read: Callable[[], T], file: Path, key: str, damaged: str = f"damaged, or no file of {_KNOWN}"
+) -> T:
     """What ``read`` gives; whatever it raises is a MechanismError at ``key`` about the file."""
     try:
         return read()
@@ -139,8 +141,7 @@ def guarded(read: Callable[[], T], file: Path, key: str) -> T:
     except MechanismError:
         raise
     except Exception:  # parsers of others raise anything, and quote the file
-        message = f"cannot read {file.name}: it is damaged, or no file of {_KNOWN}"
-        raise MechanismError(key, message) from None
+        raise MechanismError(key, f"cannot read {file.name}: it is {damaged}") from None
 
 
 def _real(matrix: Any) -> sparse.csr_array:

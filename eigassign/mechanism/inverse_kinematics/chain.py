@@ -382,7 +382,7 @@ class TipTables:
         return TipChain(
             evaluate=partial(self.evaluate, y=y),
             joints=tuple(c.joint for c in self.case.coordinates.values()),
-            relative_map=(self.motion.relative, self.motion.offset),
+            relative_map=self.motion.coordinates[:2],
             kinds=_kinds(self.case, self.motion.tree),
             turned_by=self.turns,
             assembly=self._assembly(y) if self.motion.passive else None,
@@ -426,7 +426,7 @@ class TipTables:
 
     def evaluate(self, z: Floats, y: Floats, by_design: bool = False) -> TipEvaluation:
         """The tip at states z (n, n_z) and design y, with derivatives ``by_design`` behind q."""
-        to_z, n_q, n = self.parameters.to_z, len(self.motion.offset), len(z)
+        to_z, n_q, n = self.parameters.to_z, len(self.motion.coordinates.offset), len(z)
         columns = [*range(n_q), *(range(n_q + len(self.loads), len(to_z)) if by_design else ())]
         moves = block_diag(to_z[:, columns], np.eye(z.shape[1] - n_q))
         variables = np.hstack([self._variables(z, y), np.repeat(moves, n, axis=1)])
@@ -443,7 +443,7 @@ class TipTables:
 
     def _variables(self, z: Floats, y: Floats) -> Floats:
         """The joint coordinates, loads, y and p as rows."""
-        q, p = np.split(z, [len(self.motion.offset)], axis=1)
+        q, p = np.split(z, [len(self.motion.coordinates.offset)], axis=1)
         given = np.broadcast_to(np.append(self.loads, y), (len(z), len(self.loads) + len(y)))
         return np.concatenate([self.parameters.z(np.hstack([q, given])), p.T])
 

@@ -270,7 +270,9 @@ def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Co
         seen = ik.evaluate(u)
         motion = reduced(seen, ik.n_q)
         error = ik.error(seen, target) - motion.drift
-        settled = _settled(ik, error, motion, tolerance)
+        distance, turn = ik.misses(error)
+        off = np.maximum(distance / ik.lever, turn)
+        settled = np.maximum(off, np.abs(motion.closing).max(axis=1, initial=0.0)) <= tolerance
         if settled.all():
             break
         step = change(motion, error[:, :, None])[:, :, 0]
@@ -280,15 +282,6 @@ def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Co
             break
         u = u + np.clip(step, -1.0, 1.0)
     return Corrected(u, seen, motion, settled)
-
-
-def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -> Bools:
-    """True where distance, turn and loops are each within the tolerance."""
-    distance, turn = ik.misses(error)
-    open_by = np.abs(motion.closing).max(axis=1, initial=0.0)
-    return np.asarray(
-        (distance <= tolerance * ik.lever) & (turn <= tolerance) & (open_by <= tolerance)
-    )
 
 
 def change(motion: Reduced, tasks: Floats) -> Floats:

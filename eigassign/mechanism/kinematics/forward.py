@@ -139,22 +139,13 @@ class Kinematics:
         """Indices of the coordinates that are not locked: the q̇ of eq. (1)."""
         return self.coordinates.columns
 
-    @property
-    def relative(self) -> Floats:
-        """A of s = A q + b."""
-        return self.coordinates.relative
-
-    @property
-    def offset(self) -> Floats:
-        """b of s = A q + b."""
-        return self.coordinates.offset
-
     def placement(self, link: str) -> Placement:
         """The placement of one link."""
-        return self._by_link[link]
+        return self.by_link[link]
 
     @cached_property
-    def _by_link(self) -> dict[str, Placement]:
+    def by_link(self) -> dict[str, Placement]:
+        """The placements by their links."""
         return {p.link: p for p in self.placements}
 
 
@@ -340,9 +331,8 @@ def build_link_frames(
     case: CaseFile, parameters: ModelParameters, motion: Kinematics
 ) -> LinkFrames:
     """The world frames of a case's links."""
-    links = tuple(p.link for p in motion.placements)
-    drawn = tuple(_lines(case, motion, link) for link in links)
-    return LinkFrames(case, parameters, motion, links, drawn)
+    drawn = tuple(_lines(case, motion, link) for link in motion.by_link)
+    return LinkFrames(case, parameters, motion, tuple(motion.by_link), drawn)
 
 
 def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, str], ...]:

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports.entries import LARGEST, UnfitError
+from eigassign.mechanism.imports.parts import guarded
 from eigassign.mechanism.imports.programs import CARD, fields_of
 from eigassign.mechanism.solids.elements import KINDS
 
@@ -82,16 +82,7 @@ def read_mesh(file: Path, key: str) -> SolidMesh:
     The sets are gmsh's physical groups, Abaqus' node sets, element sets and surfaces, Nastran's
     sets, and ``pid N`` of its surface elements of property N.
     """
-    try:
-        return _read(read_bytes(file, MESH))
-    except (UnfitError, UsageError) as error:
-        raise MechanismError(key, f"{file.name} {error}") from error
-    except (OSError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or "too large for this memory"
-        raise MechanismError(key, f"cannot read {file.name}: {reason}") from error
-    except (ValueError, IndexError, KeyError, StopIteration, OverflowError) as error:
-        message = f"cannot read {file.name}: it is damaged, or breaks off"
-        raise MechanismError(key, message) from error
+    return guarded(lambda: _read(read_bytes(file, MESH)), file, key, "damaged, or breaks off")
 
 
 @lru_cache(maxsize=4)  # a case reads its meshes for each model anew

@@ -186,10 +186,6 @@ class Coupling(NamedTuple):
     rigid: bool
 
 
-class UnfitSurfaceError(Exception):
-    """The surface cannot be stood for; begins with a verb."""
-
-
 def centre(mesh: SolidMesh, own: Ints) -> Floats:
     """The centre (3,) of a surface of the nodes ``own``."""
     return _moments(mesh, own)[0] @ mesh.x[own]
@@ -236,17 +232,19 @@ def _shares(x: Floats, count: int, corners: Floats) -> Floats:
     return np.asarray(N.T @ (area[:, :, None] * places))
 
 
-def joined(mesh: SolidMesh, couplings: Mapping[str, Coupling]) -> tuple[sparse.csr_array, Ints]:
+def joined(
+    mesh: SolidMesh, couplings: Mapping[str, Coupling], path: str
+) -> tuple[sparse.csr_array, Ints]:
     """T, u = T [q; u_f], (3 n, 6 n_couplings + n_free), and the dofs u_f of the mesh.
 
-    Raises UnfitSurfaceError (name, why) where the node of this name cannot stand for its surface.
+    Raises MechanismError where a node of the link at ``path`` cannot stand for its surface.
     """
     owner: dict[int, str] = {}
     for name, each in couplings.items():
         for node in each.own.tolist():
             if (other := owner.setdefault(node, name)) != name:
-                raise UnfitSurfaceError(name, f"shares nodes with that of {other!r}")
-    found = [_followers(mesh, name, each) for name, each in couplings.items()]
+                raise _unfit(path, name, f"shares nodes with that of {other!r}")
+    found = [_followers(mesh, path, name, each) for name, each in couplings.items()]
     n, first = 3 * len(mesh.x), 6 * len(found)
     free = np.setdiff1d(np.arange(n), np.concatenate([one.dofs for one in found]))
     place = np.full(n, -1)
@@ -261,6 +259,10 @@ def joined(mesh: SolidMesh, couplings: Mapping[str, Coupling]) -> tuple[sparse.c
     return sparse.csr_array((np.concatenate(values), where), shape=(n, first + len(free))), free
 
 
+def _unfit(path: str, name: str, why: str) -> MechanismError:
+    return MechanismError(f"{path}.nodes.{name}.surface", f"the surface {why}")
+
+
 class _Followers(NamedTuple):
     """Dofs of a surface that are given: u = motion [q; u_others]."""
 
@@ -269,22 +271,18 @@ class _Followers(NamedTuple):
     motion: Floats  # (n_dofs, 6 + n_others)
 
 
-def _followers(mesh: SolidMesh, name: str, each: Coupling) -> _Followers:
+def _followers(mesh: SolidMesh, path: str, name: str, each: Coupling) -> _Followers:
     x, dofs = mesh.x[each.own], (3 * each.own[:, None] + np.arange(3)).ravel()
     w, _, levers, J = moments(mesh, each)
     values = np.linalg.eigvalsh(0.5 * (J + J.T))
     if not values[0] > ON_A_LINE * values[-1]:
-        raise UnfitSurfaceError(
-            name, "has nodes on one line only, about which no turn is defined: name a surface"
-        )
+        why = "has nodes on one line only, about which no turn is defined: name a surface"
+        raise _unfit(path, name, why)
     if each.rigid:
         return _Followers(dofs, dofs[:0], rigid_rows(x - each.place))
     if len(each.own) > MOST_DISTRIBUTING:
-        raise UnfitSurfaceError(
-            name,
-            f"has {len(each.own)} nodes, distributing is for {MOST_DISTRIBUTING} at most: name a "
-            "smaller surface, or write coupling: rigid",
-        )
+        most = f"has {len(each.own)} nodes, distributing is for {MOST_DISTRIBUTING} at most"
+        raise _unfit(path, name, f"{most}: name a smaller surface, or write coupling: rigid")
     mean = np.kron(w, np.eye(3))
     turn = np.linalg.solve(J, np.hstack([crossed(lever) for lever in levers]))
     B = np.vstack([mean - crossed(each.place - w @ x) @ turn, turn])
@@ -421,11 +419,7 @@ def _made(
         name: Coupling(np.frombuffer(own, dtype=np.intp), np.array(place), rigid)
         for name, own, place, rigid in key
     }
-    try:
-        T, free = joined(mesh, given)
-    except UnfitSurfaceError as error:
-        name, why = error.args
-        raise MechanismError(f"{path}.nodes.{name}.surface", f"the surface {why}") from error
+    T, free = joined(mesh, given, path)
     n = T.shape[0]
     K, M = sparse.csr_array((n, n)), sparse.csr_array((n, n))
     for count, rows in mesh.pieces(AT_ONCE // 2000):

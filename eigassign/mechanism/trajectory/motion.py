@@ -99,14 +99,6 @@ class Motion:
         """q (n, n_q) alone."""
         return self.moving(time_s, y).q
 
-    def tip(self, _time_s: Floats) -> Floats | None:
-        """Where the tip is at the initial design, (n, 2 or 3) in m; None without its path."""
-        return None
-
-    def of_design(self, _time_s: Floats) -> OfDesign | None:
-        """How q at times (n,) follows the design; None where it does not."""
-        return None
-
     def joined(self, loads: Floats) -> Motion | TipMotion:
         """With ``loads`` (n_loads,), which neither time nor design change, behind q."""
         c = np.pad(self.curve.coefficients, [(0, 0), (0, 0), (0, len(loads))])

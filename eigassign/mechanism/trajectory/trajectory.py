@@ -87,13 +87,13 @@ class Trajectory(Brief):
     @cached_property
     def tip(self) -> Floats | None:
         """Where the tip is (n, 2 or 3) in m, for every design; None without its path."""
-        tip = self.motion.tip(self.time_s) if self.known else None
-        return None if tip is None else _stacked([tip])
+        path = self.known
+        return _stacked([path.tip(self.time_s)]) if isinstance(path, TipMotion) else None
 
     @cached_property
     def of_design(self) -> OfDesign | None:
         """How q follows the design; None where it does not."""
-        return self.motion.of_design(self.time_s) if self.known else None
+        return self.known.of_design(self.time_s) if isinstance(self.known, TipMotion) else None
 
     def at(self, y: Floats) -> tuple[Floats, Floats]:
         """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; slopes 0 where q is given."""

@@ -112,32 +112,6 @@ def _pins(pencil: Pencil, data: Floats, phi: Floats) -> Ints:
     return np.array(pins, dtype=np.intp)
 
 
-@dataclass(frozen=True, eq=False)
-class _Bordered:
-    """A' factored, W's rows, A'⁻¹ W's rows, and S factored."""
-
-    factor: linalg.SuperLU
-    W: Floats  # (m, n_u)
-    Z: Floats  # (m, n_u)
-    S: tuple[Floats, Ints]
-    n_rigid: int
-    border_scale: float
-    r: int
-
-    def __call__(self, rows: Floats) -> tuple[Floats, Floats]:
-        """x (k, n) and l (k, r) for rows (k, n)."""
-        n_u = self.W.shape[1]
-        v = self.factor.solve(rows[:, :n_u].T).T
-        small = -(v @ self.W.T)
-        small[:, : self.n_rigid] += rows[:, n_u:]
-        s = lapack.dgetrs(*self.S, small.T)[0].T
-        x = np.empty_like(rows)
-        np.subtract(v, s @ self.Z, out=x[:, :n_u])
-        x[:, n_u:] = s[:, : self.n_rigid]
-        l = s[:, self.n_rigid : self.n_rigid + self.r]  # noqa: E741
-        return x, self.border_scale * l
-
-
 def _trial(A: sparse.csc_array, border: Floats, solve: Solve) -> float:
     """Residual of one solve with a right-hand side of no special direction."""
     row = np.random.default_rng(0).standard_normal(border.shape[1]) * np.sqrt(A.diagonal().max())
@@ -149,7 +123,8 @@ def _trial(A: sparse.csc_array, border: Floats, solve: Solve) -> float:
 
 def _solver(
     pencil: Pencil, data: Floats, border: Floats, pins: Ints, factorise: Factorise
-) -> _Bordered:
+) -> Solve:
+    """A' factored by ``factorise``, with W's rows, Z = A'⁻¹ W's rows, and S factored."""
     n_u, n = pencil.n_u, pencil.n_dof
     f, r = n - n_u, len(border)
     A = principal(pencil, data, np.arange(n_u))
@@ -170,7 +145,18 @@ def _solver(
     lu, pivots, info = lapack.dgetrf(D - W @ Z.T)
     if info:
         raise AccuracyError(SINGULAR)
-    return _Bordered(factor, W, Z, (lu, pivots), f, scale, r)
+
+    def solve(rows: Floats) -> tuple[Floats, Floats]:
+        v = factor.solve(rows[:, :n_u].T).T
+        small = -(v @ W.T)
+        small[:, :f] += rows[:, n_u:]
+        s = lapack.dgetrs(lu, pivots, small.T)[0].T
+        x = np.empty_like(rows)
+        np.subtract(v, s @ Z, out=x[:, :n_u])
+        x[:, n_u:] = s[:, :f]
+        return x, scale * s[:, f : f + r]
+
+    return solve
 
 
 def add_product(out: Floats, A: Floats, B: Floats) -> None:

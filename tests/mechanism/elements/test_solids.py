@@ -316,7 +316,7 @@ def test_a_distributing_node_follows_the_mean_of_its_surface(tmp_path: Path, cou
     (tmp_path / "part.msh").write_text(msh(bar((2, 2, 1), count)))
     mesh = read_mesh(tmp_path / "part.msh", "mesh")
     place = np.array([0.45, 0.01, -0.02])
-    T, free = joined(mesh, {"end": Coupling(mesh.sets["tip"], place, False)})
+    T, free = joined(mesh, {"end": Coupling(mesh.sets["tip"], place, False)}, "")
     assert len(free) == T.shape[0] - 6
     rng = np.random.default_rng(5)
     C = rng.standard_normal((3, 3 if count == 4 else 6))

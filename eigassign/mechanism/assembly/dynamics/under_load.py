@@ -474,6 +474,8 @@ def stiffness_under_load(
     stiffness = Entries(stack.masses.shape)
     for name in named:
         add_terms(stiffness, scene.whole(name).stiffness, first[name], first[name])
+    reduced = [(first[name], link.reduction) for name, link in named.items()]
+    inner = [start + one.interior for start, one in reduced if one is not None]
     patterns = pattern(stiffness), pattern(_relative(scene, curved.shape[0]))
     strands = [(name, strand) for name in named for strand in scene.whole(name).strands]
     sheared = [strand.profiles[0][0].shear_z is not None for _, strand in strands]
@@ -486,8 +488,12 @@ def stiffness_under_load(
         stack=stack,
         stiffness=patterns[0],
         springs=patterns[1],
-        inner=_inner(scene, first),
-        slots=_slots(scene, first),
+        inner=np.concatenate([np.zeros(0, dtype=np.intp), *inner]),
+        slots={
+            (name, node): np.where(own >= 0, own + first[name], -1)
+            for name in named
+            for node, own in scene.whole(name).nodes.items()
+        },
         sites=tuple(scene.sites),
         solids=tuple(scene.solids),
         strands=list(zip(elements, sheared, strict=True)),
@@ -516,22 +522,6 @@ def _scalars(
         values = [[[0.0 if v is None else v for v in b] for b in each] for each in strand.profiles]
         yield np.array(strand.lengths, dtype=object)
         yield np.array(values, dtype=object)
-
-
-def _slots(scene: Loaded, first: Mapping[str, int]) -> dict[NodeName, Ints]:
-    """The dofs of all nodes among those of all links."""
-    return {
-        (name, node): np.where(own >= 0, own + first[name], -1)
-        for name in scene.links
-        for node, own in scene.whole(name).nodes.items()
-    }
-
-
-def _inner(scene: Loaded, first: Mapping[str, int]) -> Ints:
-    """The dofs inside reduced links among those of all links."""
-    reduced = [(first[name], link.reduction) for name, link in scene.links.items()]
-    own = [start + reduction.interior for start, reduction in reduced if reduction is not None]
-    return np.concatenate([np.zeros(0, dtype=np.intp), *own])
 
 
 def _relative(scene: Loaded, n_dof: int) -> Entries:

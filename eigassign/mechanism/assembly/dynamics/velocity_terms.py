@@ -143,7 +143,10 @@ def stacked(
     n_local, n_whole = sum(len(link.own) for _, link in links), sum(sizes)
     n_twist = len(kept) * len(links)
     U, N, T = Entries((n_local, n_dof)), Entries((n_local, n_twist)), Entries((n_twist, n_dof))
-    m, rates = Entries((n_whole, n_whole)), Entries((6 * len(links), len(motion.relative)))
+    m, rates = (
+        Entries((n_whole, n_whole)),
+        Entries((6 * len(links), len(motion.coordinates.relative))),
+    )
     local = whole = 0
     riders, meshes, bases = [], [], []
     for k, (name, link) in enumerate(links):

@@ -31,16 +31,16 @@ from eigassign.mechanism.assembly.node_motion import (
     SpringEnds,
     SpringMotion,
     pivots,
+    whole_rows,
 )
 from eigassign.mechanism.elements.links import Entries, LinkMesh, add_bodies, summed
-from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
+from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.joints import (
     DOFS,
     Floats,
     Objects,
     cross,
     multiply,
-    present,
     scaled,
     some,
 )
@@ -58,6 +58,8 @@ from eigassign.mechanism.kinematics.topology import (
     split,
 )
 from eigassign.series.expression import Scalar
+
+ABSENT = np.full(6, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,16 +99,12 @@ class Loaded:
             if self.is_rigid(name):
                 J[np.ix_(kept, kept)] = inertia(link)
                 found[name, "@origin"] = J
-        for at in (split(body.at) for body in self.case.mechanism.bodies.values()):
-            if not self.is_rigid(at[0]) and at not in found:
-                found[at] = self._bodies(at)
+        for owner, node in (split(body.at) for body in self.case.mechanism.bodies.values()):
+            if not self.is_rigid(owner) and (owner, node) not in found:
+                own, others = Entries((6, 6)), dict.fromkeys(self.nodes.meshes[owner].nodes, ABSENT)
+                add_bodies(self.case, self.known, owner, own, others | {node: np.arange(6)})
+                found[owner, node] = summed(own.terms(), 6)
         return found
-
-    def _bodies(self, at: NodeName) -> Objects:
-        own, elsewhere = Entries((6, 6)), np.full(6, -1)
-        slots = dict.fromkeys(self.nodes.meshes[at[0]].nodes, elsewhere) | {at[1]: np.arange(6)}
-        add_bodies(self.case, self.known, at[0], own, slots)
-        return summed(own.terms(), 6)
 
     @property
     def solids(self) -> dict[str, Scalar]:
@@ -120,8 +118,7 @@ class Loaded:
 
     def whole(self, name: str) -> LinkMesh:
         """The mesh of a link before it was reduced."""
-        mesh = self.nodes.meshes[name]
-        return mesh if mesh.reduction is None else mesh.reduction.mesh
+        return self.nodes.meshes[name].whole
 
     def is_rigid(self, name: str) -> bool:
         """True of links whose nodes hang rigidly on their origin."""
@@ -137,11 +134,8 @@ class Loaded:
         """The whole motion of a node in its link's axes: elastic rows and columns of N T."""
         if node == GROUND:
             return [{} for _ in range(6)]
-        rigid = shifted(self.motion.placement(node[0]).twist, self.place(node))
-        rows = [dict(row) for row in self.nodes.rows(node)]
-        for a, k in zip(*np.nonzero(present(rigid)), strict=True):
-            rows[a][self.nodes.count + int(k)] = rigid[a, k]
-        return rows
+        twist = self.motion.placement(node[0]).twist
+        return whole_rows(self.nodes.rows(node), twist, self.place(node), self.nodes.count)
 
     def freedom(self, freedom: int) -> MotionRow:
         """The motion of one freedom of a joint, elastic and with the coordinates."""
