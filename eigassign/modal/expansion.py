@@ -118,10 +118,11 @@ class Expansion:
         """
         w, last = self.local(q, y), slice(self.space.degree_starts[self.order], None)
         powers = monomials(self.space, w)[:, last]
-        sizes = [
-            np.repeat(_sizes(c, powers, last)[:, None], len(set(c.modes) & set(self.modes)), axis=1)
-            for c in self.clusters
-        ]
+        sizes = []
+        for c in self.clusters:  # ‖Σ Λ_γ w^γ‖
+            term = np.tensordot(powers, c.coefficients[:, :, last], axes=(1, 2))
+            count = len(set(c.modes) & set(self.modes))
+            sizes.append(np.repeat(np.linalg.norm(term, axis=(1, 2))[:, None], count, axis=1))
         lam = self.eigenvalues(q, y)
         return np.hstack(sizes) / (2.0 * np.abs(1.0 / lam if self.inverted else lam))
 
@@ -287,12 +288,6 @@ def _frozen(a: Floats) -> Floats:
     a = np.ascontiguousarray(a)
     a.setflags(write=False)
     return a
-
-
-def _sizes(cluster: Cluster, powers: Floats, here: slice) -> Floats:
-    """‖Σ Λ_γ w^γ‖ (n,) of some members γ of the set, from their w^γ (n, N)."""
-    term = np.tensordot(powers, cluster.coefficients[:, :, here], axes=(1, 2))
-    return np.asarray(np.linalg.norm(term, axis=(1, 2)))
 
 
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one

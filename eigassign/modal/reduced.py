@@ -90,7 +90,7 @@ class ReducedModel:
         wanted = np.array(self.modes) - 1
         x = samples(q, y, self.n_q, self.n_y)
         parts = [
-            ritz_values(*self._at(theta[:, part])[:2])
+            np.linalg.eigvalsh(_standard(*self._at(theta[:, part])[:2])[0])[:, ::-1]
             for theta in map(self._theta, chunks(x, 1))
             for part in chunks(np.arange(theta.shape[1]), self.mass.place.size)
         ]
@@ -188,11 +188,6 @@ def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
 # --- Ritz values and pairs
 
 
-def ritz_values(K: Floats, M_c: Floats) -> Floats:
-    """μ descending (n, k); of K (n, k, k) only the lower triangle is read."""
-    return np.asarray(np.linalg.eigvalsh(_standard(K, M_c)[0])[:, ::-1])
-
-
 def ritz_pairs(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
     """μ descending (n, k) and z (n, k, k) with zᵀKz = 1."""
     A, inverse = _standard(K, M_c)
@@ -201,7 +196,10 @@ def ritz_pairs(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
 
 
 def _standard(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
-    """L⁻¹ M_c L⁻ᵀ and L⁻¹; MechanismError where K is not positive definite."""
+    """L⁻¹ M_c L⁻ᵀ and L⁻¹ of K (n, k, k), whose lower triangle is read.
+
+    Raises MechanismError where K is not positive definite.
+    """
     inverse = inverse_factor(K)
     return inverse @ M_c @ np.swapaxes(inverse, 1, 2), inverse
 

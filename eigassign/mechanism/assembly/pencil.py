@@ -285,11 +285,6 @@ class Pencil(Brief):
         sizes = sparse.csr_array(spread @ abs(self.mass[on]))
         return sizes if self._stack is None else sizes.toarray()
 
-    @cached_property
-    def local_directions(self) -> tuple[Floats, Floats]:
-        """dz/dw and dw/dx for w the active ones of z."""
-        return np.eye(len(self.shift))[:, self.active], self.to_program[self.active]
-
     def theta(self, x: Floats) -> Floats:
         """θ at samples x (n_samples, n_x): shape (n_theta, n_samples).
 

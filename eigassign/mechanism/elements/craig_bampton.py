@@ -236,16 +236,12 @@ def reduced_where_asked(
 
 
 def interface(case: CaseFile, name: str) -> set[str]:
-    """Nodes of a link that stay: of a beam both ends, of others those that something uses."""
+    """Nodes of a link that stay: of a frame those that something is attached to, or that a static
+    target is about; of others all.
+    """
     mechanism: Any = case.mechanism
     if link_type(case, name) != "frame":
         return {"start", "end", *(getattr(mechanism.links[name], "nodes", None) or ())}
-    return used_nodes(case, name)
-
-
-def used_nodes(case: CaseFile, name: str) -> set[str]:
-    """Nodes of a link that something else is attached to, or that a static target is about."""
-    mechanism: Any = case.mechanism
     used = [f"{name}.start"]  # a tip is followed rigidly
     used += [end for joint in mechanism.joints.values() for end in (joint.base, joint.follower)]
     used += [body.at for body in mechanism.bodies.values()]

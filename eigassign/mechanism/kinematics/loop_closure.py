@@ -24,7 +24,7 @@ from eigassign.mechanism.kinematics.parameters import (
     written_loads,
 )
 from eigassign.mechanism.kinematics.topology import CoordinateMap, Topology
-from eigassign.series.compiler import Program, compile_program
+from eigassign.series.compiler import compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
@@ -93,10 +93,12 @@ def _bind_passive(
     depends = compile_program(recorder, atoms, n_q + n_y + n_p).dependence
     used = [v for v in range(n_q + n_y) if depends[:, v].any()]
     scalars = [*F, *check, *(entry for row in J for entry in row)]
-    program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
+    program = compile_program(recorder, [recorder.atom(s) for s in scalars], n_q + n_y + n_p)
+    order = {v: k for k, v in enumerate([*used, *range(n_q + n_y, n_q + n_y + n_p)])}
+    renamed = np.array([order[int(v)] for v in program.input_variables], dtype=np.intp)
     names = (*_joint_names(case, coords), *parameters.varied)
     function = ImplicitFunction(
-        program,
+        replace(program, input_variables=renamed, n_variables=len(order)),
         n_p,
         len(F),
         len(check),
@@ -178,16 +180,6 @@ def _gap(F: Floats, n: int) -> tuple[float, float]:
 
 def _spelt(gap: tuple[float, float]) -> str:
     return f"{gap[0]:.2g} m and {gap[1]:.2g} rad"
-
-
-def _reordered(
-    recorder: Recorder, scalars: Sequence[Scalar], used: list[int], n: int, n_p: int
-) -> Program:
-    """Compile over (used variables, passive freedoms) numbered from 0."""
-    program = compile_program(recorder, [recorder.atom(s) for s in scalars], n + n_p)
-    order = {v: k for k, v in enumerate([*used, *range(n, n + n_p)])}
-    renamed = np.array([order[int(v)] for v in program.input_variables], dtype=np.intp)
-    return replace(program, input_variables=renamed, n_variables=len(order))
 
 
 def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:

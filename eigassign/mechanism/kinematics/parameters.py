@@ -259,18 +259,14 @@ class Rails:
         if outside.any():
             k = int(np.flatnonzero(outside.any(axis=0))[0])
             rider = int(np.flatnonzero(outside[:, k])[0])
-            raise self._refusal(rider, k, s[rider, k], (low[rider, k], high[rider, k]), x, label)
-
-    def _refusal(
-        self, rider: int, k: int, s: float, allowed: tuple[float, float], x: Floats, label: Label
-    ) -> TravelError:
-        pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, x[k], strict=False))
-        where = f"in the pose {pose}" + (f" ({label(k)})" if len(x) > 1 else "")
-        message = (
-            f"stands at {s:.6g} m of {self.links[rider]!r} {where}: it can travel from "
-            f"{allowed[0]:.4g} m to {allowed[1]:.6g} m. Lengthen the link, or travel less far"
-        )
-        return TravelError(f"mechanism.joints.{self.joints[rider]}", message, k)
+            pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, x[k], strict=False))
+            where = f"in the pose {pose}" + (f" ({label(k)})" if len(x) > 1 else "")
+            message = (
+                f"stands at {s[rider, k]:.6g} m of {self.links[rider]!r} {where}: it can travel "
+                f"from {low[rider, k]:.4g} m to {high[rider, k]:.6g} m. Lengthen the link, or "
+                "travel less far"
+            )
+            raise TravelError(f"mechanism.joints.{self.joints[rider]}", message, k)
 
 
 def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails | None:

@@ -114,10 +114,12 @@ def split(node: str) -> NodeName:
 
 def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
     """The driven freedoms in the order of the coordinates, then the passive ones."""
-    driven = [
-        Freedom(c.joint, component_index(case, c), i)
-        for i, c in enumerate(case.coordinates.values())
-    ]
+    driven = []
+    for i, c in enumerate(case.coordinates.values()):
+        names = FREEDOMS[case.mechanism.joints[c.joint].type]
+        component = getattr(c, "component", None)
+        place = 0 if component is None else names.index(str(component))
+        driven.append(Freedom(c.joint, place, i))
     taken = {(f.joint, f.component) for f in driven}
     passive = [
         Freedom(name, k, None)
@@ -126,13 +128,6 @@ def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
         if (name, k) not in taken
     ]
     return tuple(driven + passive)
-
-
-def component_index(case: CaseFile, coordinate: object) -> int:
-    """Index, from 0, of the freedom of its joint that a coordinate drives."""
-    names = FREEDOMS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
-    component = getattr(coordinate, "component", None)
-    return 0 if component is None else names.index(str(component))
 
 
 # --- the spanning tree
@@ -148,23 +143,18 @@ class _SpanningTree(NamedTuple):
 
 def build_tree(case: CaseFile) -> Topology:
     """From the ground, joints in the order of the file, each from base to follower if possible."""
-    joints = [_edge(case, joint) for joint in case.mechanism.joints]
+    joints = []
+    for name, joint in case.mechanism.joints.items():
+        base = (joint.base, f"@{name}") if joint.type in RIDING else GROUND
+        if base == GROUND and joint.base != "ground":
+            base = split(joint.base)
+        joints.append(JointEdge(name, base, split(joint.follower)))
     rigid = {n for n, link in case.mechanism.links.items() if getattr(link, "type", "") == "rigid"}
     walk = _walk(joints, frozenset(), rigid)
     while better := _better(joints, walk, rigid):
         walk = better
     loops = (*walk.elastic, *walk.rigid)
     return Topology(tuple(walk.edges), loops, len(walk.elastic), freedoms(case))
-
-
-def _edge(case: CaseFile, name: str) -> JointEdge:
-    joint = case.mechanism.joints[name]
-    base = GROUND
-    if joint.type in RIDING:
-        base = (joint.base, f"@{name}")
-    elif joint.base != "ground":
-        base = split(joint.base)
-    return JointEdge(name, base, split(joint.follower))
 
 
 def _walk(joints: Sequence[JointEdge], closing: frozenset[str], rigid: set[str]) -> _SpanningTree:

@@ -429,11 +429,8 @@ def _made(
         heavy = np.asarray(np.kron(mass(x, count), np.eye(3)))
         M = M + assembled(heavy, to, to, (n, n))
     whole = rigid_rows(mesh.x)
-    rigid = np.vstack([*(_at_node(each.place) for each in given.values()), whole[free]])
+    turn = np.hstack([np.zeros((3, 3)), np.eye(3)])
+    of_nodes = (each for c in given.values() for each in (rigid_rows(c.place[None]), turn))
+    rigid = np.vstack([*of_nodes, whole[free]])
     K, M = (sparse.csr_array(T.T @ A @ T) for A in (K, M))
     return SolidPart(mesh, nu, T, 0.5 * (K + K.T), 0.5 * (M + M.T), rigid, tuple(given.values()))
-
-
-def _at_node(place: Floats) -> Floats:
-    """Rigid motion (6, 6) of a node, its turn included."""
-    return np.vstack([rigid_rows(place[None]), np.hstack([np.zeros((3, 3)), np.eye(3)])])

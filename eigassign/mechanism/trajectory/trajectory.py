@@ -434,7 +434,12 @@ class Trajectories(Brief):
     @cached_property
     def finely(self) -> Trajectories:
         """The trajectories, each divided evenly into `FINELY` steps at least."""
-        return self.with_instants([_divided(part.trajectory.time_s) for part in self.parts])
+        between = []
+        for time_s in (part.trajectory.time_s for part in self.parts):
+            pieces = -(-FINELY // max(len(time_s) - 1, 1))
+            shares = np.arange(1, pieces) / pieces
+            between.append((time_s[:-1, None] + np.diff(time_s)[:, None] * shares).ravel())
+        return self.with_instants(between)
 
     def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:
         """Some of the samples only, given by ascending numbers; no part that has none of them."""
@@ -445,12 +450,6 @@ class Trajectories(Brief):
             if len(own):
                 parts.append(part._replace(trajectory=part.trajectory.chosen(own)))
         return Trajectories(tuple(parts), self.whole)
-
-
-def _divided(time_s: Floats) -> Floats:
-    pieces = -(-FINELY // max(len(time_s) - 1, 1))
-    shares = np.arange(1, pieces) / pieces
-    return np.asarray((time_s[:-1, None] + np.diff(time_s)[:, None] * shares).ravel())
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:

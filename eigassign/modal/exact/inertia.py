@@ -181,9 +181,14 @@ def require_standing(
     require_hanging(pencil, theta, x, label)
     for k in range(theta.shape[1]):
         if not _is_definite(pencil, theta[:, k]):
-            raise MechanismError(
-                "mechanism", _buckled(pencil, theta[:, k], _pose(pencil, x, k, label))
-            )
+            share, message = buckling_share(pencil, theta[:, k]), LIMP
+            if share > 1.0:
+                message = (
+                    f"buckles under {1.0 / share:.3g} times its weight "
+                    f"{_pose(pencil, x, k, label)}: make what carries the load stiffer or the load "
+                    "lighter, or write `gravity: none`"
+                )
+            raise MechanismError("mechanism", message)
 
 
 def require_hanging(
@@ -228,17 +233,6 @@ def _is_definite(pencil: Pencil, theta: Floats) -> bool:
         return has_positive_pivots(factorise(principal(pencil, pencil.stiffness @ theta, E)))
     except RuntimeError:  # a pivot is exactly zero
         return False
-
-
-def _buckled(pencil: Pencil, theta: Floats, where: str) -> str:
-    """What a design and pose says whose K is not definite though nothing falls."""
-    share = buckling_share(pencil, theta)
-    if not share > 1.0:
-        return LIMP
-    return (
-        f"buckles under {1.0 / share:.3g} times its weight {where}: make what carries the load "
-        "stiffer or the load lighter, or write `gravity: none`"
-    )
 
 
 def buckling_share(pencil: Pencil, theta: Floats) -> float:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,23 +72,19 @@ def factor_dense(A: Floats, border: Floats) -> Solve:
     return solve
 
 
-def with_partial_pivoting(matrix: sparse.csc_array) -> linalg.SuperLU:
-    """LU factors without any regard to symmetry: more fill-in than `factorise`, and safe."""
-    return lu(matrix, permc_spec="COLAMD")
-
-
 def factor_sparse(
     pencil: Pencil,
     data: Floats,
     border: Floats,
     phi: Floats,
-    factorisations: Sequence[Factorise] = (factorise, with_partial_pivoting),
+    factorisations: Sequence[Factorise] = (factorise, partial(lu, permc_spec="COLAMD")),
 ) -> Solve:
     """Solver for [[A, −Bᵀ], [−B, 0]], A from its non-zeros ``data``, B = ``border`` (r, n).
 
     ``phi`` (r, n) are the modes; the first of ``factorisations`` whose pivots can be trusted is
-    taken. Rows (k, n) → x (k, n), l (k, r). Raises AccuracyError where the system is singular: the
-    border misses a mode with the same λ.
+    taken, the last without regard to symmetry: more fill-in, and safe. Rows (k, n) → x (k, n),
+    l (k, r). Raises AccuracyError where the system is singular: the border misses a mode with the
+    same λ.
     """
     A, pins = pencil.sparse(data), _pins(pencil, data, phi)
     for factorisation in factorisations:

@@ -127,7 +127,8 @@ def local_space(
         kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
         selection, over = np.eye(n_x)[kept], _over(space, kept.tobytes())
         return LocalSpace(over, pencil.to_program[:, kept], selection, 0)
-    to_z, directions = pencil.local_directions
+    # w are the active ones of z
+    to_z, directions = np.eye(len(pencil.shift))[:, pencil.active], pencil.to_program[pencil.active]
     n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))
     n_b = to_z.shape[1] - n_a
     chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
