@@ -276,7 +276,7 @@ def chart(
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import ACCURACY
     from eigassign.output.console import print_tables, print_verdict
-    from eigassign.output.reports import chart as page
+    from eigassign.output.reports.chart import chart_tables
     from eigassign.pipeline import charting
 
     effort, wanted = QUICK if quick else Effort(), accuracy or ACCURACY
@@ -287,17 +287,17 @@ def chart(
         made: Chart | Matrix
         if several:
             folder, made = charting.chart_cases(paths, options, effort, wanted)
-            line, tables = made.headline, page.matrix_tables(made)
+            line = made.headline
         else:
             folder, made = charting.chart(paths[0], options, effort, wanted)
-            line, tables = headline(made), page.chart_tables(made)
+            line = headline(made)
         reporter.warn(made.warnings)
         for note in made.notes:
             reporter.stage(note)
 
     def told() -> None:
         print_verdict(line)
-        print_tables(table for table in tables if table.section != "appendix")
+        print_tables(table for table in chart_tables(made) if table.section != "appendix")
 
     _show(as_json, folder, made, made.seconds, told)
     return 0

@@ -31,11 +31,11 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         f"trajectory_{row.name}.csv" if several else "trajectory.csv": trajectory_csv(results, row)
         for row in results.trajectories
     }
-    files["frequencies.csv"] = _number_text(frequency_columns(results))
+    files["frequencies.csv"] = csv_text(frequency_columns(results))
     if results.drives:
-        files["drives.csv"] = _number_text([*_samples(results), *_both(results.drives)])
+        files["drives.csv"] = csv_text([*_samples(results), *_both(results.drives)])
     if results.statics:
-        files["statics.csv"] = _number_text([*_samples(results), *_both(results.statics)])
+        files["statics.csv"] = csv_text([*_samples(results), *_both(results.statics)])
     return files
 
 
@@ -46,7 +46,7 @@ def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
         names = TIP_COLUMNS[: row.tip.shape[1]]
         places = zip(names, row.tip.T, strict=True)
         columns += [(f"{name} [m]", place.tolist()) for name, place in places]
-    return _number_text(columns)
+    return csv_text(columns)
 
 
 def frequency_columns(results: RunResults) -> list[Column]:
@@ -138,7 +138,8 @@ def _expanded(results: RunResults) -> Iterator[Column]:
                 yield f"mode {study.mode} {kind} [Hz]", hz.tolist()
 
 
-def _number_text(columns: Sequence[Column]) -> bytes:
+def csv_text(columns: Sequence[Column]) -> bytes:
+    """A heading and its numbers in each column; what is not finite is left empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([heading for heading, _ in columns])

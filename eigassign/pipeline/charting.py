@@ -12,7 +12,7 @@ from eigassign.chart.comparison import compare_methods
 from eigassign.chart.question import Effort
 from eigassign.chart.results import ACCURACY, Chart, Matrix, OrderRow
 from eigassign.errors import EigassignError, UsageError
-from eigassign.output.reports.chart import write_chart, write_matrix
+from eigassign.output.reports.chart import write_chart
 from eigassign.output.store.run_folder import run_folder
 from eigassign.pipeline.run import DEFAULT, Options, solve_case
 from eigassign.pipeline.stages import Stages, new_run_folder
@@ -94,5 +94,5 @@ def chart_cases(
         if not charts:
             raise UsageError("none of the cases can be charted: " + next(iter(refused.values())))
         made = build_matrix(charts, refused, accuracy, stages.total_s)
-        write_matrix(made, hidden, options.figures, options.report)
+        write_chart(made, hidden, options.figures, options.report)
     return target, made
