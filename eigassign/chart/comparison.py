@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,6 @@ from eigassign.chart.methods import (
     Method,
     list_meshes,
     list_methods,
-    surrogates,
 )
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
@@ -44,7 +44,7 @@ from eigassign.chart.results import (
     Reach,
     machine,
 )
-from eigassign.errors import EigassignError, LostModeError
+from eigassign.errors import EigassignError
 from eigassign.modal.exact.solver import rounding_error
 from eigassign.modal.exact.tracking import EXTRA, FollowedShape, MoreModesError, follow, places
 from eigassign.study.built_case import BuiltCase
@@ -63,41 +63,50 @@ def compare_methods(
 ) -> Chart:
     """The chart of a case, without advice. Raises what `build_subject` does."""
     subject, unfollowed = build_subject(case)
-    pencil, n_dof = subject.model.pencil, subject.model.n_dof
-    effort, skipped = effort.of_size(n_dof), dict[str, str]()
+    effort, skipped = effort.of_size(subject.model.n_dof), dict[str, str]()
+    floor = rounding_error(subject.model.pencil, subject.x0, max(subject.modes))
     progress("solving the test points exactly")
-    tests = subject.tested(effort)
+    tests, along = subject.tested(effort), subject.along(subject.initial)
     exact, near = subject.exact(tests.x), near_modes(subject, tests)
     shapes = _by_shape(subject, tests) if near else np.full_like(exact, np.nan)
-    floor = rounding_error(pencil, subject.x0, max(subject.modes))
-    made, builds = dict[str, tuple[ChartPoint, Built]](), list[Callable[[], object]]()
-    for method in list_methods(subject, effort):
-        if method.curve not in {row.curve for row, _ in made.values()}:
+    made = dict[str, tuple[ChartPoint, Built, Callable[[], object]]]()
+    for method, where, truth, by_shape in _tasks(subject, effort, tests, exact, shapes):
+        if method.curve not in {row.curve for row, *_ in made.values()}:
             progress(f"charting {method.curve}")
         try:
-            one = _made(subject, method, tests, exact, shapes, floor)
-            if one[0].method not in made:
-                made[one[0].method] = one
-                builds.append(partial(method.build, subject.learnt(method.learns)))
+            learnt = subject.learnt(method.learns)
+            built = method.build(learnt)
+            built.answer(along)  # what cannot be timed is left out
+            hz = asked(built.answer, where, truth)
         except (EigassignError, np.linalg.LinAlgError, MemoryError) as error:
             why = "the memory does not suffice" if isinstance(error, MemoryError) else str(error)
             skipped[f"{method.curve}, {method.size}"] = why
-    progress("charting meshes")
-    made |= {one[0].method: one for one in _meshes(subject, effort, tests, floor)}
+            continue
+        counts = f"{method.learns} points", f"{len(learnt)} points"  # few samples are no more
+        size = built.size or method.size.replace(*counts)
+        worst, rms, failed = errors(hz, truth)
+        shaped = None
+        if np.isfinite(by_shape).all(axis=1).any():
+            shaped = max(errors(hz, by_shape)[0], floor)
+        row = ChartPoint(
+            f"{method.curve}, {size}", method.curve, size, 0.0, 0.0, 0.0, max(worst, floor), rms,
+            shaped, failed, method.use,
+        )  # fmt: skip
+        made.setdefault(row.method, (row, built, partial(method.build, learnt)))
     progress("timing all in turns")
-    along = subject.along(subject.initial)
-    answers = [partial(built.answer, along) for _, built in made.values()]
-    times = _timed([*answers, *builds], effort.repeats)
-    spent = [*times[len(answers) :], *(len(answers) - len(builds)) * [(0.0, 0.0)]]  # of a mesh none
+    answers = [partial(built.answer, along) for _, built, _ in made.values()]
+    times = _timed([*answers, *(build for *_, build in made.values())], effort.repeats)
+    pairs = zip(made.values(), times, times[len(made) :], strict=False)
     points = tuple(
         replace(row, trajectory_s=least, spread_s=median - least, preparation_s=before)
-        for (row, _), (least, median), (before, _) in zip(made.values(), times, spent, strict=False)
+        for (row, *_), (least, median), (before, _) in pairs
     )
     progress("charting boxes")
-    boxes = study_boxes(subject, effort, {name: built for name, (_, built) in made.items()}, floor)
+    ready = {name: built for name, (_, built, _) in made.items()}
+    boxes = tuple(study_boxes(subject, effort, ready, floor))
     found = find_failures(subject, near, exact, points, boxes, skipped, accuracy, unfollowed)
     question = Asked(
-        subject.modes, n_dof, subject.free, len(np.unique(tests.design)), len(tests), len(along),
+        subject.modes, subject.model.n_dof, subject.free, len(np.unique(tests.design)), len(tests), len(along),
         accuracy, floor, time.get_clock_info("process_time").resolution,
     )  # fmt: skip
     constant, file = _constant(exact), case.file
@@ -106,27 +115,22 @@ def compare_methods(
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
         asked=question, points=points, skipped=tuple(skipped.items()),
         fronts=tuple(front(points, n, accuracy, constant) for n in EVALUATIONS),
-        boxes=boxes, reach=reaches(boxes, accuracy), findings=tuple(found),
+        boxes=boxes, reach=tuple(reaches(boxes, accuracy)), findings=tuple(found),
         notes=() if find_spec("sklearn") else (NO_KRIGING,),
         warnings=tuple(map(str, file.warnings)),
     )  # fmt: skip
 
 
-def _made(
-    subject: Subject, method: Method, tests: Points, exact: Floats, shapes: Floats, floor: float
-) -> tuple[ChartPoint, Built]:
-    """A method made, and asked at all test points."""
-    built = method.build(subject.learnt(method.learns))
-    built.answer(subject.along(subject.initial))  # what cannot be timed is left out
-    hz = asked(built.answer, tests, exact)
-    size = built.size or method.size
-    shaped = errors(hz, shapes)[0] if np.isfinite(shapes).all(axis=1).any() else None
-    worst, rms, failed = errors(hz, exact)
-    row = ChartPoint(
-        f"{method.curve}, {size}", method.curve, size, 0.0, 0.0, 0.0, max(worst, floor), rms,
-        None if shaped is None else max(shaped, floor), failed, method.use,
-    )  # fmt: skip
-    return row, built
+def _tasks(
+    subject: Subject, effort: Effort, tests: Points, exact: Floats, shapes: Floats
+) -> Iterator[tuple[Method, Points, Floats, Floats]]:
+    """Each method with its test points, what is exact there, and that of modes of one shape."""
+    for method in list_methods(subject, effort):
+        yield method, tests, exact, shapes
+    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
+    meshes, limit = list_meshes(subject, effort, few)
+    for method in meshes:
+        yield method, few, limit, np.full_like(limit, np.nan)
 
 
 def _by_shape(subject: Subject, tests: Points) -> Floats:
@@ -142,33 +146,13 @@ def _by_shape(subject: Subject, tests: Points) -> Floats:
     apart = np.nan_to_num(np.min(np.diff(lowest, axis=1) / lowest[:, :-1], axis=1), nan=-1.0)
     (start,) = places(pencil, tests.x[[int(apart.argmax())]], highest, EXTRA)
     for k in np.unique(np.linspace(0, len(tests) - 1, SHAPED).astype(int)):
-        with suppress(LostModeError, MoreModesError, EigassignError):
+        with suppress(EigassignError, MoreModesError):
             there = places(pencil, tests.x[k : k + 1], highest, EXTRA)
             for column, mode in enumerate(subject.modes):
                 one = FollowedShape(start, 1.0 * (np.arange(1, len(start.lam) + 1) == mode))
                 found = follow(pencil, one, there)[0]
                 hz[k, column] = np.nan if found.is_shared else np.sqrt(found.lam) / (2.0 * np.pi)
     return hz
-
-
-def _meshes(
-    subject: Subject, effort: Effort, tests: Points, floor: float
-) -> Iterator[tuple[ChartPoint, Built]]:
-    """Meshes against their limit f + (f − f_coarser)/15, for errors fall like h⁴ when halved."""
-    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
-    found = [
-        (str(count), finer, finer.exact(few.x)) for count, finer in list_meshes(subject, effort)
-    ]
-    if len(found) > 1:
-        limit = found[-1][2] + (found[-1][2] - found[-2][2]) / 15.0
-        nowhere = np.full_like(limit, np.nan)
-        for count, finer, _ in (*found, ("as in the case", subject, limit)):
-            built = Built(lambda points, finer=finer: finer.exact(points.x))  # type: ignore[misc]
-            size, use = f"{count} element{'s' * (count != '1')} a link", f"elements: {count}"
-            if finer is subject:
-                size, use = count, ""
-            method = Method(MESH, size, lambda _, built=built: built, use=use)  # type: ignore[misc]
-            yield _made(subject, method, few, limit, nowhere, floor)
 
 
 # --- Error against the size of the box: points drawn towards x0, x0 + h (x − x0)
@@ -180,57 +164,49 @@ FITS = (f"{SURFACE}, degree 2", f"{KRIGING}, 25 points")
 
 def study_boxes(
     subject: Subject, effort: Effort, built: Mapping[str, Built], floor: float
-) -> tuple[BoxRow, ...]:
+) -> Iterator[BoxRow]:
     """The worst error of each method in each box; none where nothing varies."""
     is_q = np.arange(len(subject.x0)) < len(subject.model.q_names)
     varied = {"q": is_q, "y": ~is_q, "q and y": np.ones_like(is_q)}
-    if not (subject.rows and subject.changes):
-        varied = {k: varied[k] for k in ("q",) * bool(subject.rows) + ("y",) * subject.changes}
+    if not (subject.rows and subject.free):
+        varied = {k: varied[k] for k in ("q",) * bool(subject.rows) + ("y",) * bool(subject.free)}
     tests = subject.tested(replace(effort, designs=effort.boxes, instants=effort.boxes))
-    fits = [m for m in surrogates(subject, effort) if f"{m.curve}, {m.size}" in FITS]
+    fits = {f"{m.curve}, {m.size}": m for m in list_methods(subject, effort)}
     ritz = [name for name in built if name.startswith(RITZ) and " at " not in name]
     kept = {name: one for name, one in built.items() if name in (*SERIES, *ritz[-1:])}
-    rows = list[BoxRow]()
-    for name, mask in varied.items():
-        for h in HALF_WIDTHS:
-
-            def drawn(points: Points, h: float = h, mask: NDArray[np.bool_] = mask) -> Points:
-                x = subject.x0 + np.where(mask, h, 0.0) * (points.x - subject.x0)
-                return replace(points, x=x)
-
-            made, points = dict(kept), drawn(tests)
-            for fit in fits:
-                with suppress(EigassignError, np.linalg.LinAlgError):
-                    made[f"{fit.curve}, {fit.size}"] = fit.build(drawn(subject.learnt(fit.learns)))
-            exact = subject.exact(points.x)
-            for method, one in made.items():
-                error = errors(asked(one.answer, points, exact), exact)[0]
-                claimed = None
-                if one.claimed is not None:
-                    claimed = errors(1.0 + asked(one.claimed, points, exact), exact * 0.0 + 1.0)[0]
-                rows.append(BoxRow(method, name, h, max(error, floor), claimed))
-    return tuple(rows)
+    for (name, mask), h in product(varied.items(), HALF_WIDTHS):
+        made, points = dict(kept), _drawn(subject, tests, np.where(mask, h, 0.0))
+        for fit in (fits[name] for name in FITS if name in fits):
+            with suppress(EigassignError, np.linalg.LinAlgError):
+                learnt = _drawn(subject, subject.learnt(fit.learns), np.where(mask, h, 0.0))
+                made[f"{fit.curve}, {fit.size}"] = fit.build(learnt)
+        exact = subject.exact(points.x)
+        for method, one in made.items():
+            error, claimed = errors(asked(one.answer, points, exact), exact)[0], None
+            if one.claimed is not None:
+                claimed = errors(1.0 + asked(one.claimed, points, exact), exact * 0.0 + 1.0)[0]
+            yield BoxRow(method, name, h, max(error, floor), claimed)
 
 
-def reaches(rows: Sequence[BoxRow], accuracy: float) -> tuple[Reach, ...]:
+def _drawn(subject: Subject, points: Points, widths: Floats) -> Points:
+    return replace(points, x=subject.x0 + widths * (points.x - subject.x0))
+
+
+def reaches(rows: Sequence[BoxRow], accuracy: float) -> Iterator[Reach]:
     """Where each method's error passes the accuracy, between boxes by straight lines of logarithms.
 
     0 where it is above in the smallest box already, 1 where it is below in all.
     """
-    found = list[Reach]()
     for method, varied in dict.fromkeys((r.method, r.varied) for r in rows):
         own = [r for r in rows if (r.method, r.varied) == (method, varied)]
-        h, error = (
-            np.array([getattr(r, k) for r in own]) for k in ("half_width", "worst_relative")
-        )
+        h, error = np.array([(r.half_width, r.worst_relative) for r in own]).T
         k = int(np.append(~(error <= accuracy), True).argmax())
         reach = 1.0 if k == len(h) else 0.0
         if 0 < k < len(h):
             low, high, wanted = np.log([error[k - 1], error[k], accuracy])
             share = (wanted - low) / (high - low) if np.isfinite(high) else 0.0
             reach = float(h[k - 1] * (h[k] / h[k - 1]) ** share)
-        found.append(Reach(method, varied, reach, float(error[-1])))
-    return tuple(found)
+        yield Reach(method, varied, reach, float(error[-1]))
 
 
 # --- Times

@@ -62,7 +62,7 @@ def near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
         for k in pairs
         if np.isfinite(gaps[:, k]).any() and np.nanmedian(gaps[:, k]) < MEET
     ]
-    if model.n_dof > SOUGHT_DOF or not (subject.rows or subject.changes):
+    if model.n_dof > SOUGHT_DOF or not (subject.rows or subject.free):
         return tuple(found)
     part = np.searchsorted([own.start for own in subject.rows], tests.place, side="right")
     beside = (np.diff(tests.design) == 0) & (np.diff(part) == 0) & bool(subject.rows)

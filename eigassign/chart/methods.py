@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from math import comb
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, RBFInterpolator
+from scipy.linalg import eigh, lstsq
 
 from eigassign.chart.question import Effort, Points, Subject
 from eigassign.errors import AccuracyError, UsageError
@@ -31,6 +33,8 @@ from eigassign.study.pictures import spread_samples
 
 Floats = NDArray[np.float64]
 Answer = Callable[[Points], Floats]  # Hz (n, n_modes)
+Fits = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats] | None]  # as `Built` has both
+Fit = Callable[[Floats, Floats], Fits]  # of inputs (n, n_u) and Hz (n, n_modes)
 FULL, LINEAR, SEVERAL = "Taylor", "Taylor, linearised in y", "Taylor, several points"
 RITZ, INTERPOLATED = "Ritz model", "interpolation along the path"
 SURFACE, RADIAL, KRIGING = "response surface", "radial basis functions", "Kriging"
@@ -63,64 +67,72 @@ class Method:
 
 
 def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
-    """All methods but meshes, exact solvers first."""
+    """All methods but meshes, exact solvers first; references [11, 12] of fits, [18] of stations.
+
+    Fits are to exact solves at poses and designs spread over the case's ranges.
+    """
     kind = "dense" if subject.model.pencil.is_dense else "sparse"
-    use = "model.frequencies(q, y)"
-    yield Method(EXACT, kind, lambda _: Built(lambda points: subject.exact(points.x)), use=use)
-    yield Method(SCIPY, "one by one", partial(_scipy, subject))
-    if subject.rows or subject.changes:
-        yield from _series(subject, effort)
-        for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
-            use = f"ea.reduce(model, q0, y0, modes={subject.modes}, half_order={half})"
-            if count == 1 or subject.rows:
-                yield Method(RITZ, "", partial(_reduced, subject, count, half), use=use)
-        for count in (5, 9, 17, 33):
-            if count <= max((own.stop - own.start for own in subject.rows), default=0):
-                build = partial(_interpolated, subject, count)
-                yield Method(INTERPOLATED, f"{count} stations", build)
-        yield from surrogates(subject, effort)
-
-
-# --- Exact solves by others
-
-
-def _scipy(subject: Subject, _: Points) -> Built:
-    if subject.model.n_dof > SCIPY_DOF:
-        raise UsageError(f"its dense solver is not tried with {subject.model.n_dof} unknowns")
-    return Built(partial(_by_scipy, subject))
-
-
-def _by_scipy(subject: Subject, points: Points) -> Floats:
-    """Frequencies (n, n_modes) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
-    from scipy.linalg import eigh
-
-    pencil, highest = subject.model.pencil, max(subject.modes)
-    elastic, mu = pencil.elastic, np.full((len(points), highest), np.nan)
-    which = [len(elastic) - highest, len(elastic) - 1]
-    for k, x in enumerate(points.x):
-        K, M = pencil.matrices(pencil.theta(x[None]))
-        pair = condense(M, elastic, pencil.rigid)[1][0], K[0][np.ix_(elastic, elastic)]
-        try:
-            mu[k] = eigh(*pair, eigvals_only=True, subset_by_index=which)[::-1]
-        except np.linalg.LinAlgError:  # K is not positive definite
-            continue
-    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(subject.modes) - 1])))
-
-
-# --- Series and Ritz models: eigassign's
-
-
-def _series(subject: Subject, effort: Effort) -> Iterator[Method]:
-    """Full and linearised series of each order, and full ones about several points."""
+    yield Method(EXACT, kind, partial(_solved, subject), use="model.frequencies(q, y)")
+    yield Method(SCIPY, "one by one", partial(_by_scipy, subject))
+    if not (subject.rows or subject.free):
+        return
     n, every = int(subject.model.pencil.active.sum()), (1, 2, 3, 4, 5, 6, 7, 8)
-    several = (1, 2, 4, 6) if subject.rows else ()
+    several, modes = (1, 2, 4, 6) if subject.rows else (), subject.modes
     for curve, orders in ((FULL, every), (LINEAR, every), (SEVERAL, several)):
         for order in (p for p in orders if comb(n + p, p) <= effort.coefficients):
             count, linear = FEW if curve == SEVERAL else 1, curve == LINEAR
             how = ", linear_in_y=True" if linear else ""
-            use = f"ea.expand(model, q0, y0, order={order}, modes={subject.modes}{how})"
+            use = f"ea.expand(model, q0, y0, order={order}, modes={modes}{how})"
             build = partial(_expanded, subject, order, linear, count)
             yield Method(curve, f"order {order}", build, use=use)
+    for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
+        use = f"ea.reduce(model, q0, y0, modes={modes}, half_order={half})"
+        if count == 1 or subject.rows:
+            yield Method(RITZ, "", partial(_reduced, subject, count, half), use=use)
+    for count in (5, 9, 17, 33):
+        if count <= max((own.stop - own.start for own in subject.rows), default=0):
+            yield Method(INTERPOLATED, f"{count} stations", partial(_interpolated, subject, count))
+    n = len(subject.free) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
+    for degree in (1, 2, 3, 4):
+        if (terms := comb(n + degree, degree)) <= 2 * max(effort.learnt):
+            build = partial(_fitted, subject, partial(_polynomials, degree))
+            yield Method(SURFACE, f"degree {degree}", build, max(2 * terms, 12))
+    for curve, fit, counts in (
+        (RADIAL, _radial, effort.learnt),
+        (KRIGING, _kriged, effort.kriged if find_spec("sklearn") else ()),
+    ):
+        for count in counts:
+            yield Method(curve, f"{count} points", partial(_fitted, subject, fit), count)
+
+
+# --- Exact solves
+
+
+def _solved(subject: Subject, _: Points) -> Built:
+    return Built(lambda points: subject.exact(points.x))
+
+
+def _by_scipy(subject: Subject, _: Points) -> Built:
+    """scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ, at one point after the other."""
+    if subject.model.n_dof > SCIPY_DOF:
+        raise UsageError(f"its dense solver is not tried with {subject.model.n_dof} unknowns")
+    pencil, highest = subject.model.pencil, max(subject.modes)
+    elastic, modes = pencil.elastic, np.array(subject.modes) - 1
+    which = [len(elastic) - highest, len(elastic) - 1]
+
+    def answer(points: Points) -> Floats:
+        mu = np.full((len(points), highest), np.nan)
+        for k, x in enumerate(points.x):
+            K, M = pencil.matrices(pencil.theta(x[None]))
+            pair = condense(M, elastic, pencil.rigid)[1][0], K[0][np.ix_(elastic, elastic)]
+            with suppress(np.linalg.LinAlgError):  # K is not positive definite
+                mu[k] = eigh(*pair, eigvals_only=True, subset_by_index=which)[::-1]
+        return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, modes])))
+
+    return Built(answer)
+
+
+# --- Series and Ritz models: eigassign's
 
 
 def _about(subject: Subject, count: int) -> tuple[Floats, Floats]:
@@ -153,7 +165,6 @@ def _reduced(subject: Subject, count: int, half: int, _: Points) -> Built:
 
 def _interpolated(subject: Subject, stations: int, _: Points) -> Built:
     """Cubic splines over exact solves at stations of each design's own path [18]."""
-    from scipy.interpolate import CubicSpline
 
     def answer(points: Points) -> Floats:
         hz = np.empty((len(points), len(subject.modes)))
@@ -170,22 +181,7 @@ def _interpolated(subject: Subject, stations: int, _: Points) -> Built:
     return Built(answer)
 
 
-def surrogates(subject: Subject, effort: Effort) -> Iterator[Method]:
-    """Fits to exact solves at poses and designs spread over the case's ranges [11, 12]."""
-    n = len(subject.free) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
-    for degree in (1, 2, 3, 4):
-        if (terms := comb(n + degree, degree)) <= 2 * max(effort.learnt):
-            build = partial(_surface, subject, degree)
-            yield Method(SURFACE, f"degree {degree}", build, max(2 * terms, 12))
-    for count in effort.learnt:
-        yield Method(RADIAL, f"{count} points", partial(_radial, subject), count)
-    for count in effort.kriged if find_spec("sklearn") else ():
-        yield Method(KRIGING, f"{count} points", partial(_kriged, subject), count)
-
-
-def _fitted(
-    subject: Subject, learnt: Points, fit: Callable[[Floats, Floats], Callable[[Floats], Any]]
-) -> Callable[[Points], Any]:
+def _fitted(subject: Subject, fit: Fit, learnt: Points) -> Built:
     """``fit`` to exact solves over inputs of unit size: directions in which the points differ."""
     hz = subject.exact(learnt.x)
     known = np.isfinite(hz).all(axis=1)
@@ -197,69 +193,75 @@ def _fitted(
     _, s, Vt = np.linalg.svd((x - middle) / width, full_matrices=False)
     kept = s > 1e-6 * s[0]
     turned = Vt[kept].T / s[kept] * np.sqrt(len(x))
-    found = fit((x - middle) / width @ turned, hz[known])
-    return lambda points: found((points.x - middle) / width @ turned)
+    answer, claimed = fit((x - middle) / width @ turned, hz[known])
+
+    def inputs(points: Points) -> Floats:
+        return np.asarray((points.x - middle) / width @ turned)
+
+    return Built(
+        lambda points: answer(inputs(points)),
+        claimed and (lambda points: claimed(inputs(points))),
+    )
 
 
-def _surface(subject: Subject, degree: int, learnt: Points) -> Built:
+def _polynomials(degree: int, u: Floats, hz: Floats) -> Fits:
     """Polynomials of all terms up to a degree, by least squares."""
-    from scipy.linalg import lstsq
+    powers = total_degree(u.shape[1], degree).indices
 
-    def fit(u: Floats, hz: Floats) -> Callable[[Floats], Floats]:
-        powers = total_degree(u.shape[1], degree).indices
+    def terms(at: Floats) -> Floats:
+        return np.asarray(np.prod(at[:, None, :] ** powers, axis=2))
 
-        def terms(at: Floats) -> Floats:
-            return np.asarray(np.prod(at[:, None, :] ** powers, axis=2))
-
-        mean = hz.mean(axis=0)  # which too few points would not give
-        coefficients = lstsq(terms(u), hz - mean)[0]
-        return lambda at: np.asarray(mean + terms(at) @ coefficients)
-
-    return Built(_fitted(subject, learnt, fit))
+    mean = hz.mean(axis=0)  # which too few points would not give
+    coefficients = lstsq(terms(u), hz - mean)[0]
+    return lambda at: np.asarray(mean + terms(at) @ coefficients), None
 
 
-def _radial(subject: Subject, learnt: Points) -> Built:
+def _radial(u: Floats, hz: Floats) -> Fits:
     """scipy.interpolate.RBFInterpolator as it is: thin plate splines."""
-    from scipy.interpolate import RBFInterpolator
-
-    return Built(_fitted(subject, learnt, RBFInterpolator), size=f"{len(learnt)} points")
+    return RBFInterpolator(u, hz), None
 
 
-def _kriged(subject: Subject, learnt: Points) -> Built:
+def _kriged(u: Floats, hz: Floats) -> Fits:
     """scikit-learn's Gaussian process with a length for each input, found by likelihood."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
-    def fit(u: Floats, hz: Floats) -> Any:
-        kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(u.shape[1]), (1e-2, 1e3))
-        process = GaussianProcessRegressor(
-            kernel, alpha=1e-10, normalize_y=True, n_restarts_optimizer=2, random_state=0
-        )
-        return partial(process.fit(u, hz).predict, return_std=True)
+    kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(u.shape[1]), (1e-2, 1e3))
+    process = GaussianProcessRegressor(
+        kernel, alpha=1e-10, normalize_y=True, n_restarts_optimizer=2, random_state=0
+    )
+    with warnings.catch_warnings(action="ignore"):  # of lengths at the ends of their range
+        process.fit(u, hz)
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of lengths at the ends of their range
-        both = _fitted(subject, learnt, fit)
+    def answer(claimed: bool, at: Floats) -> Floats:
+        with warnings.catch_warnings(action="ignore"):  # of variances below 0
+            both = process.predict(at, return_std=True)
+        found, off = (np.reshape(each, (len(at), -1)) for each in both)
+        return np.asarray(off / found if claimed else found)
 
-    def answer(points: Points, claimed: bool) -> Floats:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of variances below 0
-            hz, off = (np.reshape(each, (len(points), -1)) for each in both(points))
-        return np.asarray(off / hz if claimed else hz)
-
-    size = f"{len(learnt)} points"  # of few samples there are no more
-    return Built(partial(answer, claimed=False), partial(answer, claimed=True), size)
+    return partial(answer, False), partial(answer, True)
 
 
 # --- The mesh itself
 
 
-def list_meshes(subject: Subject, effort: Effort) -> Iterator[tuple[int, Subject]]:
-    """The case with 1, 2, 4, … elements in every beam up to the largest mesh, and how many."""
-    coarsest = refined(subject.file, 1e-9)[0]  # a beam keeps one
+def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Method], Floats]:
+    """The case with 1, 2, 4, … elements in every beam, as large as is solved, and as it is.
+
+    And their limit f + (f − f_coarser)/15 at ``few`` points, for errors fall like h⁴ when halved.
+    """
+    coarsest, hz = refined(subject.file, 1e-9)[0], list[Floats]()  # a beam keeps one
+    meshes = list[Method]()
     for count in effort.elements:
         file, counts = refined(coarsest, count)
         model = build_model(file) if counts else subject.model
         if not counts or model.n_dof > effort.most_dof:
-            return
-        yield count, replace(subject, file=file, model=model)
+            break
+        finer = replace(subject, file=file, model=model)
+        hz.append(finer.exact(few.x))
+        size, use = f"{count} element{'s' * (count > 1)} a link", f"elements: {count}"
+        meshes.append(Method(MESH, size, partial(_solved, finer), use=use))
+    if len(hz) < 2:
+        return [], np.empty(0)
+    meshes.append(Method(MESH, "as in the case", partial(_solved, subject)))
+    return meshes, hz[-1] + (hz[-1] - hz[-2]) / 15.0

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +80,7 @@ class Subject:
     x0: Floats  # about which series are expanded, (n_x,)
     initial: Floats  # (n_y,)
     bounds: tuple[Floats, Floats]  # of y
+    _followed: dict[bytes, Floats] = field(default_factory=dict)  # q at all samples, by design
 
     @property
     def rows(self) -> tuple[slice, ...]:
@@ -93,11 +93,6 @@ class Subject:
         """The names of the design parameters that have room."""
         room = zip(self.model.y_names, *self.bounds, strict=True)
         return tuple(name for name, low, high in room if high > low)
-
-    @property
-    def changes(self) -> bool:
-        """True where a design parameter has room."""
-        return bool(self.free)
 
     def split(self, x: Floats) -> tuple[Floats, Floats]:
         """q and y of x."""
@@ -116,7 +111,7 @@ class Subject:
     def tested(self, effort: Effort) -> Points:
         """Test points: between the samples, at designs spread over the bounds and at corners."""
         designs, instants = self.initial[None], effort.designs * effort.instants
-        if self.changes:
+        if self.free:
             instants = effort.instants if self.rows else 1
             inside = self._designs(1, effort.designs * effort.instants // instants)
             designs = np.vstack([np.where(corners(len(self.initial)), *self.bounds[::-1]), inside])
@@ -136,12 +131,12 @@ class Subject:
 
     def learnt(self, count: int) -> Points:
         """Points to learn from: samples, at other designs of the same sequence; each once."""
-        y = self._designs(LEARNT, count) if self.changes else np.tile(self.initial, (count, 1))
+        y = self._designs(LEARNT, count) if self.free else np.tile(self.initial, (count, 1))
         q, k = np.tile(self.split(self.x0)[0], (count, 1)), np.zeros(count, dtype=np.intp)
         if self.rows and self.path is not None:
             share = kronecker(LEARNT + count, 1 + y.shape[1])[LEARNT:, 0]
             last = len(self.path.q) - 1  # of samples alone evenly, both ends included
-            k = np.rint(last * (share if self.changes else np.linspace(0, 1, count))).astype(int)
+            k = np.rint(last * (share if self.free else np.linspace(0, 1, count))).astype(int)
             q = self.path.q[k]
             if self.path.follows_design:
                 q = np.array([self._poses_at(y[i])[k[i]] for i in range(count)])
@@ -163,10 +158,6 @@ class Subject:
         if key not in self._followed:
             self._followed[key] = poses_at(self.path, y)
         return self._followed[key]
-
-    @cached_property
-    def _followed(self) -> dict[bytes, Floats]:
-        return {}
 
     def _designs(self, first: int, count: int) -> Floats:
         lower, upper = self.bounds
