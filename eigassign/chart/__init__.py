@@ -2,12 +2,11 @@
 
 Reading order:
 
-    results     what a chart holds, as plain numbers, and words for these
+    results     what a chart holds, as plain numbers, and what it tells; several side by side
     question    points to learn from, and others as a test
     methods     the list of methods
     failures    what makes methods fail, by name
     comparison  every method put the same question, in boxes too; which no other beats
-    advice      what to write for which question; several cases side by side
 """
 
 from eigassign.faces import face
@@ -15,14 +14,13 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "advice": "advised build_matrix headline",
         "comparison": "HALF_WIDTHS compare_methods front reaches study_boxes",
         "failures": "find_failures near_modes",
-        "methods": "CURVES Built Method list_methods",
+        "methods": "Built Method list_methods",
         "question": "QUICK Effort Points Subject build_subject errors",
         "results": (
-            "ACCURACY EVALUATIONS Advice BoxRow Cell Chart ChartPoint Finding Front Matrix "
-            "OrderRow Reach machine"
+            "ACCURACY EVALUATIONS Advice BoxRow Cell Chart ChartPoint Finding Front Kind Matrix "
+            "OrderRow Reach advised build_matrix machine"
         ),
     },
 )

@@ -19,19 +19,7 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.chart.failures import find_failures, near_modes
-from eigassign.chart.methods import (
-    FULL,
-    KRIGING,
-    LINEAR,
-    MESH,
-    NO_KRIGING,
-    RITZ,
-    SURFACE,
-    Built,
-    Method,
-    list_meshes,
-    list_methods,
-)
+from eigassign.chart.methods import NO_KRIGING, Built, Method, list_meshes, list_methods
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
     ACCURACY,
@@ -41,6 +29,7 @@ from eigassign.chart.results import (
     Chart,
     ChartPoint,
     Front,
+    Kind,
     Reach,
     machine,
 )
@@ -106,8 +95,8 @@ def compare_methods(
     boxes = tuple(study_boxes(subject, effort, ready, floor))
     found = find_failures(subject, near, exact, points, boxes, skipped, accuracy, unfollowed)
     question = Asked(
-        subject.modes, subject.model.n_dof, subject.free, len(np.unique(tests.design)), len(tests), len(along),
-        accuracy, floor, time.get_clock_info("process_time").resolution,
+        subject.modes, subject.model.n_dof, subject.free, len(np.unique(tests.design)), len(tests),
+        len(along), accuracy, floor, time.get_clock_info("process_time").resolution,
     )  # fmt: skip
     constant, file = _constant(exact), case.file
     return Chart(
@@ -158,8 +147,8 @@ def _by_shape(subject: Subject, tests: Points) -> Floats:
 # --- Error against the size of the box: points drawn towards x0, x0 + h (x − x0)
 
 HALF_WIDTHS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-SERIES = tuple(f"{curve}, order {p}" for curve in (FULL, LINEAR) for p in (1, 2, 4, 8))
-FITS = (f"{SURFACE}, degree 2", f"{KRIGING}, 25 points")
+SERIES = tuple(f"{curve}, order {p}" for curve in (Kind.FULL, Kind.LINEAR) for p in (1, 2, 4, 8))
+FITS = (f"{Kind.SURFACE}, degree 2", f"{Kind.KRIGING}, 25 points")
 
 
 def study_boxes(
@@ -172,7 +161,7 @@ def study_boxes(
         varied = {k: varied[k] for k in ("q",) * bool(subject.rows) + ("y",) * bool(subject.free)}
     tests = subject.tested(replace(effort, designs=effort.boxes, instants=effort.boxes))
     fits = {f"{m.curve}, {m.size}": m for m in list_methods(subject, effort)}
-    ritz = [name for name in built if name.startswith(RITZ) and " at " not in name]
+    ritz = [name for name in built if name.startswith(Kind.RITZ) and " at " not in name]
     kept = {name: one for name, one in built.items() if name in (*SERIES, *ritz[-1:])}
     for (name, mask), h in product(varied.items(), HALF_WIDTHS):
         made, points = dict(kept), _drawn(subject, tests, np.where(mask, h, 0.0))
@@ -242,7 +231,7 @@ def front(
     One that is hardly better than the best ``constant`` answers is not among them, nor are meshes,
     whose errors are of another kind.
     """
-    rows = [p for p in points if p.curve != MESH]
+    rows = [p for p in points if p.curve != Kind.MESH]
     most = min(accuracy, max(0.5 * constant, min((p.worst_relative for p in rows), default=0.0)))
     able = (p for p in rows if p.worst_relative <= most)
     kept, best = list[str](), np.inf

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.methods import EXACT, FULL, LEARNING, LINEAR, MESH, RITZ, SCIPY
 from eigassign.chart.question import Points, Subject
-from eigassign.chart.results import BoxRow, ChartPoint, Finding
+from eigassign.chart.results import BoxRow, ChartPoint, Finding, Kind
 from eigassign.errors import EigassignError
 from eigassign.facts import percent
 from eigassign.modal.exact.tracking import links
@@ -23,6 +22,7 @@ from eigassign.study.planning import shown_point
 
 Floats = NDArray[np.float64]
 MEET = 1e-7  # relative distance below which modes cross: nearer, shapes cannot be told apart
+LEARNING = (Kind.INTERPOLATED, Kind.SURFACE, Kind.RADIAL, Kind.KRIGING)  # blind between points
 SWAPPED = 0.5  # share of a shape that the other mode has beyond
 FALLS = 1e-2  # of the frequency in the middle: a part that is lower is decoupled
 SOUGHT_DOF = 2000  # up to which modes that meet are sought
@@ -66,10 +66,9 @@ def near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
         return tuple(found)
     part = np.searchsorted([own.start for own in subject.rows], tests.place, side="right")
     beside = (np.diff(tests.design) == 0) & (np.diff(part) == 0) & bool(subject.rows)
-    q0, y = subject.split(subject.x0)[0], subject.split(tests.x)[1]
-    y = y[np.unique(tests.design, return_index=True)[1]]
-    designs = np.hstack([np.tile(q0, (len(y), 1)), y])
-    a = np.vstack([tests.x[:-1][beside], np.tile(designs[:1], (len(y) - 1, 1))])
+    designs, n_q = tests.x[np.unique(tests.design, return_index=True)[1]], len(model.q_names)
+    designs[:, :n_q] = subject.x0[:n_q]
+    a = np.vstack([tests.x[:-1][beside], np.tile(designs[:1], (len(designs) - 1, 1))])
     b = np.vstack([tests.x[1:][beside], designs[1:]])
     try:
         (hz_a, phi_a), (hz_b, phi_b) = (model.modes(*subject.split(x), count) for x in (a, b))
@@ -122,28 +121,29 @@ def find_failures(
     if unfollowed:
         kind, instead = "straight or folded arm", "keep it within reach; here it is charted at rest"
         yield finding(kind, "along the path", ["all"], why=unfollowed, instead=instead)
-    series = [p.method for p in wrong if p.curve in (FULL, LINEAR)]
+    series = [p.method for p in wrong if p.curve in (Kind.FULL, Kind.LINEAR)]
+    kinked = [p.method for p in wrong if p.curve in LEARNING]
     for one in near:
-        modes, kinked = (one.lower, one.lower + 1), [p.method for p in wrong if p.curve in LEARNING]
+        modes = (one.lower, one.lower + 1)
         if one.kind == "repeated modes":
             yield finding(one.kind, "everywhere", [], modes=modes, gap=one.gap)
             continue
-        where = _at(subject, one.x)
+        file, model = subject.file, subject.model
+        labels, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
+        where = shown_point(labels, one.x, units, file.in_degrees)
         yield finding(one.kind, where, series, modes=modes, gap=one.gap)
         if kinked:
             yield finding("too few samples to see a kink", where, kinked, modes=modes)
-    lowest = np.nanmin(exact, axis=0, initial=np.inf)
-    for mode, low, middle in zip(
-        subject.modes, lowest, subject.exact(subject.x0[None])[0], strict=True
-    ):
-        if low < FALLS * middle:
-            why = f"mode {mode} falls from {middle:.3g} to {low:.3g} Hz: towards 0 its λ is not "
+    lowest, middle = np.nanmin(exact, axis=0, initial=np.inf), subject.exact(subject.x0[None])[0]
+    for mode, low, usual in zip(subject.modes, lowest, middle, strict=True):
+        if low < FALLS * usual:
+            why = f"mode {mode} falls from {usual:.3g} to {low:.3g} Hz: towards 0 its λ is not "
             why += "smooth on the scale of the bounds"
             failing = [p.method for p in wrong]
             yield finding("a part is decoupled", "at an end of the bounds", failing, why=why)
     yield from (finding("radius of convergence", *each) for each in _diverging(boxes, accuracy))
-    ritz = [p for p in points if p.curve == RITZ and " at " not in p.size][-1:]  # about one point
-    if lost := [p.method for p in ritz if p in wrong]:
+    about_one = [p for p in points if p.curve == Kind.RITZ and " at " not in p.size]
+    if lost := [p.method for p in about_one[-1:] if p in wrong]:
         yield finding("basis without the mode", "all over the ranges", lost)
     if nowhere := int((~np.isfinite(exact).all(axis=1)).sum()):
         where = f"{nowhere} of {len(exact)} test points"
@@ -154,18 +154,10 @@ def find_failures(
         yield finding(kind, "in the preparation", names, why=why)
 
 
-def _at(subject: Subject, x: Floats) -> str:
-    """The values of pose and design that vary, in words."""
-    file, model = subject.file, subject.model
-    return shown_point(
-        (*model.q_names, *model.y_names), x, (*file.q_units, *file.design_units), file.in_degrees
-    )
-
-
 def _serves(points: Sequence[ChartPoint], accuracy: float) -> str:
     """The most accurate method that costs less than exact solves in a hundred trajectories."""
-    exact_s = min(p.cost_s(100) for p in points if p.curve == EXACT)
-    others = (p for p in points if p.curve not in (MESH, EXACT, SCIPY))
+    exact_s = min(p.cost_s(100) for p in points if p.curve == Kind.EXACT)
+    others = (p for p in points if p.curve not in (Kind.MESH, Kind.EXACT, Kind.SCIPY))
     able = [p for p in others if p.worst_relative <= accuracy and p.cost_s(100) < exact_s]
     best = min(able, key=lambda p: p.worst_relative, default=None)
     cheaper = "" if best is None else f", or {best.method}, {percent(best.worst_relative)} off"
@@ -185,7 +177,7 @@ def _some(names: Sequence[str]) -> str:
 def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, list[str]]]:
     """Series of which a higher order is worse than a lower one, and worse than is wanted."""
     errors = {(r.varied, r.half_width, r.method): r.worst_relative for r in boxes}
-    orders = [m for m in dict.fromkeys(r.method for r in boxes) if m.startswith(f"{FULL}, order")]
+    orders = [*dict.fromkeys(r.method for r in boxes if r.method.startswith(f"{Kind.FULL}, order"))]
     for varied, h in dict.fromkeys((r.varied, r.half_width) for r in boxes) if orders[1:] else ():
         lower, higher = (errors[varied, h, method] for method in orders[-2:])
         if higher > accuracy and not higher < lower:

@@ -22,6 +22,7 @@ from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.linalg import eigh, lstsq
 
 from eigassign.chart.question import Effort, Points, Subject
+from eigassign.chart.results import Kind
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.assembly.build import refined
 from eigassign.modal.exact.dense import condense
@@ -35,12 +36,6 @@ Floats = NDArray[np.float64]
 Answer = Callable[[Points], Floats]  # Hz (n, n_modes)
 Fits = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats] | None]  # as `Built` has both
 Fit = Callable[[Floats, Floats], Fits]  # of inputs (n, n_u) and Hz (n, n_modes)
-FULL, LINEAR, SEVERAL = "Taylor", "Taylor, linearised in y", "Taylor, several points"
-RITZ, INTERPOLATED = "Ritz model", "interpolation along the path"
-SURFACE, RADIAL, KRIGING = "response surface", "radial basis functions", "Kriging"
-EXACT, SCIPY, MESH = "exact, eigassign", "exact, SciPy", "mesh"
-LEARNING = (INTERPOLATED, SURFACE, RADIAL, KRIGING)  # they see nothing between what they solve
-CURVES = (FULL, LINEAR, SEVERAL, RITZ, *LEARNING, EXACT, SCIPY, MESH)
 NO_KRIGING = "Kriging needs scikit-learn: pip install 'eigassign[chart]'"
 FEW = 3  # points of series about several
 SCIPY_DOF = 1500  # beyond which its dense solver is not tried
@@ -72,15 +67,15 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
     Fits are to exact solves at poses and designs spread over the case's ranges.
     """
     kind = "dense" if subject.model.pencil.is_dense else "sparse"
-    yield Method(EXACT, kind, partial(_solved, subject), use="model.frequencies(q, y)")
-    yield Method(SCIPY, "one by one", partial(_by_scipy, subject))
+    yield Method(Kind.EXACT, kind, partial(_solved, subject), use="model.frequencies(q, y)")
+    yield Method(Kind.SCIPY, "one by one", partial(_by_scipy, subject))
     if not (subject.rows or subject.free):
         return
     n, every = int(subject.model.pencil.active.sum()), (1, 2, 3, 4, 5, 6, 7, 8)
     several, modes = (1, 2, 4, 6) if subject.rows else (), subject.modes
-    for curve, orders in ((FULL, every), (LINEAR, every), (SEVERAL, several)):
+    for curve, orders in ((Kind.FULL, every), (Kind.LINEAR, every), (Kind.SEVERAL, several)):
         for order in (p for p in orders if comb(n + p, p) <= effort.coefficients):
-            count, linear = FEW if curve == SEVERAL else 1, curve == LINEAR
+            count, linear = FEW if curve == Kind.SEVERAL else 1, curve == Kind.LINEAR
             how = ", linear_in_y=True" if linear else ""
             use = f"ea.expand(model, q0, y0, order={order}, modes={modes}{how})"
             build = partial(_expanded, subject, order, linear, count)
@@ -88,18 +83,20 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
     for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
         use = f"ea.reduce(model, q0, y0, modes={modes}, half_order={half})"
         if count == 1 or subject.rows:
-            yield Method(RITZ, "", partial(_reduced, subject, count, half), use=use)
+            yield Method(Kind.RITZ, "", partial(_reduced, subject, count, half), use=use)
     for count in (5, 9, 17, 33):
         if count <= max((own.stop - own.start for own in subject.rows), default=0):
-            yield Method(INTERPOLATED, f"{count} stations", partial(_interpolated, subject, count))
+            yield Method(
+                Kind.INTERPOLATED, f"{count} stations", partial(_interpolated, subject, count)
+            )
     n = len(subject.free) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
     for degree in (1, 2, 3, 4):
         if (terms := comb(n + degree, degree)) <= 2 * max(effort.learnt):
             build = partial(_fitted, subject, partial(_polynomials, degree))
-            yield Method(SURFACE, f"degree {degree}", build, max(2 * terms, 12))
+            yield Method(Kind.SURFACE, f"degree {degree}", build, max(2 * terms, 12))
     for curve, fit, counts in (
-        (RADIAL, _radial, effort.learnt),
-        (KRIGING, _kriged, effort.kriged if find_spec("sklearn") else ()),
+        (Kind.RADIAL, _radial, effort.learnt),
+        (Kind.KRIGING, _kriged, effort.kriged if find_spec("sklearn") else ()),
     ):
         for count in counts:
             yield Method(curve, f"{count} points", partial(_fitted, subject, fit), count)
@@ -260,8 +257,8 @@ def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Met
         finer = replace(subject, file=file, model=model)
         hz.append(finer.exact(few.x))
         size, use = f"{count} element{'s' * (count > 1)} a link", f"elements: {count}"
-        meshes.append(Method(MESH, size, partial(_solved, finer), use=use))
+        meshes.append(Method(Kind.MESH, size, partial(_solved, finer), use=use))
     if len(hz) < 2:
         return [], np.empty(0)
-    meshes.append(Method(MESH, "as in the case", partial(_solved, subject)))
+    meshes.append(Method(Kind.MESH, "as in the case", partial(_solved, subject)))
     return meshes, hz[-1] + (hz[-1] - hz[-2]) / 15.0

@@ -1,14 +1,16 @@
-"""What a chart holds, as plain numbers and the words for them: seconds, Hz, relative errors.
+"""What a chart holds, as plain numbers, and what it tells in words: what to write, and why.
 
-An error is |f / f_exact − 1| over all charted modes, at test points that no method has seen.
+An error is |f/f_exact − 1| over all charted modes, at test points that no method has seen; times
+are in seconds. Several charts stand side by side in a matrix.
 """
 
 from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,14 +18,33 @@ import numpy as np
 import scipy
 
 from eigassign._version import __version__
-from eigassign.facts import Fact, Seconds, Share, time_in_words
+from eigassign.facts import Fact, Seconds, Share, percent, time_in_words
 from eigassign.study.results import CaseRow
 
 SCHEMA = 8  # of chart.json
 EVALUATIONS = (1, 100, 10_000)  # trajectories over which a preparation is spread
 ACCURACY = 1e-2  # wanted of a frequency, where nothing is said
+ALIKE = 1.25  # times that differ by less are alike: a busy machine's spread
+ALIKE_DESIGNS = 1e-4  # of the bounds: the search ends within 1e-6
+EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
 RelativeError = Annotated[Share, Fact(may_lack=True)]
+
+
+class Kind(StrEnum):
+    """The kinds of methods, each a curve."""
+
+    FULL = "Taylor"
+    LINEAR = "Taylor, linearised in y"
+    SEVERAL = "Taylor, several points"
+    RITZ = "Ritz model"
+    INTERPOLATED = "interpolation along the path"
+    SURFACE = "response surface"
+    RADIAL = "radial basis functions"
+    KRIGING = "Kriging"
+    EXACT = "exact, eigassign"
+    SCIPY = "exact, SciPy"
+    MESH = "mesh"
 
 
 def machine() -> dict[str, Any]:
@@ -176,6 +197,26 @@ class Chart:
         """The case that was charted."""
         return CaseRow(self.case_name, self.title, None, self.reference, self.case_sha256, {})
 
+    @property
+    def headline(self) -> str:
+        """How good the paper's method is here, how far it goes, and what to write, in sentences."""
+        kinds = dict.fromkeys(f.kind for f in self.findings)
+        said = ", ".join(kind for kind in kinds if kind not in ("refused", "out of memory"))
+        lines = [f"Found: {said}."] if said else []
+        paper = {p.size: p.worst_relative for p in self.points if p.curve == Kind.LINEAR}
+        if paper:
+            size = "order 4" if "order 4" in paper else next(reversed(paper))
+            line = f"The paper's method (series linearised in y, {size}) is "
+            line += f"{percent(paper[size])} off at worst"
+            if min(paper.values()) > 0.5 * paper[size] > 0.01 * self.asked.accuracy:
+                line += ", and more orders do not help"
+            reach = [r for r in self.reach if r.method == f"{Kind.LINEAR}, {size}"]
+            far = "; ".join(_far(r, self.asked.varied) for r in reach if r.half_width < 1.0)
+            line += f"; it is within {percent(self.asked.accuracy)} up to {far}" if far else ""
+            lines.append(f"{line}.")
+        lines += [f"{one.words[:1].upper()}{one.words[1:]}." for one in self.advice if one.key]
+        return " ".join(lines)
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -222,3 +263,71 @@ class Matrix:
         fail = sum(1 for found in self.findings.values() if found)
         refused = f"; {len(self.refused)} refused" if self.refused else ""
         return f"{len(self.cases)} cases, methods fail by name in {fail}{refused}"
+
+
+# --- What to write
+
+
+def advised(chart: Chart, orders: Sequence[OrderRow] = ()) -> Chart:
+    """The chart with what to write; ``orders`` is what `optimize` makes of each order."""
+    return replace(chart, orders=tuple(orders), advice=tuple(_advise(chart, orders)))
+
+
+def _far(reach: Reach, names: Sequence[str]) -> str:
+    """``0.87 of the bounds of m1, m2``."""
+    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    of = {"q": "the motion", "y": f"the bounds of {shown}", "q and y": "motion and bounds together"}
+    return f"{reach.half_width:.2g} of {of[reach.varied]}"
+
+
+def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
+    accuracy, n = chart.asked.accuracy, EVALUATIONS[-1]
+    if orders:
+        moved = max((row.moved for row in orders if row.moved is not None), default=0.0)
+        shots = ", ".join(percent(o.one_shot) for o in orders if o.one_shot is not None)
+        names = "orders " + ", ".join(str(row.order) for row in orders)
+        same = f"to {moved:.0e} of the bounds" if moved > 1e-12 else "to the last digit"
+        words = f"nothing: the design is the same {same} for {names}, since the search solves "
+        words += "exactly"
+        if moved > ALIKE_DESIGNS:
+            words = f"the order counts: the design differs by up to {moved:.1g} of the bounds "
+            words += f"among {names}"
+        words += f"; the one shot is off by {shots}" if shots else ""
+        yield Advice("a design (`optimize`)", words)
+    able = [p for p in chart.points if p.worst_relative <= accuracy]
+    if any(p.curve == Kind.FULL for p in chart.points):
+        key, none = None, "solve exactly: no series that was charted is within"
+        words = f"{none} {percent(accuracy)}"
+        for p in [p for p in able if p.curve == Kind.FULL][:1]:
+            key = p.size.replace("order ", "order: ")
+            words = f"write `{key}` under `expansion`: {percent(p.worst_relative)} off at worst"
+        yield Advice("the series (`expand`)", words, key)
+    offered = [p for p in able if p.use and p.curve != Kind.MESH]
+    least = min((p.cost_s(n) for p in offered), default=0.0)
+    for p in [p for p in offered if p.cost_s(n) <= ALIKE * least][:1]:  # the simplest of the cheap
+        words = f"{p.method}, {percent(p.worst_relative)} off, {time_in_words(p.trajectory_s)} a "
+        yield Advice("thousands of evaluations elsewhere", f"{words}trajectory: `{p.use}`")
+    for p in [p for p in able if p.curve == Kind.MESH and p.use][:1]:
+        words = f"write `{p.use}` for every link: {percent(p.worst_relative)} from the finest mesh"
+        yield Advice("the mesh", words, p.use)
+
+
+def build_matrix(
+    charts: Mapping[str, Chart], refused: Mapping[str, str], accuracy: float, seconds: float
+) -> Matrix:
+    """Scenes × methods: errors at equal cost, that of exact solves, and costs at equal accuracy."""
+    cells = [Cell(name, k, *_cell(chart, k)) for name, chart in charts.items() for k in Kind]
+    return Matrix(
+        version=__version__, accuracy=accuracy, evaluations=EQUAL, machine=machine(),
+        cases=tuple(charts), cells=tuple(cells), refused=tuple(refused.items()),
+        findings={name: chart.findings for name, chart in charts.items()}, seconds=seconds,
+        notes=tuple(dict.fromkeys(note for chart in charts.values() for note in chart.notes)),
+    )  # fmt: skip
+
+
+def _cell(chart: Chart, curve: str) -> tuple[float | None, float | None]:
+    exact_s = min(p.cost_s(EQUAL) for p in chart.points if p.curve == Kind.EXACT)
+    own = [(p.cost_s(EQUAL) / exact_s, p.worst_relative) for p in chart.points if p.curve == curve]
+    cheap = [error for cost, error in own if cost <= ALIKE]
+    right = [cost for cost, error in own if error <= chart.asked.accuracy]
+    return min(cheap, default=None), min(right, default=None)

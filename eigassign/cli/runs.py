@@ -272,7 +272,6 @@ def chart(
     or a folder of them, are put side by side.
     """
     from eigassign.batch.plan import cases_in
-    from eigassign.chart.advice import headline
     from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import ACCURACY
     from eigassign.output.console import print_tables, print_verdict
@@ -287,16 +286,14 @@ def chart(
         made: Chart | Matrix
         if several:
             folder, made = charting.chart_cases(paths, options, effort, wanted)
-            line = made.headline
         else:
             folder, made = charting.chart(paths[0], options, effort, wanted)
-            line = headline(made)
         reporter.warn(made.warnings)
         for note in made.notes:
             reporter.stage(note)
 
     def told() -> None:
-        print_verdict(line)
+        print_verdict(made.headline)
         print_tables(table for table in chart_tables(made) if table.section != "appendix")
 
     _show(as_json, folder, made, made.seconds, told)

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from eigassign.chart.advice import advised, build_matrix
 from eigassign.chart.comparison import compare_methods
 from eigassign.chart.question import Effort
-from eigassign.chart.results import ACCURACY, Chart, Matrix, OrderRow
+from eigassign.chart.results import ACCURACY, Chart, Matrix, OrderRow, advised, build_matrix
 from eigassign.errors import EigassignError, UsageError
 from eigassign.output.reports.chart import write_chart
 from eigassign.output.store.run_folder import run_folder

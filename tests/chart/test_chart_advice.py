@@ -15,7 +15,6 @@ from eigassign.chart import (
     advised,
     build_subject,
     errors,
-    headline,
 )
 from eigassign.output import chart_tables, write_chart
 from eigassign.pipeline import Options, Stages, chart_case, prepare
@@ -94,14 +93,14 @@ def test_the_search_ends_at_one_design_with_all_orders_and_the_one_shot_does_not
 
 
 def test_a_reader_sees_how_good_the_papers_method_is_and_how_far_it_goes(arm: Chart) -> None:
-    line = headline(arm)
+    line = arm.headline
     worst = rows_of(arm, "Taylor, linearised in y")["4"].worst_relative
     assert f"linearised in y, order 4) is {100 * worst:.3g}" in line
     assert "more orders do not help" in line
     reach = {r.varied: r.half_width for r in arm.reach if r.method.endswith("in y, order 4")}
     assert f"up to {reach['y']:.2g} of the bounds of m1, m2; {reach['q and y']:.2g} of" in line
     assert "Write `order: 2` under `expansion`" in line
-    assert headline(charted("stress/mode_swaps")).startswith("Found: crossing, too few samples")
+    assert charted("stress/mode_swaps").headline.startswith("Found: crossing, too few samples")
 
 
 def test_a_folder_holds_every_point_and_the_page_begins_with_the_answer(

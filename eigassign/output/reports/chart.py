@@ -15,9 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.chart.advice import headline
-from eigassign.chart.methods import CURVES, LINEAR, MESH
-from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Matrix
+from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Kind, Matrix
 from eigassign.facts import fact, percent
 from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures import graph
@@ -26,7 +24,7 @@ from eigassign.output.reports import page as report
 from eigassign.output.result_files import csv_text
 from eigassign.output.tables import Table, facts_table
 
-COLOURS = dict(zip(CURVES, (
+COLOURS = dict(zip(Kind, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
 LEAST = 1e-10  # %, of claims: what is below is as good as nothing
@@ -61,11 +59,13 @@ def _plane(chart: Chart) -> FigurePlan:
     panels = list[Panel]()
     for one in chart.fronts:
         n, marks = one.evaluations, [_wanted(chart)]
-        for curve in CURVES:
+        for curve in Kind:
             own = [p for p in shown if p.curve == curve]
-            own.sort(key=lambda p: p.worst_relative * (p.curve == MESH))  # one is the case's own
+            own.sort(
+                key=lambda p: p.worst_relative * (p.curve == Kind.MESH)
+            )  # one is the case's own
             best = [p for p in own if p.method in one.methods]
-            full = Look(COLOURS[curve], 0.0, marker="s" if curve == MESH else "o", size=7.0)
+            full = Look(COLOURS[curve], 0.0, marker="s" if curve == Kind.MESH else "o", size=7.0)
             if own:  # the legend shows full colours, in the first panel
                 pale = replace(full, colour=_pale(full.colour), width=1.0, size=5.0)
                 marks += [_curve(own, n, pale), _curve(best, n, full, "" if panels else curve)]
@@ -103,7 +103,9 @@ def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
     for method in dict.fromkeys(row.method for row in rows):
         curve, _, size = method.rpartition(", ")
         dashes = {"order 1": "dotted", "order 2": "dash-dotted", "order 4": "dashed"}
-        width, filled = (7.0, False) if curve == LINEAR else (4.0, True)  # rings of full series
+        width, filled = (
+            (7.0, False) if curve == Kind.LINEAR else (4.0, True)
+        )  # rings of full series
         looks[method] = Look(COLOURS[curve], 1.4, dashes.get(size, "solid"), "o", width, filled)
     return looks
 
@@ -187,17 +189,17 @@ def write_chart(
     Numbers are chart.json, or matrix.json and matrix.csv.
     """
     if isinstance(made, Chart):
-        name, plans, line = "chart", chart_figures(made), headline(made)
+        name, plans = "chart", chart_figures(made)
     else:
-        name, plans, line = "matrix", matrix_figures(made), made.headline
+        name, plans = "matrix", matrix_figures(made)
         names = [each.name for each in fields(Cell)]
         text = csv_text([(each, [getattr(cell, each) for cell in made.cells]) for each in names])
         (folder / "matrix.csv").write_bytes(text)
     data = f"{dumps(results_document(made, may_lack=True))}\n".encode()
     tone = "fair" if made.findings else "good"
     report.write_page(
-        made, chart_tables(made), plans, folder, formats, kind, (f"{name}.json", data), line=line,
-        tone=tone, headings=SECTIONS,
+        made, chart_tables(made), plans, folder, formats, kind, (f"{name}.json", data),
+        line=made.headline, tone=tone, headings=SECTIONS,
     )  # fmt: skip
 
 
@@ -217,13 +219,13 @@ def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
 def _heat(
     matrix: Matrix, name: str, heading: str, levels: Mapping[float, str], fact: str
 ) -> FigurePlan:
-    marks, limits = list[Mark](), list(levels)
+    marks, limits, kinds = list[Mark](), list(levels), tuple(Kind)
     shades: list[list[Cell]] = [[] for _ in (*levels, None)]
     for cell in matrix.cells:
         value = getattr(cell, fact)
         shades[len(levels) if value is None else bisect_left(limits, value)].append(cell)
     for own, label, shade in zip(shades, (*levels.values(), "none is"), SHADES, strict=True):
-        at = np.array([CURVES.index(cell.curve) + 1.0 for cell in own])
+        at = np.array([kinds.index(cell.curve) + 1.0 for cell in own])
         below = np.array([-float(matrix.cases.index(cell.case)) for cell in own])
         names = tuple(f"{c.case}: {c.curve}, {getattr(c, fact)}" for c in own)
         marks.append(Curve(below, Look(shade, 0.0, "solid", "s", 15.0), label, at, names=names))
@@ -236,8 +238,8 @@ def _heat(
     panel = Panel(
         "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
     )
-    ends = (-0.6, len(CURVES) + 0.6)
-    shows = Graph(heading, "", np.zeros(0), (panel,), ends, x_names=CURVES)
+    ends = (-0.6, len(kinds) + 0.6)
+    shows = Graph(heading, "", np.zeros(0), (panel,), ends, x_names=kinds)
     return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
 
 
@@ -253,6 +255,6 @@ def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
     ):
         text = fact(Cell, name).text
         found = {(c.case, c.curve): text(getattr(c, name)) for c in matrix.cells}
-        body = tuple((c, *(found[c, curve] for curve in CURVES)) for c in matrix.cases)
-        yield Table(title, ("case", *CURVES), body)
+        body = tuple((c, *(found[c, curve] for curve in Kind)) for c in matrix.cases)
+        yield Table(title, ("case", *Kind), body)
     yield Table("Refused", ("case", "why"), matrix.refused, section="fails")
