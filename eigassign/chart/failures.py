@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from eigassign.chart.question import Points, Subject
 from eigassign.chart.results import BoxRow, ChartPoint, Finding, Kind
@@ -88,7 +89,6 @@ def near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
 
 def _nearest(subject: Subject, a: Floats, b: Floats, k: int) -> tuple[float, Floats]:
     """The smallest relative distance of modes k + 1 and k + 2 on the line from a to b; where."""
-    from scipy.optimize import minimize_scalar
 
     def gap(s: Floats) -> Floats:
         hz = subject.exact(a + np.reshape(s, (-1, 1)) * (b - a), k + 2)

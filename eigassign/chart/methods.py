@@ -86,9 +86,8 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
             yield Method(Kind.RITZ, "", partial(_reduced, subject, count, half), use=use)
     for count in (5, 9, 17, 33):
         if count <= max((own.stop - own.start for own in subject.rows), default=0):
-            yield Method(
-                Kind.INTERPOLATED, f"{count} stations", partial(_interpolated, subject, count)
-            )
+            build = partial(_interpolated, subject, count)
+            yield Method(Kind.INTERPOLATED, f"{count} stations", build)
     n = len(subject.free) + (min(3, len(subject.model.q_names)) if subject.rows else 0)
     for degree in (1, 2, 3, 4):
         if (terms := comb(n + degree, degree)) <= 2 * max(effort.learnt):

@@ -24,7 +24,7 @@ from eigassign.output.reports import page as report
 from eigassign.output.result_files import csv_text
 from eigassign.output.tables import Table, facts_table
 
-COLOURS = dict(zip(Kind, (
+COLOURS: dict[str, str] = dict(zip(Kind, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
 LEAST = 1e-10  # %, of claims: what is below is as good as nothing
@@ -61,9 +61,8 @@ def _plane(chart: Chart) -> FigurePlan:
         n, marks = one.evaluations, [_wanted(chart)]
         for curve in Kind:
             own = [p for p in shown if p.curve == curve]
-            own.sort(
-                key=lambda p: p.worst_relative * (p.curve == Kind.MESH)
-            )  # one is the case's own
+            if curve == Kind.MESH:  # one is the case's own
+                own.sort(key=lambda p: p.worst_relative)
             best = [p for p in own if p.method in one.methods]
             full = Look(COLOURS[curve], 0.0, marker="s" if curve == Kind.MESH else "o", size=7.0)
             if own:  # the legend shows full colours, in the first panel
@@ -103,9 +102,7 @@ def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
     for method in dict.fromkeys(row.method for row in rows):
         curve, _, size = method.rpartition(", ")
         dashes = {"order 1": "dotted", "order 2": "dash-dotted", "order 4": "dashed"}
-        width, filled = (
-            (7.0, False) if curve == Kind.LINEAR else (4.0, True)
-        )  # rings of full series
+        width, filled = (7.0, False) if curve == Kind.LINEAR else (4.0, True)  # rings of full ones
         looks[method] = Look(COLOURS[curve], 1.4, dashes.get(size, "solid"), "o", width, filled)
     return looks
 
