@@ -21,7 +21,7 @@ from eigassign.mechanism.kinematics.parameters import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.planning import corners, plan_expansion, poses_at
+from eigassign.study.planning import corners, design_bounds, plan_expansion, poses_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -221,7 +221,6 @@ def build_subject(case: BuiltCase) -> tuple[Subject, str]:
     if path is None and file.expansion.q == "auto":
         at_rest = file.expansion.model_copy(update={"q": tuple(resting_pose(file).tolist())})
         file = replace(file, expansion=at_rest)
-    plan, given = plan_expansion(file, model, path, order=1), file.design.parameters.values()
-    bounds = np.array([p.min for p in given]), np.array([p.max for p in given])
+    plan, bounds = plan_expansion(file, model, path, order=1), design_bounds(file)
     x0, initial = np.append(plan.q0, plan.y0), np.clip(case.initial_design, *bounds)
     return Subject(file, model, path, plan.modes, x0, initial, bounds), why

@@ -29,6 +29,8 @@ ALIKE_DESIGNS = 1e-4  # of the bounds: the search ends within 1e-6
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
 RelativeError = Annotated[Share, Fact(may_lack=True)]
+ErrorIfAny = Annotated[RelativeError | None, Fact(absent="")]
+TinyIfAny = Annotated[float | None, Fact(digits=".1e", absent="")]
 
 
 class Kind(StrEnum):
@@ -73,10 +75,7 @@ class ChartPoint:
     spread_s: Annotated[Seconds, Fact("median of the repeats above their least", "spread")]
     worst_relative: Annotated[RelativeError, Fact("at the test points", "worst error")]
     rms_relative: Annotated[RelativeError, Fact(heading="rms error")]
-    worst_by_shape: Annotated[
-        RelativeError | None,
-        Fact("against the mode of the same shape", "worst by shape", absent=""),
-    ]
+    worst_by_shape: Annotated[ErrorIfAny, Fact("against the mode of its shape", "worst by shape")]
     failed: Annotated[int, Fact("test points without a number", digits=lambda n: str(n or ""))]
     use: Annotated[str, Fact("the call or key that asks for it", "how")] = ""
 
@@ -101,9 +100,7 @@ class BoxRow:
     varied: Annotated[str, Fact("q, y, or q and y")]
     half_width: Annotated[float, Fact("of the case's own ranges; 1: all of them", digits="g")]
     worst_relative: Annotated[RelativeError, Fact(heading="worst error")]
-    claimed: Annotated[
-        RelativeError | None, Fact("what the method says of its own error, at worst", absent="")
-    ]
+    claimed: Annotated[ErrorIfAny, Fact("what the method says of its own error, at worst")]
 
 
 @dataclass(frozen=True)
@@ -126,9 +123,7 @@ class Finding:
     why: str
     instead: str
     modes: Annotated[tuple[int, ...], Fact(digits=lambda m: ", ".join(map(str, m)))] = ()
-    gap: Annotated[float | None, Fact("of the frequencies, relative", digits=".1e", absent="")] = (
-        None
-    )
+    gap: Annotated[TinyIfAny, Fact("of the frequencies, relative")] = None
 
 
 @dataclass(frozen=True)
@@ -145,11 +140,8 @@ class OrderRow:
     """`optimize` with an expansion of this order."""
 
     order: int
-    moved: Annotated[
-        float | None,
-        Fact("the design, from that of the highest order, of the bounds", digits=".1e", absent=""),
-    ]
-    one_shot: Annotated[RelativeError | None, Fact("the one shot's worst error", absent="")]
+    moved: Annotated[TinyIfAny, Fact("the design, from the highest order's, of the bounds")]
+    one_shot: Annotated[ErrorIfAny, Fact("the one shot's worst error")]
 
 
 @dataclass(frozen=True)

@@ -315,7 +315,7 @@ def at_corners(
 
     Each at these ``samples`` of the trajectory, or at up to so many.
     """
-    lower, upper = _bounds(file)
+    lower, upper = design_bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
     designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
     rows = np.zeros(1, dtype=np.intp)
@@ -383,7 +383,7 @@ def scattered(
 
     x (count, n_x). SciPy's sequences would do as well, at half a second for their import.
     """
-    lower, upper = _bounds(file)
+    lower, upper = design_bounds(file)
     u = kronecker(first + count, 1 + len(lower))[first:]
     y = lower + u[:, 1:] * (upper - lower)
     if trajectory is None:
@@ -407,7 +407,8 @@ def poses_at(trajectory: Trajectories, y: Floats) -> Floats:
         return trajectory.q
 
 
-def _bounds(file: CaseFile) -> tuple[Floats, Floats]:
+def design_bounds(file: CaseFile) -> tuple[Floats, Floats]:
+    """The least and greatest y, (n_y,) each, in SI units."""
     parameters = file.design.parameters.values()
     return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
