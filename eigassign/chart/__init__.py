@@ -5,8 +5,7 @@ Reading order:
     results     what a chart holds, as plain numbers, and what it tells; several side by side
     question    points to learn from, and others as a test
     methods     the list of methods
-    failures    what makes methods fail, by name
-    comparison  every method put the same question, in boxes too; which no other beats
+    comparison  every method put the same question, in boxes too; what fails, by name
 """
 
 from eigassign.faces import face
@@ -14,8 +13,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "comparison": "HALF_WIDTHS compare_methods front reaches study_boxes",
-        "failures": "find_failures near_modes",
+        "comparison": "HALF_WIDTHS compare_methods find_failures front reaches study_boxes",
         "methods": "Built Method list_methods",
         "question": "QUICK Effort Points Subject build_subject errors",
         "results": (
