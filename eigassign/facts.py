@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from itertools import chain
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -80,7 +81,8 @@ def told(name: str = "", optional: bool = False) -> Callable[[Getter], Getter]:
 def hints(row: Any) -> dict[str, Any]:
     """The types of all fields and properties, with what they are annotated with."""
     found = get_type_hints(row, include_extras=True)
-    for name, own in vars(row).items():
+    own_and_inherited = chain.from_iterable(vars(base).items() for base in reversed(row.__mro__))
+    for name, own in own_and_inherited:
         if isinstance(own, property):
             kind = get_type_hints(own.fget, include_extras=True)["return"]
             found[name] = Annotated[kind, getattr(own.fget, "fact", Fact())]

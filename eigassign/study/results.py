@@ -353,7 +353,7 @@ class TargetStudy(Brief):
     time that it stands for, weighted. ``near`` are the modes about a band; None of other kinds.
     """
 
-    asked: Unwritten[Requirement]
+    asked: Annotated[Requirement, Fact(flat=True)]
     time_s: Unwritten[Floats]
     initial_hz: Unwritten[Floats]
     exact_hz: Unwritten[Floats]
@@ -367,13 +367,6 @@ class TargetStudy(Brief):
     near: Annotated[tuple[ModeRow, ...] | None, Fact("modes about a band", optional=True)] = None
 
     @property
-    @told()
-    def kind(self) -> str:
-        """The key of the case file: frequency, …"""
-        return self.asked.kind
-
-    @property
-    @told()
     def label(self) -> str:
         """What is asked, in words: "mode 2 at least 320 Hz"."""
         return self.asked.label
@@ -383,12 +376,6 @@ class TargetStudy(Brief):
     def mode(self) -> int | None:
         """The lowest of its modes; null of one that is followed by its shape."""
         return None if self.followed else self.asked.mode
-
-    @property
-    @told()
-    def modes(self) -> tuple[int, ...]:
-        """All that it names."""
-        return self.asked.modes
 
     @property
     @told("followed", optional=True)
@@ -401,12 +388,6 @@ class TargetStudy(Brief):
     def worst(self) -> Share:
         """The largest error or violation of the answer."""
         return self.error.exact.max_relative
-
-    @property
-    @told(optional=True)
-    def trajectory(self) -> str | None:
-        """The only one on which it holds, where there are others."""
-        return self.asked.trajectory
 
     @property
     @told()

@@ -27,7 +27,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ from eigassign.case.schema.targets import (
     FollowedMode,
 )
 from eigassign.errors import UsageError
+from eigassign.facts import Fact, Unwritten, told
 
 MEET = 1e-6  # relative distance in Hz below which two modes are at a kink
 TURNED = 0.8  # cosine of twice the angle from where a mode is no longer what it was
@@ -170,19 +171,20 @@ class Requirement(Brief):
     columns: ClassVar[tuple[str, ...]] = ("target", "initial", "one shot", "exact")
     is_aim: ClassVar[bool] = False  # of the objective: always met, and the farther the better
 
-    label: str  # in words: "mode 2 at least 320 Hz"
-    place: str  # key path in the case file
-    terms: Terms
-    rows: slice
-    lower: Floats
-    upper: Floats
-    modes: tuple[int, ...] = ()
-    along: tuple[tuple[str, slice], ...] = ()
-    weight: float = 1.0
-    trajectory: str | None = None  # the only one on which it holds
-    seconds: Floats | None = None  # ω (n,) of the integral over its own part; None: of all samples
-    followed: tuple[FollowedMode, ...] = ()
-    part_of: str = ""  # the label of the whole, where it is a part of a band
+    label: Annotated[str, Fact('what is asked, in words: "mode 2 at least 320 Hz"')]
+    place: Unwritten[str]  # key path in the case file
+    terms: Unwritten[Terms]
+    rows: Unwritten[slice]
+    lower: Unwritten[Floats]
+    upper: Unwritten[Floats]
+    modes: Annotated[tuple[int, ...], Fact("all that it names")] = ()
+    along: Unwritten[tuple[tuple[str, slice], ...]] = ()
+    weight: Unwritten[float] = 1.0
+    trajectory: Annotated[str | None, Fact("the only one on which it holds", optional=True)] = None
+    # ω (n,) of the integral over its own part; None: of all samples
+    seconds: Unwritten[Floats | None] = None
+    followed: Unwritten[tuple[FollowedMode, ...]] = ()
+    part_of: Unwritten[str] = ""  # the label of the whole, where it is a part of a band
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
@@ -191,6 +193,7 @@ class Requirement(Brief):
             raise UsageError(f"target weight: {self.weight} given; must be finite and above 0")
 
     @property
+    @told()
     def kind(self) -> str:
         """The key that only its targets have, such as at_least; ``highest`` of the objective."""
         return self.form.kind
