@@ -1,10 +1,8 @@
 """A validated case with what is built from it: model and trajectories, and what it leaves to auto.
 
-Nothing is chosen here: what a file leaves to ``auto`` is settled one step further, in `built_case`.
-
-Both are measured at poses of the trajectory and corners of the design's box, against finer meshes
-and whole links, to be within their shares of ``expansion.accuracy`` (`planning`). The order and the
-expansion points are settled later, from the model that is built here.
+Elements and reductions are measured at poses of the trajectory and corners of the design's box,
+against finer meshes and whole links, to be within their shares of ``expansion.accuracy``
+(`planning`). Order and expansion points are settled later, from the model that is built here.
 """
 
 from __future__ import annotations
@@ -185,11 +183,6 @@ class Choice(NamedTuple):
     values: Mapping[str, Any]
     error: float
     reasons: tuple[str, ...]
-
-    @property
-    def elements(self) -> Mapping[str, int]:
-        """The values, of a mesh: the elements of each link."""
-        return self.values
 
 
 class SettledModel(NamedTuple):

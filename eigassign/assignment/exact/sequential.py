@@ -314,15 +314,15 @@ def with_end(
 
     Without a problem ends are told apart as they are: no way between them is looked at.
     """
-    if problem is None:
-        return tuple(best_first((*optima, found), worth))
-    width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
-    apart = [float(np.abs((found.y - one.y) / width).max(initial=0.0)) for one in optima]
-    for k in np.argsort(apart, kind="stable"):  # most are the same design as another
-        if apart[k] <= ALIKE or _no_barrier(problem, found, optima[k]):
-            better = best_first((optima[k], found), worth)[0]
-            return tuple(best_first((*optima[:k], better, *optima[k + 1 :]), worth))
-    return tuple(best_first((*optima, found), worth))
+    others = list(optima)
+    if problem is not None:
+        width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
+        apart = [float(np.abs((found.y - one.y) / width).max(initial=0.0)) for one in optima]
+        for k in np.argsort(apart, kind="stable"):  # most are the same design as another
+            if apart[k] <= ALIKE or _no_barrier(problem, found, optima[k]):
+                found = best_first((others.pop(k), found), worth)[0]
+                break
+    return tuple(best_first((*others, found), worth))
 
 
 def _no_barrier(problem: DesignProblem, a: Optimum, b: Optimum) -> bool:

@@ -251,7 +251,8 @@ class _Search:
         every = self.every
         best, *others = self.ranked
         if self.ended is not None:
-            best = best.with_best(best.best._replace(end=self.ended))
+            ended = best.best._replace(end=self.ended)
+            best = replace(best, optima=(ended, *best.optima[1:]))
         solved = [one for level in self.levels for one in level.glances.values()]
         beside = sum(one.exact_solves for one in [*solved, self.models] if one is not None)
         outcomes, scene = [best, *others], self.task.scene

@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, zip_longest
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -288,10 +288,6 @@ class Searched:
     def best(self) -> Optimum:
         """The best design found."""
         return self.optima[0]
-
-    def with_best(self, best: Optimum) -> Self:
-        """The choice with another best design."""
-        return replace(self, optima=(best, *self.optima[1:]))
 
 
 def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
