@@ -379,25 +379,24 @@ class TipTables:
 
     def chain(self, y: Floats) -> TipChain:
         """The chain at design y (n_y,)."""
+        assembly = None
+        if self.motion.passive:  # the branch of the model itself
+            gaps, sines = (2, 1) if self.case.mechanism.space == "planar" else (3, 3)
+            turning = ([False] * gaps + [True] * sines) * len(self.motion.tree.loops)
+            assembly = LoopAssembly(
+                reference_coordinates(self.case),
+                lambda q: self._passive(self._variables(q, y))[0],
+                np.array(turning),
+            )
         return TipChain(
             evaluate=partial(self.evaluate, y=y),
             joints=tuple(c.joint for c in self.case.coordinates.values()),
             relative_map=self.motion.coordinates[:2],
             kinds=_kinds(self.case, self.motion.tree),
             turned_by=self.turns,
-            assembly=self._assembly(y) if self.motion.passive else None,
+            assembly=assembly,
             y=y,
             tables=self,
-        )
-
-    def _assembly(self, y: Floats) -> LoopAssembly:
-        """The branch of the model itself: where it was chosen, and its passive freedoms."""
-        gaps, sines = (2, 1) if self.case.mechanism.space == "planar" else (3, 3)
-        turning = np.array(([False] * gaps + [True] * sines) * len(self.motion.tree.loops))
-        return LoopAssembly(
-            reference_coordinates(self.case),
-            lambda q: self._passive(self._variables(q, y))[0],
-            turning,
         )
 
     @cached_property

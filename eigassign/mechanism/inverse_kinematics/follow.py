@@ -74,18 +74,13 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
             f"misses the point by {distance[0]:.3g} m and the {course.attitude.key} by "
             f"{np.degrees(turn[0]):.3g} deg"
         )
-    return TrajectoryError(key, f"{course.label(k)} {message}{_bound(ik, course)}", k)
-
-
-def _bound(ik: TipProblem, course: Course) -> str:
-    """A word about tips that have fewer freedoms than the path asks for."""
-    wanted = ik.task(course, 0.0).shape[1]
-    if ik.n_q >= wanted:
-        return ""
-    return (
-        f"; the coordinates move {ik.n_q} of the {wanted} components asked for, so the path must "
-        "lie exactly where the tip can go: give points or samples of the coordinates instead"
-    )
+    if ik.n_q < (wanted := ik.task(course, 0.0).shape[1]):
+        message += (
+            f"; the coordinates move {ik.n_q} of the {wanted} components asked for, so the path "
+            "must lie exactly where the tip can go: give points or samples of the coordinates "
+            "instead"
+        )
+    return TrajectoryError(key, f"{course.label(k)} {message}", k)
 
 
 def outside(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
