@@ -50,6 +50,7 @@ from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
+ROUND_OFF = 1e-15  # of strains: what is less is said so
 LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs
 _SPELT = {1.0: "m", 1e-3: "mm", 0.0254: "inches"}
 
@@ -276,7 +277,7 @@ def free_part_lines(
     size = far + gyration
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
-    strain = rigid_strain(K, N)
+    strain = max(rigid_strain(K, N), ROUND_OFF)  # the digits below differ by machine
     lines = [
         f"{title}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m, about it "
         f"{about} kg m2",
