@@ -118,9 +118,19 @@ def compare_methods(
         asked=question, points=points, skipped=tuple(skipped.items()),
         fronts=tuple(front(points, n, accuracy, constant) for n in EVALUATIONS),
         boxes=boxes, reach=tuple(reaches(boxes, accuracy)), findings=tuple(found),
-        notes=() if find_spec("sklearn") else (NO_KRIGING,),
+        notes=tuple(_notes(subject)),
         warnings=tuple(map(str, file.warnings)),
     )  # fmt: skip
+
+
+def _notes(subject: Subject) -> Iterator[str]:
+    """What a reader should know of what is not charted."""
+    if not find_spec("sklearn"):
+        yield NO_KRIGING
+    if subject.model.n_dof > SOUGHT_DOF:
+        yield f"modes that meet are not sought with over {SOUGHT_DOF} degrees of freedom"
+    if subject.file.measurements is not None and subject.path is None:
+        yield "measured poses are not charted, but the pose of expansion or at rest"
 
 
 def _tasks(
@@ -265,6 +275,9 @@ def _constant(exact: Floats) -> float:
 
 MEET = 1e-7  # relative distance below which modes cross: nearer, shapes cannot be told apart
 LEARNING = (Kind.INTERPOLATED, Kind.SURFACE, Kind.RADIAL, Kind.KRIGING)  # blind between points
+NEAR = 0.1  # relative distance up to which modes that change places are told
+COINCIDENT = 1e-6  # relative distance below which shapes are arbitrary
+SOUGHT, STEP = 5, 1.0 / 32.0  # lines on which a pair's nearest place is sought, and its first steps
 SWAPPED = 0.5  # share of a shape that the other mode has beyond
 FALLS = 1e-2  # of the frequency in the middle: a part that is lower is decoupled
 SOUGHT_DOF = 2000  # up to which modes that meet are sought
@@ -276,6 +289,7 @@ WHY = {
     "repeated modes": "their shapes are not unique: they are expanded together",
     "too few samples to see a kink": "they see nothing between the points they learn from",
     "radius of convergence": "a higher order is worse than a lower one: beyond it terms grow",
+    "too wide a range for series": "what is left out of the series counts so far from its point",
     "singular": "the mechanism has no modes there: a dead point, or a part that nothing holds",
     "basis without the mode": "its shape at other poses or designs is not among the vectors, and "
     "no residual shows it",
@@ -294,8 +308,8 @@ class Near:
 
 def _near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
     """The charted modes that cross or veer with a neighbour between test points or designs."""
-    model, highest = subject.model, max(subject.modes)
-    count = min(highest + 1, len(model.pencil.elastic))
+    model, last = subject.model, len(subject.model.pencil.elastic)
+    count = min(max(subject.modes) + 1, last)
     lowest = subject.exact(tests.x, count)
     gaps = np.diff(lowest, axis=1) / lowest[:, :-1]
     pairs = [k for k in range(count - 1) if {k + 1, k + 2}.intersection(subject.modes)]
@@ -312,34 +326,49 @@ def _near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
     designs[:, :n_q] = subject.x0[:n_q]
     a = np.vstack([tests.x[:-1][beside], np.tile(designs[:1], (len(designs) - 1, 1))])
     b = np.vstack([tests.x[1:][beside], designs[1:]])
-    try:
-        (hz_a, phi_a), (hz_b, phi_b) = (model.modes(*subject.split(x), count) for x in (a, b))
-    except EigassignError:  # somewhere there are no modes
-        return tuple(found)
-    across, sizes = links(model.pencil, b, phi_a, phi_b)
-    shares = across**2 / np.einsum("nii->ni", sizes)[:, None, :]
+    numbers = _numbers_at(subject, a, b, min(count + 1, last))
     for k in set(pairs) - {one.lower - 1 for one in found}:
-        swapped = np.minimum(shares[:, k + 1, k], shares[:, k, k + 1]) > SWAPPED
-        nearer = np.minimum(hz_a[:, k + 1] - hz_a[:, k], hz_b[:, k + 1] - hz_b[:, k])
-        some = sorted(np.flatnonzero(swapped), key=lambda i: float(nearer[i]))[:3]
-        if some:
-            gap, x = min((_nearest(subject, a[i], b[i], k) for i in some), key=lambda each: each[0])
-            found.append(Near("crossing" if gap < MEET else "veering", k + 1, x, gap))
-    return tuple(found)
+        crossed = np.flatnonzero(numbers[:, k] > numbers[:, k + 1])
+        for i in crossed[np.unique(np.linspace(0, len(crossed) - 1, SOUGHT).astype(int))]:
+            s, gap = _nearest(subject, a[i], b[i], k)
+            ends = [a[i] + np.clip(s + e, 0.0, 1.0) * (b[i] - a[i]) for e in (-STEP, STEP)]
+            swapped = _numbers_at(subject, ends[0][None], ends[1][None], min(k + 3, last))[0]
+            if gap < NEAR and swapped[k] > swapped[k + 1]:
+                kind = "crossing" if gap < MEET else "veering"
+                found.append(Near(kind, k + 1, a[i] + s * (b[i] - a[i]), gap))
+    nearest = {one.lower: one for one in sorted(found, key=lambda one: -one.gap)}
+    return tuple(nearest[lower] for lower in sorted(nearest))
 
 
-def _nearest(subject: Subject, a: Floats, b: Floats, k: int) -> tuple[float, Floats]:
-    """The smallest relative distance of modes k + 1 and k + 2 on the line from a to b; where."""
+def _numbers_at(subject: Subject, a: Floats, b: Floats, count: int) -> Floats:
+    """What numbers (n, count) the shapes of the lowest modes at a have at b.
+
+    ``count`` where another one has not come; NaN of shapes that are not unique.
+    """
+    try:
+        (hz, before), (_, after) = (subject.model.modes(*subject.split(x), count) for x in (a, b))
+    except EigassignError:  # somewhere there are no modes
+        return np.full((len(a), count), np.nan)
+    across, sizes = links(subject.model.pencil, b, before, after)
+    shares = across**2 / np.einsum("nii->ni", sizes)[:, None, :]
+    numbers = np.where(shares.max(axis=1) > SWAPPED, shares.argmax(axis=1), count).astype(float)
+    same = np.diff(hz, axis=1) < COINCIDENT * hz[:, :-1]
+    numbers[:, :-1][same] = numbers[:, 1:][same] = np.nan
+    return numbers
+
+
+def _nearest(subject: Subject, a: Floats, b: Floats, k: int) -> tuple[float, float]:
+    """Where on the line a + s (b − a) modes k + 1 and k + 2 are nearest: s, relative distance."""
 
     def gap(s: Floats) -> Floats:
         hz = subject.exact(a + np.reshape(s, (-1, 1)) * (b - a), k + 2)
         return np.asarray((hz[:, k + 1] - hz[:, k]) / hz[:, k])
 
-    s = np.linspace(0.0, 1.0, 33)
+    s = np.arange(0.0, 1.0 + STEP / 2.0, STEP)
     at = s[int(np.nanargmin(gap(s)))]
-    ends = max(at - s[1], 0.0), min(at + s[1], 1.0)
+    ends = max(at - STEP, 0.0), min(at + STEP, 1.0)
     found = minimize_scalar(lambda v: float(gap(v)[0]), bounds=ends, options={"xatol": 1e-12})
-    return float(found.fun), a + found.x * (b - a)
+    return float(found.x), float(found.fun)
 
 
 def find_failures(
@@ -360,7 +389,8 @@ def find_failures(
         return Finding(kind, where, _some(failing) or "none by more than is wanted", **given)
 
     if unfollowed:
-        kind, instead = "straight or folded arm", "keep it within reach; here it is charted at rest"
+        kind = "straight or folded arm" if "of reach" in unfollowed else "path not followed"
+        instead = "mend the path; here the case is charted at rest, without motion"
         yield finding(kind, "along the path", ["all"], why=unfollowed, instead=instead)
     series = [p.method for p in wrong if p.curve in (Kind.FULL, Kind.LINEAR)]
     kinked = [p.method for p in wrong if p.curve in LEARNING]
@@ -372,7 +402,8 @@ def find_failures(
         file, model = subject.file, subject.model
         labels, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
         where = shown_point(labels, one.x, units, file.in_degrees)
-        yield finding(one.kind, where, series, modes=modes, gap=one.gap)
+        more = {} if series else {"why": "both are expanded together, right on either side"}
+        yield finding(one.kind, where, series, modes=modes, gap=one.gap, **more)
         if kinked:
             yield finding("too few samples to see a kink", where, kinked, modes=modes)
     lowest, middle = np.nanmin(exact, axis=0, initial=np.inf), subject.exact(subject.x0[None])[0]
@@ -382,7 +413,10 @@ def find_failures(
             why += "smooth on the scale of the bounds"
             failing = [p.method for p in wrong]
             yield finding("a part is decoupled", "at an end of the bounds", failing, why=why)
-    yield from (finding("radius of convergence", *each) for each in _diverging(boxes, accuracy))
+    diverging = list(_diverging(boxes, accuracy))
+    yield from (finding("radius of convergence", *each) for each in diverging)
+    if series and not (near or diverging):
+        yield finding("too wide a range for series", "all over the ranges", series)
     about_one = [p for p in points if p.curve == Kind.RITZ and " at " not in p.size]
     if lost := [p.method for p in about_one[-1:] if p in wrong]:
         yield finding("basis without the mode", "all over the ranges", lost)
@@ -419,9 +453,14 @@ def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, 
     """Series of which a higher order is worse than a lower one, and worse than is wanted."""
     errors = {(r.varied, r.half_width, r.method): r.worst_relative for r in boxes}
     orders = [*dict.fromkeys(r.method for r in boxes if r.method.startswith(f"{Kind.FULL}, order"))]
-    for varied, h in dict.fromkeys((r.varied, r.half_width) for r in boxes) if orders[1:] else ():
-        lower, higher = (errors[varied, h, method] for method in orders[-2:])
-        if higher > accuracy and not higher < lower:
+    for varied, h in dict.fromkeys((r.varied, r.half_width) for r in boxes):
+        own = [errors[varied, h, method] for method in orders]
+        worse = [
+            m
+            for m, lower, e in zip(orders[1:], own, own[1:], strict=False)
+            if e > max(accuracy, 1.1 * lower)
+        ]
+        if worse:
             far = f"from {h:g} of the ranges of {varied} on" if h < 1.0 else f"all over {varied}"
-            yield far, orders[-1:]
+            yield far, worse
             return

@@ -79,9 +79,10 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
             how = ", linear_in_y=True" if linear else ""
             use = f"ea.expand(model, q0, y0, order={order}, modes={modes}{how})"
             build = partial(_expanded, subject, order, linear, count)
-            yield Method(curve, f"order {order}", build, use=use)
+            yield Method(curve, f"order {order}", build, use=use if count == 1 else "")
     for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
-        use = f"ea.reduce(model, q0, y0, modes={modes}, half_order={half})"
+        at = f" with {count} rows of q0, y0" if count > 1 else ""
+        use = f"ea.reduce(model, q0, y0, modes={modes}, half_order={half}){at}"
         if count == 1 or subject.rows:
             yield Method(Kind.RITZ, "", partial(_reduced, subject, count, half), use=use)
     for count in (5, 9, 17, 33):

@@ -26,6 +26,7 @@ from eigassign.study.planning import corners, design_bounds, plan_expansion, pos
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 LEARNT = 1000  # the row of the sequence from which designs are learnt; tests begin with row 1
+LARGE = 1000  # degrees of freedom above which fits learn from few points
 EDGE = 0.05  # of a step between samples: test points keep so far from both
 
 
@@ -48,7 +49,10 @@ class Effort:
         """Fewer points for larger models, so that the work grows slowly."""
         share = min(1.0, 400.0 / n_dof) ** 0.5
         names = ("designs", "instants", "boxes")
-        return replace(self, **{name: max(4, round(share * getattr(self, name))) for name in names})
+        fewer = {name: max(4, round(share * getattr(self, name))) for name in names}
+        sizes = (5, 5) if n_dof <= LARGE else (2, 1)
+        learnt, kriged = self.learnt[: sizes[0]], self.kriged[: sizes[1]]
+        return replace(self, **fewer, learnt=learnt, kriged=kriged)
 
 
 QUICK = Effort(True, 16, 12, 1500, (25, 50, 100), (25, 50), (1, 2, 4, 8), 1500, 8, 5)
@@ -114,7 +118,8 @@ class Subject:
         if self.free:
             instants = effort.instants if self.rows else 1
             inside = self._designs(1, effort.designs * effort.instants // instants)
-            designs = np.vstack([np.where(corners(len(self.initial)), *self.bounds[::-1]), inside])
+            ends = corners(len(self.initial))[: effort.designs]
+            designs = np.vstack([np.where(ends, *self.bounds[::-1]), inside])
         if not self.rows:
             q = np.tile(self.split(self.x0)[0], (len(designs), 1))
             return Points(np.hstack([q, designs]), np.zeros(len(q)), np.arange(len(q)))
@@ -122,11 +127,14 @@ class Subject:
         steps = np.concatenate([np.arange(own.start, own.stop - 1) for own in self.rows])
         step, rest = np.divmod(np.sort(share) * len(steps), 1.0)
         place = steps[step.astype(np.intp)] + EDGE + (1.0 - 2.0 * EDGE) * rest
+        if self.free:  # poses that hold still, at designs that none has seen
+            held = [own.start for own in self.rows if own.stop - own.start == 1]
+            place = np.sort(np.hstack([place, np.tile(held, (len(place), 1))]))
         parts = list[tuple[Floats, Floats, Ints]]()
         for k, y in enumerate(designs):
             with suppress(TrajectoryError):  # a design that cannot follow the path
-                x = np.hstack([self._poses(place[k], y), np.tile(y, (instants, 1))])
-                parts.append((x, place[k], np.full(instants, k)))
+                x = np.hstack([self._poses(place[k], y), np.tile(y, (place.shape[1], 1))])
+                parts.append((x, place[k], np.full(place.shape[1], k)))
         return Points(*map(np.concatenate, zip(*parts, strict=True)))
 
     def learnt(self, count: int) -> Points:
@@ -138,7 +146,7 @@ class Subject:
             last = len(self.path.q) - 1  # of samples alone evenly, both ends included
             k = np.rint(last * (share if self.free else np.linspace(0, 1, count))).astype(int)
             q = self.path.q[k]
-            if self.path.follows_design:
+            if self.path.follows_design and count:
                 q = np.array([self._poses_at(y[i])[k[i]] for i in range(count)])
         x = np.hstack([q, y])
         once = np.sort(np.unique(x, axis=0, return_index=True)[1])
