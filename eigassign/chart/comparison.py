@@ -329,7 +329,7 @@ def _near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
     numbers = _numbers_at(subject, a, b, min(count + 1, last))
     for k in set(pairs) - {one.lower - 1 for one in found}:
         crossed = np.flatnonzero(numbers[:, k] > numbers[:, k + 1])
-        for i in crossed[np.unique(np.linspace(0, len(crossed) - 1, SOUGHT).astype(int))]:
+        for i in crossed[:: max(1, len(crossed) // SOUGHT)]:
             s, gap = _nearest(subject, a[i], b[i], k)
             ends = [a[i] + np.clip(s + e, 0.0, 1.0) * (b[i] - a[i]) for e in (-STEP, STEP)]
             swapped = _numbers_at(subject, ends[0][None], ends[1][None], min(k + 3, last))[0]
@@ -415,7 +415,9 @@ def find_failures(
             yield finding("a part is decoupled", "at an end of the bounds", failing, why=why)
     diverging = list(_diverging(boxes, accuracy))
     yield from (finding("radius of convergence", *each) for each in diverging)
-    if series and not (near or diverging):
+    decoupled = bool((lowest < FALLS * middle).any())
+    able = any(p.curve == Kind.FULL and p not in wrong for p in points)
+    if series and not (able or near or diverging or decoupled):
         yield finding("too wide a range for series", "all over the ranges", series)
     about_one = [p for p in points if p.curve == Kind.RITZ and " at " not in p.size]
     if lost := [p.method for p in about_one[-1:] if p in wrong]:
@@ -460,7 +462,7 @@ def _diverging(boxes: Sequence[BoxRow], accuracy: float) -> Iterator[tuple[str, 
             for m, lower, e in zip(orders[1:], own, own[1:], strict=False)
             if e > max(accuracy, 1.1 * lower)
         ]
-        if worse:
+        if worse and own[-1] > accuracy:
             far = f"from {h:g} of the ranges of {varied} on" if h < 1.0 else f"all over {varied}"
             yield far, worse
             return

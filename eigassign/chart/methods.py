@@ -73,12 +73,13 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
         return
     n, every = int(subject.model.pencil.active.sum()), (1, 2, 3, 4, 5, 6, 7, 8)
     several, modes = (1, 2, 4, 6) if subject.rows else (), subject.modes
-    for curve, orders in ((Kind.FULL, every), (Kind.LINEAR, every), (Kind.SEVERAL, several)):
+    linear = every if subject.free else ()  # without a design both are the same
+    for curve, orders in ((Kind.FULL, every), (Kind.LINEAR, linear), (Kind.SEVERAL, several)):
         for order in (p for p in orders if comb(n + p, p) <= effort.coefficients):
-            count, linear = FEW if curve == Kind.SEVERAL else 1, curve == Kind.LINEAR
-            how = ", linear_in_y=True" if linear else ""
+            count, is_linear = FEW if curve == Kind.SEVERAL else 1, curve == Kind.LINEAR
+            how = ", linear_in_y=True" if is_linear else ""
             use = f"ea.expand(model, q0, y0, order={order}, modes={modes}{how})"
-            build = partial(_expanded, subject, order, linear, count)
+            build = partial(_expanded, subject, order, is_linear, count)
             yield Method(curve, f"order {order}", build, use=use if count == 1 else "")
     for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
         at = f" with {count} rows of q0, y0" if count > 1 else ""

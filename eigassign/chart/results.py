@@ -24,11 +24,21 @@ from eigassign.study.results import CaseRow
 SCHEMA = 8  # of chart.json
 EVALUATIONS = (1, 100, 10_000)  # trajectories over which a preparation is spread
 ACCURACY = 1e-2  # wanted of a frequency, where nothing is said
+UNFOLLOWED = ("straight or folded arm", "path not followed")  # findings, and charts at rest
 ALIKE = 1.25  # times that differ by less are alike: a busy machine's spread
 ALIKE_DESIGNS = 1e-4  # of the bounds: the search ends within 1e-6
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
-RelativeError = Annotated[Share, Fact(may_lack=True)]
+
+
+def off(error: float) -> str:
+    """``1.6 % off``, or that a method has no number."""
+    return f"{percent(error)} off" if np.isfinite(error) else "without a number somewhere"
+
+
+RelativeError = Annotated[
+    Share, Fact(may_lack=True, digits=lambda e: percent(e) if np.isfinite(e) else "no number")
+]
 ErrorIfAny = Annotated[RelativeError | None, Fact(absent="")]
 TinyIfAny = Annotated[float | None, Fact(digits=".1e", absent="")]
 
@@ -195,11 +205,12 @@ class Chart:
         kinds = dict.fromkeys(f.kind for f in self.findings)
         said = ", ".join(kind for kind in kinds if kind not in ("refused", "out of memory"))
         lines = [f"Found: {said}."] if said else []
+        lines += ["Charted at rest, without motion."] if kinds.keys() & set(UNFOLLOWED) else []
         paper = {p.size: p.worst_relative for p in self.points if p.curve == Kind.LINEAR}
         if paper:
             size = "order 4" if "order 4" in paper else next(reversed(paper))
             line = f"The paper's method (series linearised in y, {size}) is "
-            line += f"{percent(paper[size])} off at worst"
+            line += f"{off(paper[size])} at worst"
             if min(paper.values()) > 0.5 * paper[size] > 0.01 * self.asked.accuracy:
                 line += ", and more orders do not help"
             reach = [r for r in self.reach if r.method == f"{Kind.LINEAR}, {size}"]
@@ -276,7 +287,7 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
     accuracy, n = chart.asked.accuracy, EVALUATIONS[-1]
     if orders:
         moved = max((row.moved for row in orders if row.moved is not None), default=0.0)
-        shots = ", ".join(percent(o.one_shot) for o in orders if o.one_shot is not None)
+        shots = {str(o.order): percent(o.one_shot) for o in orders if o.one_shot is not None}
         names = "orders " + ", ".join(str(row.order) for row in orders)
         same = f"to {moved:.0e} of the bounds" if moved > 1e-12 else "to the last digit"
         words = f"nothing: the design is the same {same} for {names}, since the search solves "
@@ -284,7 +295,11 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
         if moved > ALIKE_DESIGNS:
             words = f"the order counts: the design differs by up to {moved:.1g} of the bounds "
             words += f"among {names}"
-        words += f"; the one shot is off by {shots}" if shots else ""
+        if shots:
+            words += (
+                f"; the one shot misses its targets by {', '.join(shots.values())} with orders "
+            )
+            words += ", ".join(shots)
         yield Advice("a design (`optimize`)", words)
     able = [p for p in chart.points if p.worst_relative <= accuracy]
     if any(p.curve == Kind.FULL for p in chart.points):

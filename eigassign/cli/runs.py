@@ -257,7 +257,8 @@ def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
 @click.option(
     "--accuracy",
     type=arguments.ACCURACY,
-    help="The relative error that is wanted of a frequency (default: 0.01).",
+    help="The relative error that is wanted of a frequency (default: that of the case's "
+    "expansion, else 0.01).",
 )
 @arguments.writing("results/<case>_chart, or results/charts of several cases")
 @arguments.json
@@ -269,25 +270,27 @@ def chart(
 
     Every method is judged at points that none has seen, and timed on this machine. Names what
     makes methods fail in the case, how far each may be trusted, and what to write. Several CASES,
-    or a folder of them, are put side by side.
+    or a folder of them, are put side by side. Exit code 1 if one of several is refused.
     """
     from eigassign.batch.plan import cases_in
     from eigassign.chart.question import QUICK, Effort
-    from eigassign.chart.results import ACCURACY
     from eigassign.output.console import print_tables, print_verdict
     from eigassign.output.reports.chart import chart_tables
     from eigassign.pipeline import charting
 
-    effort, wanted = QUICK if quick else Effort(), accuracy or ACCURACY
+    effort, failed = QUICK if quick else Effort(), False
     several = len(cases) > 1 or cases[0].is_dir()
     paths = cases_in(cases) if several else cases
     with reporting(how) as reporter:
         options = _options(how, reporter)
         made: Chart | Matrix
         if several:
-            folder, made = charting.chart_cases(paths, options, effort, wanted)
+            folder, made = charting.chart_cases(paths, options, effort, accuracy)
+            for name, why in made.refused:
+                reporter.error(f"{name} is refused: {why}")
+            failed = bool(made.refused)
         else:
-            folder, made = charting.chart(paths[0], options, effort, wanted)
+            folder, made = charting.chart(paths[0], options, effort, accuracy)
         reporter.warn(made.warnings)
         for note in made.notes:
             reporter.stage(note)
@@ -297,4 +300,4 @@ def chart(
         print_tables(table for table in chart_tables(made) if table.section != "appendix")
 
     _show(as_json, folder, made, made.seconds, told)
-    return 0
+    return int(failed)

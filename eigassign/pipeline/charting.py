@@ -22,7 +22,7 @@ SOLVED_DOF = 400  # up to which it is
 
 
 def chart(
-    path: str | Path, options: Options, effort: Effort, accuracy: float = ACCURACY
+    path: str | Path, options: Options, effort: Effort, accuracy: float | None = None
 ) -> tuple[Path, Chart]:
     """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
     case = load_case(path, options.allow_outside)
@@ -34,15 +34,19 @@ def chart(
 
 
 def chart_case(
-    case: BuiltCase, options: Options, effort: Effort, accuracy: float = ACCURACY
+    case: BuiltCase, options: Options, effort: Effort, accuracy: float | None = None
 ) -> Chart:
     """Speed against accuracy on this case, and what to write; nothing written.
 
+    ``accuracy`` is what is wanted of a frequency: else what the case asks of its expansion, or 1 %.
     Raises CaseError for what cannot be modelled.
     """
     stages = Stages(options.progress)
     with case.located(), stages("methods", "charting methods"):
-        made = compare_methods(case, effort, accuracy, options.progress)
+        given = case.file.expansion
+        asked = given.accuracy if "accuracy" in given.model_fields_set else None
+        wanted = accuracy or asked or ACCURACY
+        made = compare_methods(case, effort, wanted, options.progress)
         orders = list(_orders(case, made, options))
     return replace(advised(made, orders), seconds=stages.total_s)
 
@@ -71,13 +75,13 @@ def _orders(case: BuiltCase, made: Chart, options: Options) -> Iterator[OrderRow
 
 
 def chart_cases(
-    paths: Sequence[Path], options: Options, effort: Effort, accuracy: float = ACCURACY
+    paths: Sequence[Path], options: Options, effort: Effort, accuracy: float | None = None
 ) -> tuple[Path, Matrix]:
     """Scenes × methods in one folder: matrix.json, matrix.csv, report.html, heat maps.
 
     A case that cannot be charted is told with the reason, and does not stop the others.
     """
-    target = options.out or Path("results", "charts")
+    target, wanted = options.out or Path("results", "charts"), accuracy or ACCURACY
     stages, charts, refused = Stages(options.progress), dict[str, Chart](), dict[str, str]()
     common = Path(os.path.commonpath([path.absolute().parent for path in paths]))
     with run_folder(target, case_path=common, key="charts", force=options.force) as hidden:
@@ -87,11 +91,11 @@ def chart_cases(
                 try:
                     case = load_case(path, options.allow_outside)
                     with case.located():
-                        charts[name] = advised(compare_methods(case, effort, accuracy))
+                        charts[name] = advised(compare_methods(case, effort, wanted))
                 except EigassignError as error:
                     refused[name] = str(error)
         if not charts:
             raise UsageError("none of the cases can be charted: " + next(iter(refused.values())))
-        made = build_matrix(charts, refused, accuracy, stages.total_s)
+        made = build_matrix(charts, refused, wanted, stages.total_s)
         write_chart(made, hidden, options.figures, options.report)
     return target, made

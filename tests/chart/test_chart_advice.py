@@ -88,7 +88,7 @@ def test_the_search_ends_at_one_design_with_all_orders_and_the_one_shot_does_not
     assert first > 1.2 * last > 0.0
     told = made.advice[0]
     assert (told.question, told.key) == ("a design (`optimize`)", None)
-    assert f"off by {100 * first:.3g} %" in told.words
+    assert f"misses its targets by {100 * first:.3g} %" in told.words
     assert made.seconds > 0.0
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from charts import SMALL, random_arm
+from charts import CASES, SMALL, charted, random_arm
 
 from eigassign import load_case
 from eigassign.chart import build_subject, list_methods
@@ -68,3 +68,22 @@ def test_no_method_solves_at_a_test_point_and_these_lie_between_samples(
         assert (np.abs(tests.place - np.rint(tests.place)) >= 0.05 - 1e-9).all()
         ends = [own.stop - 1 for own in subject.rows]
         assert not np.isin(np.floor(tests.place), ends).any()  # not from one path to the next
+
+
+def test_what_follows_the_design_is_charted_and_a_pose_that_holds_still_is_tested(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "tip.yaml").write_text(random_arm("tip", "length", 3))
+    assert all(p.failed == 0 for p in charted(tmp_path / "tip.yaml").points)
+    text = (CASES / "stress/wide_motion.yaml").read_text()
+    hold = (
+        "trajectory: [{name: move, q: [[0, 1], [0, 2], [0, 2.5]], duration: 1}, "
+        "{name: hold, q: [[0.5, 0.5]]}]\n"
+    )
+    head, _, tail = text.partition("trajectory:")
+    (tmp_path / "hold.yaml").write_text(f"{head}{hold}design:{tail.partition('design:')[2]}")
+    subject, _ = build_subject(load_case(tmp_path / "hold.yaml"))
+    tests = subject.tested(SMALL)
+    held = tests.place == 3.0
+    assert len(np.unique(tests.x[held], axis=0)) == len(np.unique(tests.design))
+    assert (tests.x[held, :2] == 0.5).all()

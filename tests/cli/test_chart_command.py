@@ -57,7 +57,7 @@ def test_a_folder_is_a_matrix_and_a_broken_case_does_not_stop_the_others(
     (case.parent / "broken.yaml").write_text("title: x")
     still = (CASES / "stress" / "straight_arm.yaml").read_text()
     (case.parent / "straight_arm.yaml").write_text(still)
-    assert main(["chart", "cases", "--quick", "--json", "--quiet", "--out", "all"]) == 0
+    assert main(["chart", "cases", "--quick", "--json", "--quiet", "--out", "all"]) == 1
     kept = json.loads(Path("all/matrix.json").read_text())
     assert json.loads(capsys.readouterr().out)["cells"] == kept["cells"]
     assert {p.name for p in Path("all/figures").iterdir()} == {"errors.png", "costs.png"}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Kind, Matrix
 from eigassign.facts import fact, percent
@@ -27,10 +28,10 @@ from eigassign.output.tables import Table, facts_table
 COLOURS: dict[str, str] = dict(zip(Kind, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
+Floats = NDArray[np.float64]
 LEAST = 1e-10  # %, of claims: what is below is as good as nothing
 WANTED = Look(graph.BLACK, 1.0, "fine")
 SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
-ERRORS = {1e-6: "≤ 0.0001 %", 1e-4: "≤ 0.01 %", 1e-2: "≤ 1 %", np.inf: "over 1 %"}
 COSTS = {0.01: "≤ 1/100", 0.1: "≤ 1/10", 1.0: "≤ 1", np.inf: "over 1"}
 SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
             "reach": "How far each method goes"}  # fmt: skip
@@ -58,7 +59,7 @@ def _plane(chart: Chart) -> FigurePlan:
     asked, shown = chart.asked, [p for p in chart.points if p.worst_relative <= 1.0]
     panels = list[Panel]()
     for one in chart.fronts:
-        n, marks = one.evaluations, [_wanted(chart)]
+        n, marks, written = one.evaluations, [_wanted(chart)], list[Floats]()
         for curve in Kind:
             own = [p for p in shown if p.curve == curve]
             if curve == Kind.MESH:  # one is the case's own
@@ -67,7 +68,8 @@ def _plane(chart: Chart) -> FigurePlan:
             full = Look(COLOURS[curve], 0.0, marker="s" if curve == Kind.MESH else "o", size=7.0)
             if own:  # the legend shows full colours, in the first panel
                 pale = replace(full, colour=_pale(full.colour), width=1.0, size=5.0)
-                marks += [_curve(own, n, pale), _curve(best, n, full, "" if panels else curve)]
+                label = "" if panels else curve
+                marks += [_curve(own, n, pale, written), _curve(best, n, full, written, label)]
         label = "one trajectory" if n == 1 else f"{n:,} trajectories"
         panels.append(Panel(f"worst error [%], {label}", tuple(marks), 3.4, True, 14))
     lost = len(chart.points) - len(shown)
@@ -87,13 +89,20 @@ def _wanted(chart: Chart) -> Mark:
     return Rule(100.0 * chart.asked.accuracy, WANTED, note="wanted")
 
 
-def _curve(points: Sequence[ChartPoint], n: float, look: Look, label: str = "") -> Curve:
-    """Their orders or sizes are written at points."""
+def _curve(
+    points: Sequence[ChartPoint], n: float, look: Look, written: list[Floats], label: str = ""
+) -> Curve:
+    """Their orders or sizes are written at points that are not too near to a ``written`` one."""
     y = np.array([100.0 * p.worst_relative for p in points])
     x = np.array([p.cost_s(n) for p in points])
     names = tuple(f"{p.method}, rms {percent(p.rms_relative)}" for p in points)
-    marks = tuple("".join(re.findall(r"\d+", p.size)[:1]) for p in points)
-    return Curve(y, look, label, x, names=names, marks=marks)
+    marks = list[str]()
+    for p, place in zip(points, np.log10([x, np.maximum(y, 1e-12)]).T, strict=True):
+        is_free = all(np.abs((place - other) / (0.06, 0.5)).max() > 1.0 for other in written)
+        size = "case" if p.size.endswith("the case") else "".join(re.findall(r"\d+", p.size)[:1])
+        marks.append(size if is_free else "")
+        written += [place] if is_free else []
+    return Curve(y, look, label, x, names=names, marks=tuple(marks))
 
 
 def _looks(rows: Sequence[BoxRow]) -> dict[str, Look]:
@@ -172,6 +181,8 @@ def _tables(chart: Chart) -> Iterator[Table]:
     yield facts_table("All methods", points, f"{names} failed use", caption)
     names = "method varied half_width worst_relative claimed"
     yield facts_table("All boxes", chart.boxes, names)
+    fronts = tuple((f"{f.evaluations:,}", "; ".join(f.methods)) for f in chart.fronts)
+    yield Table("Fronts", ("trajectories", "no other is quicker and more accurate"), fronts)
     yield Table("Left out", ("method", "why"), chart.skipped)
     m = dict(chart.machine)
     m["versions"] = ", ".join(f"{name} {version}" for name, version in m["versions"].items())
@@ -205,10 +216,11 @@ def write_chart(
 
 def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
     """Two heat maps: errors at equal cost, costs at equal accuracy."""
-    wanted = percent(matrix.accuracy)
+    wanted, steps = percent(matrix.accuracy), [1e-4 * matrix.accuracy, 1e-2 * matrix.accuracy]
+    errors = {e: f"≤ {percent(e)}" for e in (*steps, matrix.accuracy)} | {np.inf: f"over {wanted}"}
     exact, time = "Worst error for the time of exact solves", f"Time for {wanted}, of that of exact"
     return (
-        _heat(matrix, "errors", exact, ERRORS, "error_at_equal_cost"),
+        _heat(matrix, "errors", exact, errors, "error_at_equal_cost"),
         _heat(matrix, "costs", f"{time} solves", COSTS, "cost_at_equal_accuracy"),
     )
 
@@ -221,7 +233,7 @@ def _heat(
     for cell in matrix.cells:
         value = getattr(cell, fact)
         shades[len(levels) if value is None else bisect_left(limits, value)].append(cell)
-    for own, label, shade in zip(shades, (*levels.values(), "none is"), SHADES, strict=True):
+    for own, label, shade in zip(shades, (*levels.values(), "none"), SHADES, strict=True):
         at = np.array([kinds.index(cell.curve) + 1.0 for cell in own])
         below = np.array([-float(matrix.cases.index(cell.case)) for cell in own])
         names = tuple(f"{c.case}: {c.curve}, {getattr(c, fact)}" for c in own)
