@@ -45,7 +45,8 @@ def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
 def _figure(
     name: str, heading: str, caption: str, label: str, panels: Sequence[Panel], section: str
 ) -> FigurePlan:
-    shows = Graph(heading, label, np.zeros(0), tuple(panels), x_logarithmic=True, beside=True)
+    ends = (0.008, 1.25) if name == "boxes" else None  # of half-widths from 0.01 to 1
+    shows = Graph(heading, label, np.zeros(0), tuple(panels), ends, True, beside=True)
     return FigurePlan(name, heading, caption, f"{heading}.", shows, section)
 
 
