@@ -311,7 +311,7 @@ def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
         yield Advice("the series (`expand`)", words, key)
     offered = [p for p in able if p.use and p.curve != Kind.MESH]
     least = min((p.cost_s(n) for p in offered), default=0.0)
-    for p in [p for p in offered if p.cost_s(n) <= ALIKE * least][:1]:  # the simplest of the cheap
+    for p in [p for p in offered if p.cost_s(n) <= 2.0 * least][:1]:  # the simplest of the cheap
         words = f"{p.method}, {percent(p.worst_relative)} off, {time_in_words(p.trajectory_s)} a "
         yield Advice("thousands of evaluations elsewhere", f"{words}trajectory: `{p.use}`")
     for p in [p for p in able if p.curve == Kind.MESH and p.use][:1]:
