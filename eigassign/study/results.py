@@ -47,7 +47,7 @@ from eigassign.modal.adaptive_order import MARGIN
 _DOWN = Context(prec=4, rounding=ROUND_DOWN)
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
-SCHEMA = 2  # of results.json: raised when a field goes or means something else
+SCHEMA = 3  # of results.json: raised when a field goes or means something else
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 MET = 1e-8  # a violation below it is round-off
