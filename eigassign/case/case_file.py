@@ -125,7 +125,7 @@ def plain(value: object) -> object:
         fields = {f.alias or n: getattr(value, n) for n, f in type(value).model_fields.items()}
         if fields.get("base", "ground") != "ground" and not any(fields["position"] or ()):
             del fields["position"]  # of a joint at the node of a link
-        return plain(fields)
+        return plain({k: v for k, v in fields.items() if v or k != "set"})
     if isinstance(value, Mapping):
         return {key: plain(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, (tuple, list)):

@@ -54,7 +54,7 @@ from eigassign.study.planning import shown_point
 Floats = NDArray[np.float64]
 LEAST_S = 1e-3  # a timed run takes at least so long: a thousand times what the clock resolves
 ONCE_S, OFTEN_S = 1.0, 0.1  # a run that takes over so long is not repeated, or three times only
-SHAPED, SHAPED_DOF = 48, 2000  # test points at which errors by shape are taken, up to this size
+SHAPED = 48  # test points at which errors by shape are taken
 
 
 def compare_methods(
@@ -152,7 +152,7 @@ def _by_shape(subject: Subject, tests: Points) -> Floats:
     """
     pencil, highest = subject.model.pencil, max(subject.modes)
     hz = np.full((len(tests), len(subject.modes)), np.nan)
-    if pencil.n_dof > SHAPED_DOF:
+    if pencil.n_dof > SOUGHT_DOF:
         return hz
     lowest = subject.exact(tests.x, min(highest + 1, len(pencil.elastic)))
     apart = np.nan_to_num(np.min(np.diff(lowest, axis=1) / lowest[:, :-1], axis=1), nan=-1.0)

@@ -11,7 +11,6 @@ import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -61,15 +60,12 @@ class Kind(StrEnum):
 
 def machine() -> dict[str, Any]:
     """Processor, cores, versions and threads of linear algebra; no names of host or user."""
-    file, threads = Path("/proc/cpuinfo"), os.environ.get("OMP_NUM_THREADS")
-    lines = file.read_text(errors="replace").splitlines() if file.exists() else []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     packages = {"eigassign": __version__, "NumPy": np.__version__, "SciPy": scipy.__version__}
     return {
-        "processor": [*named, platform.processor(), platform.machine()][0],
+        "processor": platform.processor() or platform.machine(),
         "cores": os.cpu_count() or 1,
         "versions": {"Python": platform.python_version(), **packages},
-        "threads": threads or "as the library chooses",  # NumPy does not tell
+        "threads": os.environ.get("OMP_NUM_THREADS", "as the library chooses"),
     }
 
 

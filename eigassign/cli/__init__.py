@@ -13,7 +13,6 @@ Reading order:
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -30,8 +29,6 @@ from eigassign.cli.inspect import results_schema as results_schema
 from eigassign.cli.runs import chart, expand, optimize, update, validate
 from eigassign.errors import UsageError
 
-COMPLETE = "_EIGASSIGN_COMPLETE"  # the name that click gives it
-
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
@@ -41,19 +38,11 @@ def main(args: Sequence[str] | None = None) -> int:
     process.replace_what_cannot_be_encoded()
     try:
         with process.terminable():
-            asked = os.environ.get(COMPLETE)
-            code = _invoke(arguments) if asked is None else _completed(asked)
+            code = _invoke(arguments)
             process.flush_streams()
             return code
     except BaseException as error:
         return _reported(error, arguments)
-
-
-def _completed(asked: str) -> int:
-    """Print click's script of a shell, or what that script asks for behind a tab; the exit code."""
-    from click.shell_completion import shell_complete
-
-    return shell_complete(cli, {}, "eigassign", COMPLETE, asked)
 
 
 def _reported(error: BaseException, arguments: list[str]) -> int:

@@ -43,10 +43,9 @@ def chart_case(
     """
     stages = Stages(options.progress)
     with case.located(), stages("methods", "charting methods"):
-        given = case.file.expansion
-        asked = given.accuracy if "accuracy" in given.model_fields_set else None
-        wanted = accuracy or asked or ACCURACY
-        made = compare_methods(case, effort, wanted, options.progress)
+        asked = case.file.expansion
+        given = asked.accuracy if "accuracy" in asked.model_fields_set else ACCURACY
+        made = compare_methods(case, effort, accuracy or given, options.progress)
         orders = list(_orders(case, made, options))
     return replace(advised(made, orders), seconds=stages.total_s)
 

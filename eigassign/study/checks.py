@@ -211,7 +211,7 @@ def _row(
     share = float(buckling(model, q, y).max())
     known = share if np.isfinite(share) else None
     struts = strut_error(model, q, y, modes)
-    return replace(row, sag=tuple(rows), buckling=known, struts=struts)
+    return replace(row, sag=tuple(rows), turn=float(turns.max()), buckling=known, struts=struts)
 
 
 def weight_doubt(

@@ -915,6 +915,7 @@ class WeightRow:
     poses: Annotated[int, Fact("at which it was judged")]
     design: Annotated[str, Fact("of which it is: initial, optimal or updated")]
     sag: Annotated[tuple[SagRow, ...], Fact("of named nodes, the farthest first")] = ()
+    turn: Annotated[float | None, Fact("of a node under the weight at most", unit="rad")] = None
     buckling: Annotated[Share | None, Fact("the weight, relative to that which buckles")] = None
     struts: Annotated[
         Share | None, Fact("what imported matrices may put frequencies off, from 2 % of it on")

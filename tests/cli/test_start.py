@@ -104,38 +104,6 @@ def test_the_manual_lists_its_pages_and_shows_one(capsys: Captured) -> None:
     assert "did you mean 'case-file'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_shell_is_given_the_script_of_click(
-    shell: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    monkeypatch.setenv("_EIGASSIGN_COMPLETE", f"{shell}_source")
-    assert main([]) == 0
-    assert f"_EIGASSIGN_COMPLETE={shell}_complete" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("words", "offered"),
-    [
-        ("eigassign op", ["plain,optimize"]),
-        ("eigassign init f", ["plain,four_bar"]),
-        ("eigassign check --dr", ["plain,--draw"]),
-        ("eigassign check a", ["file,a"]),
-    ],
-)
-def test_tab_completes_commands_options_templates_and_files(
-    words: str, offered: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    asked = {
-        "_EIGASSIGN_COMPLETE": "bash_complete",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(words.count(" ")),
-    }
-    for name, value in asked.items():
-        monkeypatch.setenv(name, value)
-    assert main([]) == 0
-    assert capsys.readouterr().out.splitlines() == offered
-
-
 # --- Help
 
 COMMANDS = {

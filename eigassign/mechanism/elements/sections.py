@@ -20,6 +20,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
+from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.expression import Scalar, exp, is_constant, one_atom
 
@@ -293,7 +294,10 @@ def _shear_modulus(case: CaseFile, parameters: ModelParameters, beam: Any, E: Sc
     if getattr(data, "poissons_ratio", None) is not None:
         nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
         return E / ((nu + 1.0) * 2.0)
-    return 0.0
+    if case.mechanism.space == "planar" and not getattr(beam, "shear", False):
+        return 0.0
+    message = "needs poissons_ratio or shear_modulus for torsion or shear"
+    raise MechanismError(f"mechanism.materials.{beam.material}", message)
 
 
 # --- tapers

@@ -27,7 +27,7 @@ from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.clearance import finer_path
-from eigassign.study.design.conclusions import Conflict, conflict
+from eigassign.study.design.conclusions import Conflict, conflict, least_changed
 from eigassign.study.design.robust import robust_optimum
 from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
 from eigassign.study.results import RobustRow, SolverRow
@@ -177,7 +177,8 @@ def _optimum(
     """The optimum at the samples, and what it costs to keep what is asked within tolerances."""
     if scene.file.assignment.robust:
         return robust_optimum(scene, starts, progress, deadline)
-    return find_optimum(scene, starts, progress, deadline=deadline), None
+    found = find_optimum(scene, starts, progress, deadline=deadline)
+    return least_changed(found, scene.initial), None
 
 
 def _choice_notes(found: Found) -> Iterator[str]:

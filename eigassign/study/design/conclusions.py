@@ -21,9 +21,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.design_point import first_order
 from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
+    Appraisal,
     DesignProblem,
 )
 from eigassign.assignment.exact.requirements import Requirements
@@ -32,6 +34,7 @@ from eigassign.assignment.program import can_be_kept, smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
+from eigassign.errors import EigassignError
 from eigassign.study.checks import raised_by
 from eigassign.study.design.clearance import WITHIN, check_band, lowest_room
 from eigassign.study.design.lists import cost
@@ -218,6 +221,8 @@ MOST_CHOICES = 60  # searches to say whether some limits can be met together
 MOST = 12  # limits of which the smallest contradiction is looked for
 # Steps of a search that nobody has asked to end sooner: of 20 runs 19 took at most 15, one 32
 ENOUGH = 100
+WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
+SAME = 1e-9  # of the merit: a design this little worse is as good
 
 
 # --- Contradictions
@@ -282,3 +287,55 @@ def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
     problem = DesignProblem(lambda y: alone.appraise(y, unasked), lower, upper)
     best = minimise(problem, y, max(scene.file.assignment.steps, ENOUGH))
     return None if best.seen.violation <= MET else limit.amount(best.y)
+
+
+# --- What changes nothing
+
+
+def _effects(problem: DesignProblem, y: Floats, seen: Appraisal) -> Floats:
+    """Slopes at y of all that is asked per width of the bounds, a column for each parameter."""
+    width = problem.upper - problem.lower
+    cost = () if problem.cost is None else (problem.cost_slopes(y),)
+    return np.vstack([seen.slopes, seen.excess_slopes, *cost]) * width
+
+
+def _null_space(J: Floats) -> Floats:
+    """Orthonormal directions (n, k) that change nothing."""
+    if not J.size:
+        return np.zeros((J.shape[1], 0))
+    _, s, V = np.linalg.svd(J, full_matrices=len(J) < J.shape[1])
+    rank = int((s > WITHOUT * s[0]).sum())
+    return np.asarray(V[rank:].T)
+
+
+def least_changed(found: Found, initial: Floats) -> Found:
+    """The answer with undetermined directions pulled back to the initial design.
+
+    Only where the merit is not worse than 1e-9 of itself.
+    """
+    problem, best = found.variant.problem, found.best
+    settled = found.are_listed or found.variant.requirements.least_change is not None
+    if settled or found.clearances:  # a band is checked at this very design
+        return found
+    free = np.flatnonzero(problem.upper > problem.lower)
+    width = (problem.upper - problem.lower)[free]
+    N = _null_space(_effects(problem, best.y, best.seen)[:, free])
+    d = np.zeros(len(best.y))
+    d[free] = width * (N @ (N.T @ ((initial - best.y)[free] / width)))
+    if np.abs(d[free] / width).max(initial=0.0) <= SAME:
+        return found
+    y = np.clip(best.y + d, problem.lower, problem.upper)
+    for row in problem.constraints:
+        if not row.lower - 1e-12 <= row.coefficients @ y <= row.upper + 1e-12:
+            return found
+    try:
+        seen = problem.appraise(y)
+    except EigassignError:
+        return found
+    value = problem(y, seen)
+    limit = best.objective + SAME * abs(best.objective) + 1e-20
+    if value > limit or seen.violation > max(best.seen.violation * (1.0 + SAME), MET):
+        return found
+    left, limits = first_order(problem, y, seen)
+    moved = best._replace(y=y, seen=seen, objective=value, stationarity=left, limits=limits)
+    return replace(found, optima=(moved, *found.optima[1:]))

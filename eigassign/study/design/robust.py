@@ -24,6 +24,7 @@ from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import EdgeRows
 from eigassign.brief import counted
 from eigassign.errors import AccuracyError, EigassignError
+from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, find_optimum
 from eigassign.study.design.search.response import DesignResponse, box_corners, reduced_models
@@ -76,6 +77,7 @@ def robust_optimum(
             if scenarios:
                 raise AccuracyError(LOST.format(why)) from why
             raise
+        found = least_changed(found, scene.initial)
         look = _Deviations(found)
         ended = found.best.end in (End.SECONDS, End.INTERRUPTED) or monotonic() > deadline
         lost = look.lost()
