@@ -129,8 +129,6 @@ def _notes(subject: Subject) -> Iterator[str]:
         yield NO_KRIGING
     if subject.model.n_dof > SOUGHT_DOF:
         yield f"modes that meet are not sought with over {SOUGHT_DOF} degrees of freedom"
-    if subject.file.measurements is not None and subject.path is None:
-        yield "measured poses are not charted, but the pose of expansion or at rest"
 
 
 def _tasks(

@@ -377,13 +377,14 @@ class _Search:
         self, k: int, margins: tuple[Margin, ...], near: Sequence[Floats], spread: bool
     ) -> Searched:
         """The optima of a choice from some designs, or from all starts."""
-        levels = self.levels[-1:] if self.every.is_discrete else self.levels
-        levels = tuple(replace(level, margins=margins) for level in levels)
+        which = self.levels[-1:] if self.every.is_discrete else self.levels
+        levels = tuple(replace(level, margins=margins) for level in which)
 
         def posed(task: Task) -> PosedProblem:
             return self.every.posed(k, task)
 
-        starts = near or self.near(posed(levels[0]))[: 1 if self.every.is_discrete else None]
+        few = self.every.posed(k, replace(self.levels[0], margins=margins))  # as designs are solved
+        starts = near or self.near(few)[: 1 if self.every.is_discrete else None]
         if self.ended and not near and k in self.leads:
             starts = [self.leads[k]]
         alone = len(self.every.of) == 1
