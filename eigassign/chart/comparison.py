@@ -400,7 +400,7 @@ def find_failures(
         file, model = subject.file, subject.model
         labels, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
         where = shown_point(labels, one.x, units, file.in_degrees)
-        more = {} if series else {"why": "both are expanded together, right on either side"}
+        more = {} if series else {"why": "no series is off by more than is wanted"}
         yield finding(one.kind, where, series, modes=modes, gap=one.gap, **more)
         if kinked:
             yield finding("too few samples to see a kink", where, kinked, modes=modes)

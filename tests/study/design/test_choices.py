@@ -78,3 +78,22 @@ def test_a_limit_contradicts_with_the_linear_one_that_forbids_what_would_meet_it
     _, _, row = answered("list_and_drives", **changes)
     assert row.verdict == "infeasible"
     assert sorted(row.conflict) == ["mode 1 at least 9 Hz along 'go'", "thin"]
+
+
+def test_lists_alone_beside_a_band_are_compared_on_all_of_many_samples() -> None:
+    """Starts are compared on few of the samples, which are fewer than the 101 of this path."""
+    text = (Path(ea.__file__).parent / "starters" / "planar_arm.yaml").read_text()
+    tree = yaml.safe_load(text.partition("\ntargets:")[0].partition("\ndesign:")[0])
+    tree["trajectory"] |= {"samples": 101}
+    outer = "sections.upper_tube.outer_diameter"
+    tree["design"] = {"diameter": {"parameter": outer, "values": [0.038, 0.050]}}
+    case = ea.load_case(tree)
+    q, both = case.trajectory.q, (0.038, 0.050)
+    hz = {y: case.model().frequencies(q, np.full((len(q), 1), y), 4) for y in both}
+    low, high = (hz[y][:, 0] for y in both)  # mode 1 of the thicker tube is higher
+    edges = [float(low.min() + 1e-3), float(low.max() - 1e-3)]
+    free = (hz[0.050] < edges[0]) | (hz[0.050] > edges[1])
+    assert high.min() > low.min()
+    tree["targets"] = [{"modes": "all", "keep_out": edges}]
+    row = ea.assign(ea.load_case(tree)).results.assignment
+    assert row.verdict == ("reached" if free.all() else "infeasible")
