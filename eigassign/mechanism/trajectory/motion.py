@@ -122,8 +122,6 @@ def sampled_motion(time_s: Floats, q: Floats) -> Motion:
     if len(time_s) == 1:
         return Motion(Curve(time_s + np.arange(2.0), q[None].copy()), np.zeros(0))
     c = through(time_s, q, "spline").coefficients.copy()
-    if len(c) == 2:  # the line through two samples
-        return Motion(Curve(time_s, c), np.zeros(0))
     # what q rounded to 1e-16 leaves of second differences where the velocity does not change
     step = np.diff(time_s)[:, None]
     least = 4e-15 * np.abs(q).max(axis=0) / step.min() ** 2
