@@ -101,8 +101,10 @@ def _finished(
         _show(as_json, outcome.folder, results, outcome.seconds, told)
         if results.shortcoming is not None:
             reporter.error(results.shortcoming)
-    if results.interrupted:
-        return process.INTERRUPTED
+        if results.interrupted:
+            kept = "no finished run is replaced"
+            reporter.error(f"interrupted: the best design so far is in {outcome.folder}; {kept}")
+            return process.INTERRUPTED
     return 0 if results.shortcoming is None else 1
 
 

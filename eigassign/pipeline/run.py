@@ -25,6 +25,7 @@ from eigassign.output import tables
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
+from eigassign.output.store.run_folder import UNFINISHED, unfinished_beside
 from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
@@ -271,15 +272,18 @@ def _first_curve(results: RunResults) -> tuple[Floats, Floats, Floats, Floats | 
 def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     """`solve_case`, and its run folder: results.json, report.html, figures, case.yaml, log.txt.
 
-    Raises StorageError before anything is computed where the folder may not be replaced.
+    What Ctrl-C ended goes to `unfinished_beside` it. Raises StorageError before anything is
+    computed where the folder may not be replaced.
     """
     stages = Stages(options.progress)
-    case = load_case(path, options.allow_outside)
-    with new_run_folder(case.file, options.out, options.force) as folder:
+    case, ended = load_case(path, options.allow_outside), dict[str, bool]()
+    with new_run_folder(case.file, options.out, options.force, outcome=ended) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
         folder.write(results, options.figures, options.report)
-    return Outcome(folder.path, results, stages.total_s)
+        ended |= {UNFINISHED: True} if results.interrupted else {}
+    place = unfinished_beside(folder.path) if results.interrupted else folder.path
+    return Outcome(place, results, stages.total_s)
 
 
 def expand_case(

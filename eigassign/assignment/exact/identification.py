@@ -143,7 +143,7 @@ def identify(
     problem = DesignProblem(appraise, lower, upper)
     start = np.clip(start, lower, upper)
     initial_hz = response(start)[0]
-    minima, starts = [_fitted(problem, start)], 1
+    minima, starts = [minimise(problem, start)], 1
     room = max(len(initial_hz) - len(start), 1)
 
     def explains(found: Optimum) -> bool:
@@ -161,7 +161,7 @@ def identify(
         if enough(starts, len(minima)):
             break
         with suppress(EigassignError):
-            minima = joined(_fitted(problem, other))
+            minima = joined(minimise(problem, other))
             starts += 1
     for rounds in range(1, ROUNDS + 1):
         fit = min(minima, key=lambda found: found.objective)
@@ -170,7 +170,7 @@ def identify(
         intervals = profile.intervals()
         if profile.best is fit or rounds == ROUNDS:
             break
-        minima = joined(_fitted(problem, profile.best.y))
+        minima = joined(minimise(problem, profile.best.y))
     held = _held(fit, len(start))
     covariance, rank = _covariance(problem, fit, held)
     hz, chi_squared = response(fit.y)[0], fit.objective
@@ -196,14 +196,6 @@ def identify(
     )
 
 
-def _fitted(problem: DesignProblem, start: Floats) -> Optimum:
-    """A fit; Ctrl-C ends the whole work, for no part of it is an answer."""
-    found = minimise(problem, start)
-    if found.end is End.INTERRUPTED:
-        raise KeyboardInterrupt
-    return found
-
-
 def _are_same(
     problem: DesignProblem, a: Optimum, b: Optimum, explains: Callable[[Optimum], bool]
 ) -> bool:
@@ -223,7 +215,7 @@ def _held_at(problem: DesignProblem, j: int, at: float, start: Floats) -> Optimu
     lower[j] = upper[j] = at
     held = problem._replace(lower=lower, upper=upper)
     try:
-        return _fitted(held, np.clip(start, lower, upper))
+        return minimise(held, np.clip(start, lower, upper))
     except EigassignError:
         return None
 

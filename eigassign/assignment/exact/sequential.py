@@ -96,12 +96,13 @@ class Optimum(NamedTuple):
 
 
 def minimise(
-    problem: DesignProblem, start: Floats, steps: int = 100, deadline: float = np.inf
+    problem: DesignProblem, start: Floats, steps: int = 100, deadline: float | None = None
 ) -> Optimum:
     """The local optimum that steps from ``start`` (n_y,) lead to; start is put within its limits.
 
-    ``deadline`` is a time of `time.monotonic`, looked at between steps; Ctrl-C ends them too, and
-    the best design so far is returned. Raises what ``appraise`` raises at the start.
+    ``deadline`` is a time of `time.monotonic`, looked at between steps; Ctrl-C ends them too then,
+    and the best design so far is returned: without one no part of the work is an answer, and it is
+    raised. Raises what ``appraise`` raises at the start.
     """
     run = _Run(problem)
     place = best = run.placed(run.box.inside(run.box.z(start)))
@@ -114,7 +115,7 @@ def minimise(
             if not beyond and run.unbalanced(place) <= OPTIMAL:
                 end = End.OPTIMAL
                 break
-            if monotonic() > deadline:
+            if deadline is not None and monotonic() > deadline:
                 end = End.SECONDS
                 break
             move = run.proposed(place)
@@ -132,6 +133,8 @@ def minimise(
                 end = End.STALLED
                 break
     except KeyboardInterrupt:
+        if deadline is None:
+            raise
         end = End.INTERRUPTED
     y = run.box.y(best.z)
     left, limits = first_order(problem, y, best.seen)

@@ -13,6 +13,9 @@ a single step. What may give way to it:
 - anything else only with ``force``, and then it is kept as ``<name>.1`` too: nothing that a run
   did not write is ever deleted.
 
+A run that Ctrl-C ended with the best design so far goes to ``<name>.unfinished`` by the same rules,
+whatever is there is moved aside as with ``force``: it never takes the place of a finished run.
+
 The hidden names, of a writer with the token ``<pid>-<8 hex digits>``:
 
     .<name>.<token>.tmp    being written, or being deleted: nobody misses it
@@ -52,6 +55,7 @@ from eigassign.output.store.atomic import (
 )
 
 MARKER = "run.json"
+UNFINISHED = "unfinished"  # in the outcome of such a run, and the end of its folder's name
 _SCHEMA = 3  # of run.json: of earlier ones no file is vouched for
 
 
@@ -173,7 +177,8 @@ def run_folder(
 ) -> Iterator[Path]:
     """Yield an empty hidden folder to fill; on a clean exit it becomes ``target``.
 
-    ``key`` and ``outcome``, as it is at the exit, stand in run.json.
+    ``key`` and ``outcome``, as it is at the exit, stand in run.json; one with `UNFINISHED` becomes
+    `unfinished_beside` ``target``.
     Any exception, interrupt or full disk inside leaves ``target`` as it was. Of two writers of
     one target the last one wins whole. Raises StorageError where ``target`` may not be replaced
     (checked on entry already) or cannot be written.
@@ -189,11 +194,18 @@ def run_folder(
             with temporary(target, Path.mkdir) as folder:
                 yield folder
                 write_record(folder, run, token_of(folder), outcome)
+                if outcome.get(UNFINISHED):
+                    target, force = unfinished_beside(target), True
                 _publish(folder, target, run, force=force)
         finally:
             for parent in made:  # of a run that failed they are empty
                 with contextlib.suppress(OSError):
                     parent.rmdir()
+
+
+def unfinished_beside(target: Path) -> Path:
+    """Where an unfinished run of ``target`` goes."""
+    return target.with_name(f"{target.name}.{UNFINISHED}")
 
 
 def settle_killed(folder: Path) -> None:
@@ -252,7 +264,7 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
     sync_tree(folder)
     if (reason := _objection(target, run)) and not force:
         raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
-    new = folder.with_suffix(".new")
+    new = target.with_name(f".{target.name}.{token_of(folder)}.new")
     try:
         os.rename(folder, new)
         put_in_place(new, target)

@@ -224,9 +224,12 @@ def test_ctrl_c_keeps_the_best_design_so_far() -> None:
         return asked.appraise(y)
 
     start = np.array([2.0, 0.0, 5.0])
-    found = minimise(asked._replace(appraise=interrupted), start)
+    found = minimise(asked._replace(appraise=interrupted), start, deadline=np.inf)
     assert found.end is End.INTERRUPTED
     assert found.objective < asked(start, asked.appraise(start))
+    calls[0] = 0
+    with pytest.raises(KeyboardInterrupt):  # without a deadline no part of it is an answer
+        minimise(asked._replace(appraise=interrupted), start)
 
 
 def test_a_step_to_where_no_design_is_goes_nowhere() -> None:
