@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,11 @@ from eigassign.modal.reduced import ReducedModel
 from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
-from eigassign.pipeline.run import Result, solve_case
+from eigassign.pipeline.run import Options, Result, solve_case
+from eigassign.pipeline.stages import silent
 from eigassign.pipeline.studies import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
+from eigassign.process import one_thread
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case
 from eigassign.study import pictures as drawing
@@ -86,6 +88,7 @@ class Case(built_case.BuiltCase):
             return drawing.draw_modes(self.file, self.model(), *at, mode)
 
 
+@one_thread
 def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False) -> Case:
     """Read and validate a case file, or a mapping with the same keys and values.
 
@@ -97,6 +100,7 @@ def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False
     return Case(built_case.load_case(given, allow_outside).file)
 
 
+@one_thread
 def expand(
     model: Model,
     q0: ArrayLike,
@@ -123,6 +127,7 @@ def expand(
     )
 
 
+@one_thread
 def reduce(
     model: Model,
     q0: ArrayLike,
@@ -142,7 +147,8 @@ def reduce(
     return modal_reduced.reduce(as_model(model).pencil, q0, y0, modes, half_order)
 
 
-def assign(case: Case) -> Result:
+@one_thread
+def assign(case: Case, progress: Callable[[str], None] = silent) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything.
 
         min over y of Σ w (f(t)/f_d(t) − 1)² / Σ w  within the bounds, limits and bands of the case
@@ -150,23 +156,25 @@ def assign(case: Case) -> Result:
     (or its largest term: ``assignment.objective``), judged by exact eigenvalues; the paper's one
     shot, the quadratic program of eqs. (13)-(14), is where it starts or all there is of it.
     ``.design`` by name in SI units, ``.exact_hz`` (n_t,), ``.results`` with all the rest;
-    ``.results.shortcoming`` says why this is no answer to build on, None if it is. Raises
-    CaseError for what the case lacks, InfeasibleError for limits that contradict each other,
-    AccuracyError for numbers that cannot be vouched for.
+    ``.results.shortcoming`` says why this is no answer to build on, None if it is. ``progress`` is
+    called with what the command writes on stderr: ``print``. Raises CaseError for what the case
+    lacks, InfeasibleError for limits that contradict each other, AccuracyError for numbers that
+    cannot be vouched for.
     """
-    return solve_case(_loaded(case))
+    return solve_case(_loaded(case), Options(progress=progress))
 
 
-def update(case: Case) -> Updated:
+@one_thread
+def update(case: Case, progress: Callable[[str], None] = silent) -> Updated:
     """The whole job of ``eigassign update``, without writing anything.
 
         min over y of Σ ((f(q, y) − f_measured) / σ)²
 
     ``.design`` and its 95 % ``.intervals`` by name in SI units, ``.results`` with all the rest,
-    ``.case`` with the values found. Raises CaseError for what the case lacks and for wrong
-    measurements.
+    ``.case`` with the values found; ``progress`` as of `assign`. Raises CaseError for what the
+    case lacks and for wrong measurements.
     """
-    found = update_case(_loaded(case))
+    found = update_case(_loaded(case), Options(progress=progress))
     return replace(found, case=Case(found.case.file))
 
 

@@ -24,6 +24,7 @@ OWNERS = {
     "jinja2": {"output"},
     "platformdirs": {"output"},
     "click": {"cli"},
+    "threadpoolctl": {"process"},
 }
 EVERYWHERE = {"numpy", "scipy"}
 LATE = (  # what few cases or options need is imported when they do: a run of two_link has none

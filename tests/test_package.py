@@ -1,7 +1,11 @@
 """The package as one meets it in an interactive session."""
 
 import inspect
+import os
+import subprocess
+import sys
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -9,6 +13,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.brief import LONGEST
+from eigassign.errors import UsageError
 from eigassign.pipeline import Result
 
 TWO_LINK = Path(__file__).parents[1] / "cases" / "two_link.yaml"
@@ -123,3 +128,101 @@ def test_what_is_no_case_is_refused_with_what_makes_one():
     for whole in (ea.assign, ea.update):
         with pytest.raises(ea.EigassignError, match=r"expected a case, got str: ea\.load_case"):
             whole("arm.yaml")
+
+
+@pytest.mark.parametrize("given", [None, 3, ["arm.yaml"]])
+def test_what_is_neither_a_path_nor_a_mapping_is_refused(given: Any) -> None:
+    with pytest.raises(UsageError, match="expected the path of a case file, or a mapping, got"):
+        ea.load_case(given)
+
+
+def test_progress_is_told_line_by_line(case: ea.Case) -> None:
+    lines: list[str] = []
+    ea.assign(case, progress=lines.append)
+    assert lines[:2] == ["assembling K and M", "following the trajectory"]
+    assert "  from start 1" in lines
+
+
+# --- Threads of the linear algebra
+
+THREADS = """
+import threading
+import eigassign as ea
+import threadpoolctl, scipy.linalg
+
+def threads():
+    own = threadpoolctl.threadpool_info()
+    return [each["num_threads"] for each in own if each["user_api"] == "blas"]
+
+threadpoolctl.threadpool_limits(2, user_api="blas")
+before = threads()
+case = ea.load_case("cases/two_link.yaml")
+model, seen = case.model(), []
+q, y = case.trajectory.q, case.initial_design
+ea.assign(case, progress=lambda line: seen.append(threads()))
+assert all(each == [1] * len(before) for each in seen), seen
+assert threads() == before
+
+class Stop(Exception):
+    pass
+
+def stop(line):
+    model.frequencies(q, y)  # one call inside another
+    assert threads() == [1] * len(before)
+    raise Stop
+
+for _ in range(2):
+    try:
+        ea.assign(case, progress=stop)
+    except Stop:
+        assert threads() == before
+
+first, second = threading.Event(), threading.Event()
+
+def overlapping(mine, other):
+    def wait(line):
+        mine.set()
+        assert other.wait(60)
+        seen.append(threads())
+    ea.assign(case, progress=wait)
+
+seen.clear()
+orders = (first, second), (second, first)
+pair = [threading.Thread(target=overlapping, args=both) for both in orders]
+[each.start() for each in pair]
+[each.join() for each in pair]
+assert seen and all(each == [1] * len(before) for each in seen), seen
+assert threads() == before
+"""
+
+
+@pytest.mark.parametrize("chosen", [None, "2"])
+def test_a_call_has_one_thread_and_puts_back_what_was(chosen: str | None) -> None:
+    others = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    code = THREADS if chosen is None else THREADS.replace("[1]", "[2]")  # the user's own choice
+    own = {} if chosen is None else {"OMP_NUM_THREADS": chosen}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=others | own, cwd=TWO_LINK.parents[1],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("call", "name"), [("assign", "gantry"), ("update", "arm_update")])
+def test_a_session_takes_the_processor_time_that_one_thread_takes(call: str, name: str) -> None:
+    """At most 1.2 times; without a limit 2.8 times on two cores."""
+    others = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    code = (
+        f"import os, eigassign as ea; ea.{call}(ea.load_case('cases/{name}.yaml'));"
+        "print(sum(os.times()[:4]))"
+    )
+    taken: dict[bool, list[float]] = {False: [], True: []}
+    for limited in 5 * [False, True]:  # in turns: the machine may be busy
+        own = {"OMP_NUM_THREADS": "1"} if limited else {}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=others | own, cwd=TWO_LINK.parents[1],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        taken[limited].append(float(done.stdout))
+    assert median(taken[False]) <= 1.2 * median(taken[True])

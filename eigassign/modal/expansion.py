@@ -35,6 +35,7 @@ from eigassign.modal.taylor.recursion import (
     taylor_vectors,
     vector_set,
 )
+from eigassign.process import one_thread
 from eigassign.series.algebra import Polynomials, monomials, polynomials, reciprocal
 from eigassign.series.multi_index import LowerSet
 
@@ -83,6 +84,7 @@ class Expansion:
             f"coefficients in {counted(self.space.n_variables, 'variable')}, about (q, y) = ({at})>"
         )
 
+    @one_thread
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
         w = self.local(q, y)

@@ -43,6 +43,7 @@ from eigassign.modal.mesh_error import (
     solid_error,
     standing_frequencies,
 )
+from eigassign.process import one_thread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -182,15 +183,18 @@ class Model:
         if self.pencil.weight is not None:
             require_standing(self.pencil, self.pencil.theta(x), x, label)
 
+    @one_thread
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
         return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count)) / (2.0 * np.pi)
 
+    @one_thread
     def modes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[Floats, Floats]:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
         found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
 
+    @one_thread
     def slopes(
         self, q: ArrayLike, y: ArrayLike, count: int = 3, wanted: ArrayLike | None = None
     ) -> tuple[Floats, Floats]:
@@ -223,6 +227,7 @@ class Model:
             self.pencil.limits.require(x)
         return x[0, len(self.q_names) :]
 
+    @one_thread
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """By how much reduced links raise frequencies, relative, (n_samples, n_modes).
 
@@ -257,6 +262,7 @@ class Model:
             return error
         return (1.0 + error) * (1.0 + solid_error(self.solids, self.x(q, y), modes)) - 1.0
 
+    @one_thread
     def beam_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """The part of the beams in `discretisation_error`."""
         x = self.x(q, y)

@@ -38,6 +38,7 @@ from eigassign.modal.exact.dense import condense_blocks, inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.taylor.rayleigh import project
 from eigassign.modal.taylor.recursion import vectors_to_order
+from eigassign.process import one_thread
 from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
@@ -81,6 +82,7 @@ class ReducedModel:
         """Number k of basis vectors."""
         return len(self.stiffness.place)
 
+    @one_thread
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n_samples, n_modes) in Hz.
 
@@ -97,6 +99,7 @@ class ReducedModel:
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
 
+    @one_thread
     def slopes(
         self, q: ArrayLike, y: ArrayLike, wanted: ArrayLike | None = None
     ) -> tuple[Floats, Floats]:
@@ -220,7 +223,7 @@ def reduce(
     AccuracyError where no basis can be made.
     """
     wanted = mode_numbers(modes)
-    half_order = whole_within(half_order, "half_order", 0, 10)
+    half_order = whole_within(half_order, "half_order", 1, 10)
     n_y = pencil.to_program.shape[1] - pencil.n_q
     points = samples(q0, y0, pencil.n_q, n_y)
     V = ritz_basis(pencil, points, wanted, half_order)

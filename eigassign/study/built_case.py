@@ -26,6 +26,7 @@ from eigassign.errors import (
     MechanismError,
     SingularityError,
     TrajectoryError,
+    UsageError,
 )
 from eigassign.mechanism.assembly.build import (
     LOWEST,
@@ -50,6 +51,7 @@ from eigassign.modal.arguments import spread
 from eigassign.modal.exact.solver import rounding_error
 from eigassign.modal.mesh_error import solid_links, standing_frequencies
 from eigassign.modal.model import Model
+from eigassign.process import one_thread
 from eigassign.study.planning import (
     SERIES,
     TRUNCATION,
@@ -338,6 +340,7 @@ class BuiltCase:
         return self.settled.model
 
     @cached_property
+    @one_thread
     def settled(self) -> SettledModel:
         """The model with what was chosen for links that leave it to ``auto``; raises as `model`."""
         return settle_model(self.file)
@@ -353,6 +356,7 @@ class BuiltCase:
         return initial_design(self.file)
 
     @cached_property
+    @one_thread
     def trajectory(self) -> Trajectories:
         """q(t), of several trajectories all samples one after the other.
 
@@ -378,4 +382,6 @@ def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False
     """
     if isinstance(given, Mapping):
         return BuiltCase(from_mapping(given, allow_outside=allow_outside))
+    if not isinstance(given, str | Path):
+        raise UsageError(f"expected the path of a case file, or a mapping, got {given!r:.60}")
     return BuiltCase(load(given, allow_outside))

@@ -70,6 +70,8 @@ def test_an_order_that_is_none_is_refused(model, order):
         expand(model, Q0, Y0, order=order)
     with pytest.raises(UsageError, match="half_order"):
         reduce(model, Q0, Y0, half_order=order)
+    with pytest.raises(UsageError, match="half_order"):
+        reduce(model, Q0, Y0, half_order=0)
     if order is not None:
         with pytest.raises(UsageError, match="vector_order"):
             expand(model, Q0, Y0, vector_order=order)
