@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from eigassign.errors import EigassignError, UsageError
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
+from eigassign.modal.arguments import whole_within
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import ReducedModel
@@ -144,6 +145,7 @@ def reduce(
     ``model.frequencies`` at a few places says. Raises UsageError for impossible arguments,
     AccuracyError where no basis can be made.
     """
+    half_order = whole_within(half_order, "half_order", 1, 10)
     return modal_reduced.reduce(as_model(model).pencil, q0, y0, modes, half_order)
 
 

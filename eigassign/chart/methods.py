@@ -84,8 +84,9 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
     for count, half in ((1, 0), (1, 1), (1, 2), (FEW, 1), (FEW, 2)):
         at = f" with {count} rows of q0, y0" if count > 1 else ""
         use = f"ea.reduce(model, q0, y0, modes={modes}, half_order={half}){at}"
-        if count == 1 or subject.rows:
-            yield Method(Kind.RITZ, "", partial(_reduced, subject, count, half), use=use)
+        if count == 1 or subject.rows:  # the modes alone are there to compare with
+            build = partial(_reduced, subject, count, half)
+            yield Method(Kind.RITZ, "", build, use=use if half else "")
     for count in (5, 9, 17, 33):
         if count <= max((own.stop - own.start for own in subject.rows), default=0):
             build = partial(_interpolated, subject, count)

@@ -223,7 +223,7 @@ def reduce(
     AccuracyError where no basis can be made.
     """
     wanted = mode_numbers(modes)
-    half_order = whole_within(half_order, "half_order", 1, 10)
+    half_order = whole_within(half_order, "half_order", 0, 10)
     n_y = pencil.to_program.shape[1] - pencil.n_q
     points = samples(q0, y0, pencil.n_q, n_y)
     V = ritz_basis(pencil, points, wanted, half_order)
