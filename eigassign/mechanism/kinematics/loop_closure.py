@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import FREEDOMS
@@ -23,7 +25,7 @@ from eigassign.mechanism.kinematics.parameters import (
     initial_design,
     written_loads,
 )
-from eigassign.mechanism.kinematics.topology import CoordinateMap, Topology
+from eigassign.mechanism.kinematics.topology import CoordinateMap, Freedom, Topology
 from eigassign.series.compiler import compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction
@@ -107,9 +109,8 @@ def _bind_passive(
         tuple(names[v] for v in used),
         "the mechanism",
     )
-    a0 = reference(case, parameters)[used]
-    p0 = _Branches(case, tree, function, used, a0).chosen()
-    solved = replace(function, a0=a0, p0=p0)
+    branches = _Branches(case, tree, function, used, parameters, reference_coordinates(case))
+    solved = replace(function, a0=branches.a0, p0=branches.chosen())
     return parameters.with_passive(
         parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
     )
@@ -196,6 +197,10 @@ def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
 # --- the assembly branch
 
 MEETS = 1e-5  # m and rad: a loop without passive joints closes, its dimensions have six digits
+SAME = 1e-6  # rad or m: solutions within it are one, as Newton settles at round-off
+# `_apart` from the guess Newton's solution is taken without a look at others: of 400 random
+# parallelograms and guesses none within 0.6 was another than the nearest
+NEAR = 0.5
 CHANGE = 1e-5  # rad or m, for central differences of F
 IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; differences leave some 1e-9 of it
 RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
@@ -203,35 +208,69 @@ RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not co
 
 @dataclass(frozen=True, eq=False)
 class _Branches:
-    """The solutions p of the closure at the reference a_0: ways to put the loops together."""
+    """The solutions p of the closure at the coordinates q: ways to put the loops together."""
 
     case: CaseFile
     tree: Topology
     function: ImplicitFunction
     used: Sequence[int]  # the entries of z that are its arguments
-    a0: Floats
+    parameters: ModelParameters
+    q: Floats  # (n_q,)
+
+    @cached_property
+    def a0(self) -> Floats:
+        """The arguments at q, properties as written."""
+        return reference(self.case, self.parameters, self.q)[list(self.used)]
 
     def chosen(self) -> Floats:
         """The solution p_0 that the case asks for, or the only one.
 
-        Raises MechanismError when there is none, when the passive freedoms are not determined, or
-        when several branches exist and the case gives no guess; the branches are then listed.
+        Raises MechanismError when there is none, when the passive freedoms are not determined or
+        cannot follow, or when several branches exist and the case gives no guess. The message has
+        branches as a case would write them, the nearest to the guess first; where there is none at
+        these coordinates, those of other ones.
         """
         assembly = getattr(self.case.mechanism, "assembly", None)
-        guess, drawn = _guess(self.tree, assembly), np.zeros((1, self.function.size))
-        if guess is None and self._missed(drawn)[0] < ACCEPT:
-            guess = drawn[0]  # as the file places the joints: that closes the loops
-        found = self._solutions(self._starts if guess is None else guess[None])
-        if not len(found):
+        guess, drawn = _guess(self.tree, assembly), np.zeros(self.function.size)
+        near = drawn if guess is None else guess
+        found = near[None] if self._missed(near[None])[0] < ACCEPT else self._starts[:0]
+        if guess is not None and not len(found):
+            found = self._solutions(near[None])
+        led = [p for p in found if self._apart(p, near) < NEAR]
+        ways = led or sorted(
+            self._solutions(np.vstack([found, self._starts])), key=lambda p: self._apart(p, near)
+        )
+        path, message = "mechanism.assembly" if assembly else "mechanism.joints", ""
+        if not ways:
             message = self._unclosable()
-            if guess is not None and len(others := self._solutions(self._starts)):
-                message = f"the guess leads to no closed pose: {self._ambiguous(others)}"
-            raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
-        self._require_determined(found[0])
-        self._require_movable(found[0])
-        if guess is None and len(found) > 1:
-            raise MechanismError("mechanism.joints", self._ambiguous(found))
-        return np.asarray(found[0])
+        elif not self._is_determined(ways[0]):
+            path, message = "coordinates", self._open()
+        elif held := self._held(ways[0]):
+            path = "design" if held in self.parameters.varied else "coordinates"
+            message = f"{held} cannot change at {self._at}: the loops hold it, as a structure or "
+            message += "at a dead point. Give a joint another freedom, or lock the coordinate"
+            message += self._elsewhere()
+        elif len(ways) > 1 and (not len(found) or self._apart(ways[0], found[0]) > SAME):
+            message = "the guess leads to no closed pose near it: " * (guess is not None)
+            message += f"the loops close in {len(ways)} ways at {self._at}: {self._ways(ways)}"
+        if message:
+            raise MechanismError(path, message)
+        return np.asarray(ways[0])
+
+    def _apart(self, p: Floats, guess: Floats) -> float:
+        """Σ |2 sin(Δ/2)| of what turns, and of what slides Σ |Δ| in m.
+
+        Of chords one angle that is half a turn off counts 2, less than several that are 60 deg off.
+        """
+        return float(np.abs(self._gaps(p - guess)).sum())
+
+    def _gaps(self, d: Floats) -> Floats:
+        """Differences of p, full turns not counted."""
+        return np.where(self._turning, 2.0 * np.sin(d / 2.0), d)
+
+    @cached_property
+    def _turning(self) -> NDArray[np.bool_]:
+        return np.array([_unit(self.case, f) == "rad" for f in self.tree.passive], dtype=bool)
 
     @property
     def _starts(self) -> Floats:
@@ -260,9 +299,6 @@ class _Branches:
         Rx(α) Ry(β) Rz(γ) = Rx(α + π) Ry(π − β) Rz(γ + π): of balls |β| ≤ π/2.
         """
         p, several = self._descended(starts), len(starts) > 1
-        types = [self.case.mechanism.joints[f.joint].type for f in self.tree.passive]
-        kinds = [FREEDOMS[k][f.component] for k, f in zip(types, self.tree.passive, strict=True)]
-        turning = np.array([kind != "translation" for kind in kinds], dtype=bool)
         distinct: list[Floats] = []
         for candidate in p[self._missed(p) < ACCEPT]:
             turned = wrapped(candidate)
@@ -270,10 +306,8 @@ class _Branches:
                 if abs(turned[k + 1]) > np.pi / 2:
                     alpha, beta, gamma = turned[k : k + 3]
                     turned[k : k + 3] = wrapped(np.array([alpha, -beta, gamma]) + np.pi)
-            near = np.where(turning & several, turned, candidate)
-            apart = (near - d for d in distinct)  # full turns not counted
-            # solutions within 1e-6 rad or m are one: Newton settles at round-off
-            if all(np.abs(np.where(turning, 2.0 * np.sin(d / 2.0), d)).max() > 1e-6 for d in apart):
+            near = np.where(self._turning & several, turned, candidate)
+            if all(np.abs(self._gaps(near - d)).max() > SAME for d in distinct):
                 distinct.append(near)
         return np.array(distinct).reshape(-1, self.function.size)
 
@@ -289,20 +323,47 @@ class _Branches:
             and names.count(f.joint) == 3
         ]
 
-    def _require_determined(self, p0: Floats) -> None:
-        J = self._equations(p0[None])[2][0]
-        missing = self.function.size - int(np.linalg.matrix_rank(J, RANK))
-        if missing:
-            joints = ", ".join(sorted({f.joint for f in self.tree.passive}))
-            n = len(self.tree.freedoms) - len(self.tree.passive)
-            raise MechanismError(
-                "coordinates",
-                f"{missing} more coordinate(s) needed: {n} of {n + missing} freedom(s) have one, "
-                f"which leaves the joints {joints} open; or {self._at} is a dead point",
-            )
+    def _is_determined(self, p0: Floats) -> bool:
+        return int(np.linalg.matrix_rank(self._equations(p0[None])[2][0], RANK)) == len(p0)
 
-    def _require_movable(self, p0: Floats) -> None:
-        """Refuse arguments of p that cannot change: ∂F/∂p ṗ = −∂F/∂a has no solution."""
+    def _open(self) -> str:
+        """The sentence on passive freedoms that are not determined: here alone, or everywhere."""
+        if elsewhere := self._elsewhere():
+            return f"{self._at} is a dead point of the loops{elsewhere}"
+        met = int(np.linalg.matrix_rank(self._equations(self._starts)[2], RANK).max())
+        missing = max(self.function.size - met, 1)
+        joints = ", ".join(sorted({f.joint for f in self.tree.passive}))
+        n = len(self.tree.freedoms) - len(self.tree.passive)
+        return (
+            f"{missing} more coordinate(s) needed: {n} of {n + missing} freedom(s) have one, "
+            f"which leaves the joints {joints} open; or {self._at} is a dead point"
+        )
+
+    def _elsewhere(self) -> str:
+        """The clause on another pose at which the loops close; nothing where none is found.
+
+        Of some poses that whose ways to close stay furthest from dead points.
+        """
+        best, text = RANK, ""
+        varied = [v for v in self.used if v < len(self.q)]
+        turning = np.array(self.case.coordinate_units)[varied] == "rad"
+        for share in 2.0 * kronecker(32, max(len(varied), 1))[:, : len(varied)] - 1.0:
+            q = self.q.copy()
+            # by tens of degrees; what slides by millimetres to metres
+            steps = np.where(turning, np.radians(10.0) * np.round(18.0 * share), np.pi * share**3)
+            q[varied] += np.where(turning, steps, np.round(steps, 2))
+            other = replace(self, q=q)
+            ways = [*other._solutions(self._starts)]
+            if not ways or not all(other._is_determined(p) and not other._held(p) for p in ways):
+                continue
+            s = np.linalg.svd(other._equations(np.array(ways))[2], compute_uv=False)
+            if (least := float((s[:, -1] / s[:, 0]).min())) > best:
+                best, many = least, f"in {len(ways)} ways" if len(ways) > 1 else "so"
+                text = f". Put them together where they close {many}: {other._ways(ways)}"
+        return text
+
+    def _held(self, p0: Floats) -> str:
+        """The first argument that cannot change, "" for none: ∂F/∂p ṗ = −∂F/∂a has no solution."""
         J, n = self._equations(p0[None])[2][0], len(self.a0)
         steps = self.a0[:, None] + CHANGE * np.hstack([np.eye(n), -np.eye(n)])
         F = self.function.equations(steps, np.repeat(p0[:, None], 2 * n, axis=1))[0]
@@ -312,12 +373,8 @@ class _Branches:
         for k, v in enumerate(self.used):
             held = v < len(moves) and moves[v] == "locked"  # the only pose it has is then enough
             if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
-                raise MechanismError(
-                    "coordinates" if v < len(moves) else "design",
-                    f"{self.function.names[k]} cannot change at {self._at}: the loops hold it, as "
-                    "a structure or at a dead point. Give a joint another freedom, lock the "
-                    "coordinate, or choose another pose with mechanism.assembly.at",
-                )
+                return self.function.names[k]
+        return ""
 
     def _unclosable(self) -> str:
         """The sentence on loops that do not close: too many conditions, or too little length.
@@ -331,10 +388,10 @@ class _Branches:
         nearest = p[[int(np.nanargmin(self._missed(p)))]]
         left = _gap(self._equations(nearest)[0], len(DOFS[self.case.mechanism.space]))
         if met == n:
+            instead = self._elsewhere() or ". Correct lengths and positions"
             return (
                 f"{message}: links do not reach, or lie beyond a dead point; the nearest pose "
-                f"found leaves {_spelt(left)}. Correct lengths and positions, or write a pose that "
-                "exists: mechanism.assembly: {at: {coordinate: value}}"
+                f"found leaves {_spelt(left)}{instead}"
             )
         joints = ", ".join(dict.fromkeys(f.joint for f in self.tree.passive))
         # rounded dimensions of a loop with passive joints leave less than 1e-3 m and rad
@@ -352,25 +409,22 @@ class _Branches:
 
     @property
     def _at(self) -> str:
-        pairs = zip(self.function.names, self.a0, strict=True)
-        return ", ".join(f"{name} = {value:.6g}" for name, value in pairs) or "its only pose"
+        units = [*self.case.coordinate_units, *[""] * len(self.parameters.varied)]
+        values = zip(self.function.names, self.used, self.a0, strict=True)
+        return ", ".join(f"{n} = {written(a, units[v])}" for n, v, a in values) or "its only pose"
 
-    def _ambiguous(self, found: Floats) -> str:
-        """The sentence that lists all branches, each as it is to be given."""
-        listed = " | ".join(_as_guess(self.tree, p) for p in found)
-        poses = zip(self.case.coordinates, reference_coordinates(self.case), strict=True)
-        at = ", ".join(f"{name}: {value:.6g}" for name, value in poses)
-        return (
-            f"the loops close in {len(found)} ways at {self._at}: {listed}; choose one with "
-            f"mechanism.assembly: {{at: {{{at}}}, guess: {_as_guess(self.tree, found[0])}}} "
-            "(rad, m)"
-        )
+    def _ways(self, ways: Sequence[Floats]) -> str:
+        """Branches as guesses, eight at most, and the first with all that is to be written."""
+        listed = [_as_guess(self.case, self.tree, p) for p in ways[:8]] + ["…"] * (len(ways) > 8)
+        choice = f"mechanism.assembly: {as_assembly(self.case, self.tree, self.q, ways[0])}"
+        return f"{' | '.join(listed)}; choose one with {choice}" if ways[1:] else choice
 
 
-def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
-    """z where the branch is chosen, properties as written."""
+def reference(case: CaseFile, parameters: ModelParameters, q: Floats | None = None) -> Floats:
+    """z at q, by default where the branch is chosen, properties as written."""
+    at = reference_coordinates(case) if q is None else q
     written = (written_loads(case), initial_design(case))
-    return parameters.z(np.concatenate([reference_coordinates(case), *written])[None])[:, 0]
+    return parameters.z(np.concatenate([at, *written])[None])[:, 0]
 
 
 def reference_coordinates(case: CaseFile) -> Floats:
@@ -417,10 +471,31 @@ def wrapped(angles: Floats) -> Floats:
     return np.asarray(np.mod(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 
-def _as_guess(tree: Topology, p: Floats) -> str:
+def _unit(case: CaseFile, freedom: Freedom) -> str:
+    """rad of a freedom that turns, m of one that slides."""
+    known = FREEDOMS[case.mechanism.joints[freedom.joint].type]
+    return "m" if known[freedom.component] == "translation" else "rad"
+
+
+def written(value: float, unit: str, digits: int = 6) -> str:
+    """A number as people read and write it: angles in degrees, and round-off as 0."""
+    size = np.degrees(value) if unit == "rad" else value
+    size = 0.0 if abs(size) < 1e-9 else size
+    return f"{size:.{digits}g} {'deg' if unit == 'rad' else unit}".rstrip()
+
+
+def as_assembly(case: CaseFile, tree: Topology, q: Floats, p: Floats) -> str:
+    """The key `assembly` for passive freedoms p at coordinates q, as a case would have it."""
+    named = zip(case.coordinates, q, case.coordinate_units, strict=True)
+    at = ", ".join(f"{name}: {written(value, unit)}" for name, value, unit in named)
+    return f"{{at: {{{at}}}, guess: {_as_guess(case, tree, p)}}}"
+
+
+def _as_guess(case: CaseFile, tree: Topology, p: Floats) -> str:
     """One solution as the guess that leads to it: a list for a joint with several freedoms."""
     values: dict[str, list[str]] = {}
     for freedom, value in zip(tree.passive, p, strict=True):
-        values.setdefault(freedom.joint, []).append(f"{value:.4g}")
+        text = written(value, _unit(case, freedom), 4)
+        values.setdefault(freedom.joint, []).append(text)
     several = {j: v[0] if len(v) == 1 else f"[{', '.join(v)}]" for j, v in values.items()}
     return "{" + ", ".join(f"{joint}: {value}" for joint, value in several.items()) + "}"
