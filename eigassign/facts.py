@@ -8,7 +8,7 @@ the JSON Schema of these are walks over facts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from itertools import chain
@@ -139,11 +139,6 @@ def verdict_word(word: str) -> str:
 def number(value: float) -> str:
     """Four significant digits: ``0.2287``, and 15430 rather than 1.543e+04; no sign on a zero."""
     return f"{float(f'{value:.4g}') + 0.0:.7g}"
-
-
-def listed(amounts: Mapping[str, float]) -> str:
-    """``a: 0.2287, b: 2``."""
-    return ", ".join(f"{name}: {number(value)}" for name, value in amounts.items())
 
 
 def percent(fraction: float) -> str:

@@ -51,6 +51,7 @@ from eigassign.case.rules.consistency import (
 from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, implausible
 from eigassign.case.rules.properties import (
     below,
+    coordinate_lists,
     is_place,
     known_property,
     properties_of,
@@ -77,6 +78,7 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
+from eigassign.case.units import SI
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
 
@@ -224,17 +226,40 @@ class CaseFile:
         if problems:
             raise CaseError(problems)
 
-    @property
+    @cached_property
     def coordinate_units(self) -> tuple[str, ...]:
-        """SI unit of each coordinate, in the order of q: rad, or m where its joint slides."""
+        """SI unit of each coordinate, in the order of q: rad, or m where its joint slides.
+
+        Answered as poses are written, of the trajectory first.
+        """
         joints = self.mechanism.joints
+        written = zip(*(row for _, row in coordinate_lists(self)), strict=True)
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
-        return tuple("m" if freedom == "translation" else "rad" for freedom in moved)
+        units = ("m" if freedom == "translation" else "rad" for freedom in moved)
+        return tuple(self._unit(u, *next(written, ())) for u in units)
+
+    def _unit(self, unit: str, *given: object) -> SI:
+        """SI ``unit`` of what is written as ``given``; the file may have degrees elsewhere."""
+        return SI(unit, *given, "deg" * (unit == "rad" and self.in_degrees))
+
+    @property
+    def mass_unit(self) -> str:
+        """Kilograms, as the mass of the whole is limited."""
+        mass = self.design.mass
+        return SI("kg", mass and mass.min, mass and mass.max, "kg")
+
+    def constraint_unit(self, name: str) -> str:
+        """SI unit of a constraint of the design; empty where its terms have several."""
+        given, own = self.design.constraints[name], [*self.design.parameters]
+        first, *more = (self.design_units[own.index(p)] for p, c in given.terms.items() if c)
+        return "" if {*more} - {first} else SI(str(first), given.min, given.max, first)
 
     @property
     def drive_units(self) -> tuple[str, ...]:
         """SI unit of what the drive of each coordinate exerts: N m, or N where its joint slides."""
-        return tuple("N" if unit == "m" else "N m" for unit in self.coordinate_units)
+        limits = (getattr(self.design.torque.get(name), "max", None) for name in self.coordinates)
+        pairs = zip(self.coordinate_units, limits, strict=True)
+        return tuple(SI("N" if unit == "m" else "N m", limit) for unit, limit in pairs)
 
     @cached_property
     def design_quantities(self) -> tuple[Quantity, ...]:
@@ -248,7 +273,11 @@ class CaseFile:
     @property
     def design_units(self) -> tuple[str, ...]:
         """SI unit of each design parameter, in the order of y; empty for a plain number."""
-        return _units(self.design_quantities)
+        columns = self.design.parameters.values()
+        return tuple(
+            self._unit(unit, column.min, column.max, self.value_at(column.parameter))
+            for unit, column in zip(_units(self.design_quantities), columns, strict=True)
+        )
 
     @cached_property
     def loads(self) -> Mapping[str, Load]:
@@ -262,8 +291,10 @@ class CaseFile:
         found = {}
         for path, unit in zip(paths, _units(self.quantities(paths)), strict=True):
             own = 0.0 if path in of_design else self.value_at(path)
-            values = (each.get(path, own) for each in sets)
+            values = [each.get(path, own) for each in sets]
             along = tuple(own + v.add if isinstance(v, Added) else float(v) for v in values)
+            written = (v.add if isinstance(v, Added) else v for v in values)
+            unit = self._unit(unit, *written, self.value_at(path))
             found[f"{path}.add" if path in of_design else path] = Load(path, own, along, unit)
         return found
 
@@ -358,8 +389,7 @@ class CaseFile:
 
 def _units(quantities: Iterable[Quantity]) -> tuple[str, ...]:
     """SI units; empty for a plain number."""
-    dimensions = (quantity.dimension for quantity in quantities)
-    return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)
+    return tuple(each.dimension.si if each.dimension else "" for each in quantities)
 
 
 NO_VALUES: Mapping[str, object] = FrozenDict()

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from eigassign.case.reader import NUMBER, shown, suggestion
 
+SHOWN = 8  # values of a pose or design that are named
 Exponents = tuple[int, ...]  # of kg, m, s, rad, cycle
 
 
@@ -122,30 +124,74 @@ _HANDY = {  # units that people read, the largest first
 }
 
 
-def handy_unit(unit: str, *values: float) -> tuple[str, float]:
-    """The largest unit that makes the largest of ``values`` (in SI ``unit``) at least 1, in SI.
+class Given(float):
+    """A number in SI with the ``text`` that gives it in the case file."""
 
-    The smallest one if none does; where there is nothing but zeros, ``unit`` itself.
+    __slots__ = ("text",)
+    text: str | float
+
+    def __new__(cls, value: float, text: str | float = math.nan) -> Self:
+        """``value`` in SI, written as ``text``."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+
+class SI(str):
+    """The SI unit of a quantity, and the one that its amounts are ``answered`` in.
+
+    That is its own, else the first that ``given`` have: numbers of the case file, other units, the
+    name of one. Without any it is a handy one, by the amount.
     """
+
+    __slots__ = ("answered",)
+    answered: str
+
+    def __new__(cls, unit: str, *given: object) -> Self:
+        """SI ``unit`` of what is answered as one of ``given`` is written."""
+        self = super().__new__(cls, unit)
+        own = getattr(unit, "answered", "")
+        self.answered = next(filter(None, (own, *map(_unit_of, given))), "")
+        return self
+
+
+def _unit_of(given: object) -> str:
+    if isinstance(given, Given):
+        return _split(given.text, None)[1] if isinstance(given.text, str) else ""
+    return getattr(given, "answered", given if isinstance(given, str) else "")
+
+
+def handy_unit(unit: str, *values: float) -> tuple[str, float]:
+    """The unit that amounts in SI ``unit`` are answered in, and its size in SI.
+
+    Else the largest that makes the largest of ``values`` at least 1, or the smallest if none does;
+    where there is nothing but zeros, ``unit`` itself.
+    """
+    if answered := getattr(unit, "answered", ""):
+        return answered, parse_unit(answered).to_si(1.0)
     most = max((abs(value) for value in values), default=0.0)
     units = _HANDY.get(unit, {unit: 1.0}) if most else {unit: 1.0}
     return next(((n, size) for n, size in units.items() if most >= size), [*units.items()][-1])
 
 
-def limit_unit(unit: str, *values: float) -> tuple[str, float]:
-    """The unit that limits are said in: kg and degrees always, else the handy one."""
-    return angle_unit(unit, True) if unit in ("kg", "rad") else handy_unit(unit, *values)
+def handy(amount: float, unit: str, digits: int = 3) -> str:
+    """An amount in SI ``unit``, in the unit that it is answered in: ``2 kN m/rad``, ``35 mm``."""
+    name, size = handy_unit(SI(unit, amount), amount)
+    return f"{float(f'{amount / size:.{digits}g}'):.12g} {name}".rstrip()  # 1000, not 1e+03
 
 
-def angle_unit(unit: str, in_degrees: bool) -> tuple[str, float]:
-    """``unit`` and 1, but of angles degrees, and their size in rad, where a case has these."""
-    return ("deg", math.pi / 180.0) if unit == "rad" and in_degrees else (unit, 1.0)
+def written(amount: float, unit: str = "", *others: float) -> str:
+    """An amount in the unit that the file has for it, or for ``others``; else in SI ``unit``."""
+    name, size = handy_unit(SI(unit, amount, *others))
+    return f"{amount / size:.12g} {name}".rstrip()
 
 
-def handy(amount: float, unit: str) -> str:
-    """An amount in SI ``unit`` to three digits, in its handy unit: ``2 kN m/rad``."""
-    name, size = handy_unit(unit, amount)
-    return f"{float(f'{amount / size:.3g}'):g} {name}".rstrip()  # 1000, not 1e+03
+def shown_point(names: Iterable[str], values: Iterable[float], units: Iterable[str]) -> str:
+    """``"q1 = 1.817 rad, q2 = 5.312 rad"``; of many the first."""
+    each = zip(names, values, units, strict=False)
+    shown = [f"{name} = {handy(value, unit, 6)}" for name, value, unit in each]
+    rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
+    return (", ".join(shown[:SHOWN]) or "none") + rest
 
 
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}

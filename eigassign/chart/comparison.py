@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from eigassign._version import __version__
+from eigassign.case.units import shown_point
 from eigassign.chart.methods import NO_KRIGING, Built, Method, list_meshes, list_methods
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
@@ -49,7 +50,6 @@ from eigassign.modal.exact.tracking import (
     places,
 )
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.planning import shown_point
 
 Floats = NDArray[np.float64]
 LEAST_S = 1e-3  # a timed run takes at least so long: a thousand times what the clock resolves
@@ -399,7 +399,7 @@ def find_failures(
             continue
         file, model = subject.file, subject.model
         labels, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
-        where = shown_point(labels, one.x, units, file.in_degrees)
+        where = shown_point(labels, one.x, units)
         more = {} if series else {"why": "no series is off by more than is wanted"}
         yield finding(one.kind, where, series, modes=modes, gap=one.gap, **more)
         if kinked:

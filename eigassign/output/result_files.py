@@ -1,7 +1,8 @@
 """Every sample of a run as CSV.
 
-trajectory.csv is what `trajectory: {file: …}` reads. Numbers are written as ``repr`` writes them,
-so that they read back to the last bit; one that an expansion could not give is left empty.
+trajectory.csv is what `trajectory: {file: …}` reads. Units are those of the case file, else SI.
+Numbers are written as ``repr`` writes them, so that in SI they read back to the last bit; one that
+an expansion could not give is left empty.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ import csv
 import io
 import math
 from collections.abc import Iterator, Sequence
-from itertools import count
+from itertools import count, repeat
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.units import handy_unit
 from eigassign.mechanism.trajectory.trajectory import TIME, TIP_COLUMNS
 from eigassign.study.results import RunResults, StaticRow, TargetStudy, TrajectoryRow
 
@@ -40,12 +42,11 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
 
 
 def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
-    """Time, coordinates and, where the case gives its path, the tip of one trajectory; SI."""
+    """Time, coordinates and, where the case gives its path, the tip of one trajectory."""
     columns = [*_motion(results, row.rows)]
     if row.tip is not None:
         names = TIP_COLUMNS[: row.tip.shape[1]]
-        places = zip(names, row.tip.T, strict=True)
-        columns += [(f"{name} [m]", place.tolist()) for name, place in places]
+        columns += map(_column, names, repeat(row.tip_unit), row.tip.T)
     return csv_text(columns)
 
 
@@ -69,13 +70,18 @@ def _both(rows: Sequence[StaticRow]) -> Iterator[Column]:
     """What drives exert, or stiffnesses, compliances and sags, before and after."""
     for row in rows:
         for when, curve in (("initial", row.initial_curve), ("exact", row.optimal_curve)):
-            yield f"{row.name}{row.quantity} {when} [{row.unit}]", curve.tolist()
+            yield _column(f"{row.name}{row.quantity} {when}", row.unit, curve)
+
+
+def _column(name: str, unit: str, values: Floats) -> Column:
+    """The values, SI, in what their unit is answered in, else in SI."""
+    answered, size = handy_unit(unit)
+    return f"{name} [{answered}]", (values / size).tolist()
 
 
 def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
     yield f"{TIME} [s]", results.time_s[rows].tolist()
-    for i, (name, unit) in enumerate(zip(results.q_names, results.q_units, strict=True)):
-        yield f"{name} [{unit}]", results.q[rows, i].tolist()
+    yield from map(_column, results.q_names, results.q_units, results.q[rows].T)
 
 
 def _assigned(results: RunResults) -> Iterator[Column]:

@@ -249,8 +249,8 @@ def _depends(results: RunResults) -> Iterator[Table]:
     found = results.meaning
     caption = "How the exact frequency rises at the answer with one unit more of the parameter, "
     caption += "and in % with 1 % more: means over the samples."
-    names = "parameter label hz_per_unit percent_per_percent percent_per_percent_largest"
-    headings = {"hz_per_unit": "Hz per SI unit", "percent_per_percent": "% per %"}
+    names = "parameter label slope percent_per_percent percent_per_percent_largest"
+    headings = {"slope": "Hz per unit", "percent_per_percent": "% per %"}
     headings["percent_per_percent_largest"] = "% per % at most"
     yield facts_table("Sensitivity", found.sensitivity, names, caption, **headings)
     yield facts_table("Limits", found.relaxed, "words")

@@ -20,7 +20,7 @@ from eigassign.assignment.requirements.sampling import (
 )
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.parts import Quantity, quantity
-from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
+from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, handy, is_bare, shown_point
 from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.facts import Fact, Hertz, Key, Share
 from eigassign.files import quoted
@@ -43,7 +43,7 @@ from eigassign.study.checks import (
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off
 from eigassign.study.meaning import levers
-from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
+from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import LeverRow, WeightRow
 from eigassign.study.scene import Scene
 from eigassign.study.updating.measured import read_measurements
@@ -158,8 +158,8 @@ def _beyond_bounds(case: BuiltCase, y: Floats) -> Iterator[str]:
     for (name, column), unit, value in zip(columns, units, y, strict=True):
         slack = 1e-9 * max(abs(column.min), abs(column.max))
         if not column.min - slack <= value <= column.max + slack:
-            bounds = f"{column.min:g} to {column.max:g} {unit}"
-            yield f"{name} = {value:g} {unit} is outside its bounds, {bounds}"
+            low, high = (handy(each, unit, 6) for each in (column.min, column.max))
+            yield f"{name} = {handy(value, unit, 6)} is outside its bounds, {low} to {high}"
 
 
 def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
@@ -177,7 +177,7 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         hz.tolist(),
         tuple(zip(model.q_names, q.tolist(), strict=True)),
         tuple(zip(model.y_names, y.tolist(), strict=True)),
-        ", ".join(shown_point(*point, file.in_degrees) for point in named if point[0]),
+        ", ".join(shown_point(*point) for point in named if point[0]),
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
         None if coarse is None else coarse.tolist(),
         None if lost is None else lost.tolist(),

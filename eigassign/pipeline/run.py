@@ -18,8 +18,8 @@ from eigassign.assignment.one_shot import Assignment
 from eigassign.assignment.requirements.sampling import with_instants
 from eigassign.brief import counted
 from eigassign.case.reader import shown
+from eigassign.case.units import handy
 from eigassign.errors import EigassignError
-from eigassign.facts import number
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
 from eigassign.output.reports.notebook import Pictured, html
@@ -96,7 +96,7 @@ class Result(Pictured):
 
     def __repr__(self) -> str:
         rows = self.results.design
-        design = ", ".join(f"{r.name} = {number(r.optimal)} {r.unit}".rstrip() for r in rows)
+        design = ", ".join(f"{r.name} = {handy(r.optimal, r.unit, 4)}" for r in rows)
         return f"<Result: {design}. {tables.headline(self.results)}>"
 
     def _repr_html_(self) -> str:

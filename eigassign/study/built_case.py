@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile, from_mapping, load
 from eigassign.case.schema.trajectory import TrajectoryForm
+from eigassign.case.units import handy
 from eigassign.errors import (
     AccuracyError,
     CaseError,
@@ -148,7 +149,7 @@ def _loaded(file: CaseFile, model: Model, k: int) -> Trajectory:
     found = _followed(file, model, keys, path, loads)
     if not len(loads):
         return found
-    said = [f"{name} = {load.along[k]:.6g} {load.unit}" for name, load in file.loads.items()]
+    said = [f"{name} = {handy(load.along[k], load.unit, 6)}" for name, load in file.loads.items()]
     return replace(found.joined(loads), notes=(*said, *found.notes))
 
 

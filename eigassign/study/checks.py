@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.units import handy
 from eigassign.errors import EigassignError
 from eigassign.facts import about
 from eigassign.mechanism.assembly.dynamics.velocity_terms import placeless, velocity_terms
@@ -289,7 +290,7 @@ def _advice(file: CaseFile) -> str:
 def _of_whole(row: WeightRow) -> Iterator[str]:
     """Say of stated gravity what sags most, and how near it is to buckling."""
     if row.sag:
-        yield f"{row.sag[0].node} sags by {row.sag[0].most:.3g} m under the weight"
+        yield f"{row.sag[0].node} sags by {handy(row.sag[0].most, 'm')} under the weight"
     if row.buckling is not None:
         yield _share(row.buckling)
     if row.struts is not None:

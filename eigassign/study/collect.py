@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
+from eigassign.case.units import SI, handy_unit
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks import Accuracy, MotionStudy, study_motion
@@ -80,7 +82,6 @@ def collect_results(
     return RunResults(
         case=CaseRow.of(file),
         given=given(file, trajectory),
-        in_degrees=file.in_degrees,
         reduced=scene.model.is_reduced,
         q_names=tuple(file.coordinates),
         q_units=file.coordinate_units,
@@ -118,7 +119,9 @@ def _answer(
         "solver": None if answer.one_shot is None else solver_row(answer.one_shot),
         "assignment": row,
         "meaning": assigned.meaning,
-        "mass": MassRow(mass(scene.initial), mass(answer.y), *asked, name),
+        "mass": MassRow(
+            *(mass(scene.initial), mass(answer.y), *asked, name), handy_unit(scene.file.mass_unit)
+        ),
         "drives": _drives(scene, answer.y),
         "statics": tuple(_statics(scene, answer.y)),
     }
@@ -174,6 +177,7 @@ def _trajectories(
 ) -> Iterator[TrajectoryRow]:
     parts = () if path is None else zip(path.parts, path.rows, strict=True)
     for k, (part, rows) in enumerate(parts):
+        places = getattr(file.trajectories[k][2], "waypoints", ())
         along = [one for target in counted_of(targets) for one in target.along]
         errors = [(one.error, 1.0) for one in along if one.name == part.name]
         yield TrajectoryRow(
@@ -182,6 +186,7 @@ def _trajectories(
             duration_s=float(np.ptp(part.trajectory.time_s)),
             weight=part.weight,
             tip=part.trajectory.tip,
+            tip_unit=SI("m", *chain.from_iterable(places)),
             loads={path: load.along[k] for path, load in file.loads.items()} or None,
             error=over_all(errors) if errors else None,
         )

@@ -67,7 +67,7 @@ def _drives(file: CaseFile) -> Iterator[str]:
         coordinate = file.coordinates[name]
         stiffness = getattr(coordinate.drive, "stiffness", None)
         per = "N m/rad" if unit == "rad" else "N/m"
-        said = coordinate.moves if stiffness is None else handy(stiffness, per)
+        said = coordinate.moves if stiffness is None else handy(stiffness, per, 4)
         alike.setdefault(said, []).append(name)
     return (f"{', '.join(names)} {said}" for said, names in alike.items())
 

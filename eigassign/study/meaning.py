@@ -35,7 +35,7 @@ from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.kinds import AssignedFrequency, Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import handy
+from eigassign.case.units import handy, handy_unit
 from eigassign.errors import EigassignError
 from eigassign.modal.model import Model
 from eigassign.study.built_case import build_model
@@ -235,6 +235,7 @@ def sensitivities(
             yield SensitivityRow(
                 parameter=name,
                 unit=file.design_units[k],
+                handy=handy_unit(file.design_units[k], float(y[k])),
                 label=own.label,
                 hz_per_unit=float(of_f.mean()),
                 hz_per_unit_largest=_largest(of_f),
@@ -287,9 +288,11 @@ def relaxed_limits(
             continue
         amount, unit = _amount(file, problem, row)
         while row.multiplier * amount > MOST * abs(F) > 0.0:
-            amount = _rounded(0.5 * amount)
+            amount = _rounded(0.5 * amount, unit)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
-        change = f"{before:.4g} → {after:.4g}{' kg' * (kind == 'mass')}"
+        change = f"{before:.4g} → {after:.4g}"
+        if kind == "mass":
+            change = " → ".join(handy(each, file.mass_unit, 4) for each in (before, after))
         if kind.endswith("error") or kind == "room":
             change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
         yield RelaxedRow(
@@ -309,18 +312,20 @@ def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> boo
 def _amount(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> tuple[float, str]:
     if row.kind == "bound":
         k = list(file.design.parameters).index(row.name)
-        return _rounded(STEP * float(problem.upper[k] - problem.lower[k])), file.design_units[k]
+        unit = file.design_units[k]
+        return _rounded(STEP * float(problem.upper[k] - problem.lower[k]), unit), unit
     if row.kind == "constraint":
         (terms,) = (one.coefficients for one in problem.constraints if one.name == row.name)
         span = float(np.abs(terms) @ (problem.upper - problem.lower))
-        units = {file.design_units[k] for k in np.flatnonzero(terms)}
-        return _rounded(STEP * span), units.pop() if len(units) == 1 else "(SI)"
+        unit = file.constraint_unit(row.name)
+        return _rounded(STEP * span, unit), unit
     return 0.01, ""
 
 
-def _rounded(value: float) -> float:
-    """``value`` to one digit; 1 where there is nothing to round."""
-    return float(f"{value:.0e}") if value > 0.0 else 1.0
+def _rounded(value: float, unit: str) -> float:
+    """``value`` to one digit of what its SI ``unit`` is answered in; 1 if there is nothing."""
+    size = handy_unit(unit, value)[1]
+    return float(f"{value / size:.0e}") * size if value > 0.0 else size
 
 
 def _room(variant: PosedProblem, row: ActiveLimit, amount: float, unit: str) -> str:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import RIDING, SLIDING
+from eigassign.case.units import shown_point
 from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import mounting, multiply, sliding_axis
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type
@@ -26,7 +27,6 @@ from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName,
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model, ModeShapes
-from eigassign.study.planning import shown_point
 from eigassign.study.results import (
     DrawnBody,
     DrawnJoint,
@@ -85,7 +85,7 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
         title=file.title,
         rigid_modes=model.n_rigid,
         frequencies_hz=tuple(float(hz) for hz in shapes.frequencies),
-        where=shown_point(names, x[0], units, file.in_degrees),
+        where=shown_point(names, x[0], units),
         amplitude=AMPLITUDE,
         rest=displaced(file, model, x, [shapes], np.zeros((1, count))),
         deformed=displaced(file, model, np.repeat(x, count, 0), [shapes] * count, np.diag(scales)),

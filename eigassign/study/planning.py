@@ -7,8 +7,7 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from itertools import chain, repeat
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import angle_unit, handy_unit
+from eigassign.case.units import shown_point
 from eigassign.errors import (
     CaseError,
     EigassignError,
@@ -38,7 +37,6 @@ Ints = NDArray[np.intp]
 
 # --- The expansion of a case: point, design, order and modes
 
-SHOWN = 8  # values of a point that a note names
 MANY_SAMPLES = 500  # up to which the distance to every other sample counts for the most central
 
 
@@ -103,7 +101,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     if given != "auto":
         q0 = with_middle_loads(file, given)
         why = f"from the case file{of_loads}"
-        point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
+        point = shown_point(model.q_names, q0, file.q_units)
         return q0, f"expansion point: {point}, {why}"
     if trajectory is None:
         if n == 0:
@@ -114,7 +112,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     poses[:, n:] = 0.0
     k = central_sample(poses @ joint_map(model).T)
     q0 = with_middle_loads(file, trajectory.q[k, :n])
-    point = shown_point(model.q_names, q0, file.q_units, file.in_degrees)
+    point = shown_point(model.q_names, q0, file.q_units)
     why = f"the middle of the motion{of_loads}"
     return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
 
@@ -163,7 +161,7 @@ def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
 
 
 def _design(file: CaseFile, model: Model, y0: Floats) -> str:
-    return f"expansion design: {shown_point(model.y_names, y0, file.design_units, file.in_degrees)}"
+    return f"expansion design: {shown_point(model.y_names, y0, file.design_units)}"
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
@@ -192,18 +190,6 @@ def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
             where = places.get(mode, "expansion.modes")
             message = f"there is no mode {mode}: with these elements the model has {available}"
             raise _wrong(file, where, message)
-
-
-def shown_point(
-    names: Sequence[str], values: Floats, units: Iterable[str] = (), in_degrees: bool = False
-) -> str:
-    """``"q1 = 1.817 rad, q2 = 5.312 rad"``, with units where they are given; of many the first."""
-    shown = []
-    for name, value, si in zip(names, values, chain(units, repeat("")), strict=False):
-        unit, size = angle_unit(si, in_degrees) if si == "rad" else handy_unit(si, value)
-        shown.append(f"{name} = {value / size:.6g} {unit}".rstrip())
-    rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
-    return (", ".join(shown[:SHOWN]) or "none") + rest
 
 
 def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:

@@ -23,7 +23,7 @@ from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import angle_unit, handy, handy_unit, is_bare, limit_unit
+from eigassign.case.units import handy, handy_unit, is_bare
 from eigassign.facts import (
     OF_ROW,
     Curve,
@@ -172,14 +172,11 @@ class DesignRow:
     choice: Annotated[str | None, Fact("name or value chosen of its catalogue")] = None
     price: Annotated[float | None, Fact("of one SI unit")] = None
     choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
-    in_degrees: Unwritten[bool] = False  # people read angles so
     lies_on: Unwritten[str] = ""  # which of its bounds
 
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
         """The unit that people read it in, and the size of that in SI."""
-        if self.unit == "rad":
-            return angle_unit(self.unit, self.in_degrees)
         return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 
     def place(self, value: float) -> float:
@@ -213,8 +210,8 @@ class MassRow:
     upper: Kilograms | None
     price: Annotated[float | None, Fact("of one kg")] = None
     name: Key = "mass"
+    handy: Unwritten[tuple[str, float]] = ("kg", 1.0)  # as of a design parameter
     parameter = "of all links and bodies"
-    handy = ("kg", 1.0)
     lies_on = chosen = ""
 
     @property
@@ -470,7 +467,7 @@ class LimitRow:
     def said(self, amount: float) -> str:
         """An amount with the unit that the limit is said in: masses are in kg."""
         edges = [edge for edge in (self.lower, self.upper) if edge is not None]
-        unit, size = limit_unit(self.unit, *edges)
+        unit, size = handy_unit(self.unit, *edges)
         return f"{number(amount / size)} {unit}".rstrip()
 
 
@@ -563,7 +560,7 @@ class AimRow:
     def _said(self, value: float) -> str:
         """A mass rounded to four digits; frequencies and room, which are at least that, down."""
         if self.unit == "kg":
-            return f"{value:.4g} kg"
+            return handy(value, self.unit, 4)
         down = float(_DOWN.create_decimal(value))
         if self.unit:
             return f"{down:g} {self.unit}"
@@ -593,7 +590,7 @@ class RobustTarget:
     @property
     def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
         """The unit that people read both in, and the size of that in SI."""
-        return limit_unit(self.unit, self.nominal, self.robust)
+        return handy_unit(self.unit, self.nominal, self.robust)
 
     @property
     def most(self) -> float:
@@ -691,10 +688,17 @@ class SensitivityRow:
     parameter: str
     unit: Annotated[str, Fact("of the parameter")]
     label: Annotated[str, Fact("the target in words", "target")]
-    hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit", digits=".3g")]
+    handy: Unwritten[tuple[str, float]]  # its unit that people read, and the size of that in SI
+    hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit")]
     hz_per_unit_largest: Annotated[float, Fact(unit="Hz per SI unit")]
     percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
     percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]
+
+    @property
+    def slope(self) -> Annotated[str, Fact(heading="mean")]:
+        """``0.0123 Hz per mm``."""
+        unit, size = self.handy
+        return f"{self.hz_per_unit * size:.3g} Hz per {unit or 1}"
 
 
 @dataclass(frozen=True)
@@ -862,6 +866,7 @@ class TrajectoryRow(Brief):
     duration_s: Seconds
     weight: float
     tip: Unwritten[Floats | None]
+    tip_unit: Unwritten[str]
     loads: Annotated[
         Mapping[str, float] | None, Fact("properties that it sets, SI", name="set", optional=True)
     ] = None
@@ -985,7 +990,6 @@ class RunResults(Origin):
     q: Unwritten[Floats]  # (n_t, n_q), of several trajectories one after the other
     poses: Unwritten[DrawnPoses]
     reduced: Unwritten[bool] = False  # links are
-    in_degrees: Unwritten[bool] = False  # people read angles so
     given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
     spectrum: Unwritten[tuple[ModeRow, ...]] = ()  # up to the mode above the highest asked for
     only: Unwritten[str | None] = None  # of several trajectories the one that these are of

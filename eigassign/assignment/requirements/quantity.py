@@ -26,7 +26,7 @@ from eigassign.assignment.requirements.requirement import (
 )
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import PushedNode, StaticTarget
-from eigassign.case.units import handy, limit_unit
+from eigassign.case.units import SI, handy
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -128,15 +128,18 @@ class LimitedQuantity(Requirement):
     def stated(self, y: Floats, extreme: float | None) -> str:
         """``mass 5.47 kg, at most 3 kg``, and where given what the most extreme design has."""
         where = "" if self.row_place is None else f" at {self.row_place(y, self.worst(y)[0])}"
-        words = f"{self.noun} {said(self.amount(y), self.unit)}{where}, {self._asked}"
+        words = f"{self.noun} {handy(self.amount(y), self.unit, 4)}{where}, {self._asked}"
         if extreme is None:
             return words
-        return f"{words}; {self.extreme[int(extreme < self.allowed[0])]} {said(extreme, self.unit)}"
+        most = self.extreme[int(extreme < self.allowed[0])]
+        return f"{words}; {most} {handy(extreme, self.unit, 4)}"
 
     @property
     def _asked(self) -> str:
         limits = zip(("at least", "at most"), self.allowed, strict=True)
-        words = (f"{word} {said(edge, self.unit)}" for word, edge in limits if np.isfinite(edge))
+        words = (
+            f"{word} {handy(edge, self.unit, 4)}" for word, edge in limits if np.isfinite(edge)
+        )
         return " and ".join(words)
 
     @property
@@ -151,12 +154,6 @@ class LimitedQuantity(Requirement):
         (low, high), is_less = self.allowed, side == "lower" and np.isfinite(self.allowed[0])
         edge, more = (low, "less") if is_less else (high, "more")
         return f"{handy(share * edge, self.unit)} {more} {self.noun}"
-
-
-def said(amount: float, unit: str) -> str:
-    """An amount in SI ``unit`` to four digits."""
-    name, size = limit_unit(unit, amount)
-    return f"{amount / size:.4g} {name}".rstrip()
 
 
 def limit_between(
@@ -178,7 +175,7 @@ def quantity_limits(
         yield limit_between(
             *(mass.min, mass.max, model.total_mass, key, key),
             noun="mass",
-            unit="kg",
+            unit=file.mass_unit,
             extreme=("the lightest design has", "the heaviest design has"),
             is_affine=model.total_mass.is_affine,
         )
@@ -186,11 +183,10 @@ def quantity_limits(
         yield from _drive_limits(file, model, path)
     for name, given in file.design.constraints.items():
         factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])
-        units = {unit for c, unit in zip(factors, file.design_units, strict=True) if c}
         yield limit_between(
             *(given.min, given.max, LinearConstraint(name, factors), name),
             f"design.constraints.{name}",
-            unit=units.pop() if len(units) == 1 else "",
+            unit=file.constraint_unit(name),
         )
 
 
@@ -337,11 +333,12 @@ def static_limits(
         if way(initial_design(file))[0].max() <= RIGID:
             message = f"nothing gives way at {place.at} in any pose: all is rigid and locked"
             raise MechanismError(way.place, message)
-        noun, unit, edge = f"{target.kind} of {place.at}{towards}", UNITS[target.kind], target.edge
+        noun, edge = f"{target.kind} of {place.at}{towards}", target.edge
+        unit = SI(UNITS[target.kind], edge)
         is_least = target.limit == "at_least"
         upper = np.full(rows.stop - rows.start, 1.0 / edge if is_least else edge)
         yield StaticLimit(
-            label=f"{noun} {target.limit.replace('_', ' ')} {said(edge, unit)}{where}",
+            label=f"{noun} {target.limit.replace('_', ' ')} {handy(edge, unit, 4)}{where}",
             place=f"targets[{k}]",
             terms=((way, 1.0),),
             rows=rows,

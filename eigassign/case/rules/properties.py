@@ -173,7 +173,8 @@ def value_at(case: Any, path: str) -> float:
     """The number at ``path`` in the parts of a valid case, in SI."""
     owner = case if path.startswith("coordinates.") else case.mechanism
     value = reduce(below, path.split("."), owner)
-    return 0.0 if value is None else float(value)  # it is at its node, and not turned
+    found: float = 0.0 if value is None else value  # it is at its node, and not turned
+    return found
 
 
 def below(part: Any, key: str) -> Any:
@@ -229,9 +230,9 @@ def followed_modes(document: Document) -> list[tuple[KeyPath, FollowedMode]]:
     return [(path, mode) for path, mode in found if isinstance(mode, FollowedMode)]
 
 
-def coordinate_lists(document: Document) -> Iterator[tuple[KeyPath, Sequence[float]]]:
+def coordinate_lists(document: Any) -> Iterator[tuple[KeyPath, Sequence[float]]]:
     """Key path and content of whatever has an entry for each coordinate."""
-    for group in ("expansion", "measurements", "trajectory", "targets"):
+    for group in ("trajectory", "expansion", "measurements", "targets"):
         for path, row in walk(getattr(document, group), (group,)):
             if not isinstance(row, tuple) or any(isinstance(each, tuple) for each in row):
                 continue

@@ -41,6 +41,7 @@ from eigassign.case.units import (
     DIMENSIONS,
     PLAIN,
     Dimension,
+    Given,
     QuantityError,
     read_quantity,
     read_rate,
@@ -168,21 +169,14 @@ def distinct(text: str) -> AfterValidator:
 # --- Quantities
 
 
-class Written(float):
-    """A number in SI whose dimension another key decides, with the ``text`` that gives it.
+class Written(Given):
+    """A number in SI whose dimension another key decides.
 
     It is NaN where it cannot be read, or is beyond a limit. Rules say what is wrong
     with it.
     """
 
-    __slots__ = ("text",)
-    text: str | float
-
-    def __new__(cls, value: float, text: str | float = math.nan) -> Written:
-        """``value`` in SI, written as ``text``."""
-        self = super().__new__(cls, value)
-        self.text = text
-        return self
+    __slots__ = ()
 
 
 @dataclass(frozen=True)
@@ -205,7 +199,7 @@ class Quantity:
 
     def read(self, value: object) -> float:
         """SI value within the limits. Raises QuantityError."""
-        if isinstance(value, Written):
+        if isinstance(value, Given):
             value = value.text
         if self.elsewhere and isinstance(value, (str, int, float)) and not isinstance(value, bool):
             try:
@@ -217,7 +211,8 @@ class Quantity:
             return si if bare else Written(si, value)
         if self.dimension is None and isinstance(value, str):
             raise QuantityError(f"expected a number without unit, got text {shown(value)}")
-        return self.checked(read_quantity(value, self.dimension), value)
+        si = self.checked(read_quantity(value, self.dimension), value)
+        return Given(si, value) if isinstance(value, str) else si
 
     def checked(self, si: float, given: object) -> float:
         """``si`` if it is within the limits. Raises QuantityError.

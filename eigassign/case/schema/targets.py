@@ -401,7 +401,8 @@ class StaticTarget(AnyTarget):
     @property
     def edge(self) -> float:
         """The limit, in SI units."""
-        return float(getattr(self, self.limit))
+        edge: float = getattr(self, self.limit)
+        return edge
 
     @model_validator(mode="before")
     @classmethod

@@ -393,5 +393,6 @@ def _weight(
         swinging=np.flatnonzero(~np.isin(joints, held)),
         names=tuple(names[motion.columns[k]] for k in columns),
         variables=(*parameters.coordinates, *parameters.loads, *parameters.design),
+        units=(*case.q_units, *case.design_units),
         gravity=float(np.linalg.norm(g)),
     )

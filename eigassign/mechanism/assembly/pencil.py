@@ -198,6 +198,7 @@ class Weight:
     swinging: Ints  # places in ``joints`` of those that nothing but the weight holds
     names: tuple[str, ...]  # of ``joints``
     variables: tuple[str, ...]  # the names of x
+    units: tuple[str, ...]  # SI, of x
     gravity: float  # |g| in m/s²
 
 

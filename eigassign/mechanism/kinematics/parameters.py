@@ -24,6 +24,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import limits
 from eigassign.case.schema.links import IMPORTED
 from eigassign.case.schema.mechanism import RIDING
+from eigassign.case.units import SI, handy, shown_point
 from eigassign.errors import TravelError, UsageError
 from eigassign.mechanism.kinematics.joints import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree, coordinates
@@ -246,6 +247,8 @@ class Rails:
     margins: Floats  # (n_riders, 2): of the length, at start and end
     table: CompiledArrays  # station and length of every rider, (n_riders, 2)
     names: tuple[str, ...]  # of the coordinates
+    units: tuple[str, ...]  # SI, of these
+    length_units: tuple[str, ...]  # SI, of the beams' lengths
 
     def require(self, z: Floats, x: Floats, label: Label = "sample {}".format) -> None:
         """Raise TravelError for the first sample at which a rider leaves its range.
@@ -259,12 +262,14 @@ class Rails:
         if outside.any():
             k = int(np.flatnonzero(outside.any(axis=0))[0])
             rider = int(np.flatnonzero(outside[:, k])[0])
-            pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, x[k], strict=False))
-            where = f"in the pose {pose}" + (f" ({label(k)})" if len(x) > 1 else "")
+            where = f"in the pose {shown_point(self.names, x[k], self.units)}"
+            where += f" ({label(k)})" if len(x) > 1 else ""
+            place, *ends = (
+                handy(each[rider, k], self.length_units[rider], 6) for each in (s, low, high)
+            )
             message = (
-                f"stands at {s[rider, k]:.6g} m of {self.links[rider]!r} {where}: it can travel "
-                f"from {low[rider, k]:.4g} m to {high[rider, k]:.6g} m. Lengthen the link, or "
-                "travel less far"
+                f"stands at {place} of {self.links[rider]!r} {where}: it can travel from "
+                f"{ends[0]} to {ends[1]}. Lengthen the link, or travel less far"
             )
             raise TravelError(f"mechanism.joints.{self.joints[rider]}", message, k)
 
@@ -284,6 +289,8 @@ def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails 
         np.array([_margins(case, link) for _, link in riders]),
         parameters.compiled(np.array(scalars, dtype=object).T),
         parameters.coordinates,
+        case.coordinate_units,
+        tuple(SI("m", case.value_at(f"links.{link}.length")) for _, link in riders),
     )
 
 
@@ -328,7 +335,7 @@ class PropertyLimits:
         k = int(wrong.any(axis=1).argmax())
         limit = int(wrong[k].argmax())
         own = np.flatnonzero(self.rows[limit])
-        given = " and ".join(f"{self.names[j]} = {x[k, j]:g} {self.units[j]}".strip() for j in own)
+        given = " and ".join(f"{self.names[j]} = {handy(x[k, j], self.units[j], 6)}" for j in own)
         where = f" (sample {k})" if len(x) > 1 else ""
         raise UsageError(f"no mechanism has {given}{where}: {self.words[limit]}")
 

@@ -30,7 +30,7 @@ from eigassign.case.schema.trajectory import (
     TipTrajectory,
 )
 from eigassign.case.table import CsvColumn, read_table
-from eigassign.case.units import DIMENSIONS
+from eigassign.case.units import DIMENSIONS, handy
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Course,
@@ -248,7 +248,7 @@ def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[s
     """A note for each angle that moves by more than half a turn from sample to sample."""
     steps, units = np.abs(np.diff(q, axis=0)), q_units or ["rad"] * len(q_names)
     return tuple(
-        f"{name} jumps by {own[k]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
+        f"{name} jumps by {handy(own[k], unit)} from sample {k} to {k + 1}; is it cut at 360 deg?"
         for own, name, unit in zip(steps.T, q_names, units, strict=True)
         if unit == "rad" and own[k := int(own.argmax())] > np.pi
     )

@@ -38,6 +38,7 @@ from scipy import sparse
 from scipy.linalg import eigh, lapack
 from scipy.sparse import linalg
 
+from eigassign.case.units import shown_point
 from eigassign.errors import LIMP, MechanismError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil, principal
 from eigassign.mechanism.elements.craig_bampton import (
@@ -165,7 +166,6 @@ def _require_mass(M_FF: Floats) -> None:
 Label = Callable[[int], str]
 # Of the largest K_g of a coordinate, and of g M_ii per metre: less is round-off, a thousand times
 ZERO = 1e-12
-SHOWN = 8  # values of a pose or design that a message names
 FALLS = "give it a drive stiffness, lock it, or write `gravity: none`"
 
 
@@ -218,10 +218,11 @@ def _pose(pencil: Pencil, x: Floats | None, k: int, label: Label) -> str:
     """Where a sample is, in words."""
     if x is None or pencil.weight is None:
         return f"({label(k)})"
-    n, named = pencil.n_joints, zip(pencil.weight.variables, x[k], strict=True)
-    each = [f"{name} = {value:.6g}" for name, value in named]
-    pose, more = (", ".join(own[:SHOWN]) for own in (each[:n], each[n:]))
-    return f"in the pose {pose}{f' with {more}' if more else ''} ({label(k)})"
+    n, names, units = pencil.n_joints, pencil.weight.variables, pencil.weight.units
+    pose, more = (
+        shown_point(names[own], x[k, own], units[own]) for own in (slice(n), slice(n, None))
+    )
+    return f"in the pose {pose}{f' with {more}' * (x.shape[1] > n)} ({label(k)})"
 
 
 def _is_definite(pencil: Pencil, theta: Floats) -> bool:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import angle_unit
+from eigassign.case.units import handy_unit
 from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
@@ -54,11 +54,11 @@ def where(results: RunResults) -> str:
 
 def coordinates(results: RunResults) -> FigurePlan:
     """q(t), one panel for each unit."""
-    names, units = ", ".join(results.q_names), list(dict.fromkeys(results.q_units))
-    panels = []
-    for unit in units:
-        own = [i for i, each in enumerate(results.q_units) if each == unit]
-        said, size = angle_unit(unit, results.in_degrees)
+    names, panels = ", ".join(results.q_names), []
+    each = [(unit, *handy_unit(unit)) for unit in results.q_units]
+    units = list(dict.fromkeys(each))
+    for unit, said, size in units:
+        own = [i for i, other in enumerate(each) if other == (unit, said, size)]
         curves = (Curve(results.q[:, i] / size, series(i), short(results.q_names[i])) for i in own)
         quantity = {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate")
         height = 2.6 if len(units) == 1 else 1.8

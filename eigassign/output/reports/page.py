@@ -224,9 +224,11 @@ def _trust(results: RunResults) -> Iterator[str]:
 def _cost(results: RunResults) -> Iterator[str]:
     mass = results.mass
     if mass is not None:
-        change = mass.optimal - mass.initial
-        added = f"{change:+.4g} kg".replace("-", "−") if number(change) != "0" else "unchanged"
-        yield f"Mass {number(mass.initial)} → {number(mass.optimal)} kg ({added})"
+        unit, size = mass.handy
+        before, after = mass.initial / size, mass.optimal / size
+        added = f"{after - before:+.4g} {unit}".replace("-", "−")
+        added = added if number(after - before) != "0" else "unchanged"
+        yield f"Mass {number(before)} → {number(after)} {unit} ({added})"
     if results.price is not None:
         listed = any(row.choice_price is not None for row in results.design)
         what = "Price" if listed else "Price of the change"

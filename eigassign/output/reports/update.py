@@ -139,13 +139,13 @@ def _found(results: UpdateResults) -> Iterator[Table]:
     names = "name parameter handy initial value deviation low high remark"
     yield facts_table("Parameters", results.parameters, names, caption)
     caption = (
-        "Changes from bound to bound, in SI units, that move all measured frequencies together by "
+        "Changes from bound to bound that move all measured frequencies together by "
         "less than 1.96 standard deviations."
     )
-    yield facts_table("Not identified", results.unidentified, "words change", caption)
+    yield facts_table("Not identified", results.unidentified, "words amounts", caption)
     several = results.minima if len(results.minima) > 1 else ()
     caption = "Distinct minima of χ², the best first: the parameters above are those of the first."
-    yield facts_table("Explanations", several, "values chi_squared", caption)
+    yield facts_table("Explanations", several, "amounts chi_squared", caption)
 
 
 def _fit(results: UpdateResults, most: int | None) -> Iterator[Table]:

@@ -34,6 +34,7 @@ from eigassign.assignment.program import can_be_kept, smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
+from eigassign.case.units import handy
 from eigassign.errors import EigassignError
 from eigassign.study.checks import raised_by
 from eigassign.study.design.clearance import WITHIN, check_band, lowest_room
@@ -140,7 +141,7 @@ def _words(scene: Scene, found: Found, least: float, gap: float) -> str:
     if gap > 1e-9:  # of F: round-off
         better += f" by more than {-_rounded(-100 * gap)} % of the objective"
         if aim == "lightest":
-            better = f"below {_rounded(least)} kg"
+            better = f"below {handy(_rounded(least), keys.mass_unit, 4)}"
         elif aim == "highest" and problem.cost is None:
             better = f"above {-_rounded(least)} Hz"
         elif problem.is_error and goals and all(one.weight == 1.0 for one in goals):
@@ -173,7 +174,7 @@ def aim_row(
         kept += "), all limits kept" if met else "), not all limits kept"
     if aim == "lightest":
         before, after = map(scene.model.mass, designs)
-        row = AimRow("as light as can be", before, after, "kg")
+        row = AimRow("as light as can be", before, after, scene.file.mass_unit)
         return _in_words(row, f"lightest design found: {row.after}", kept)
     if (paid := cost(scene, found.best.y)) is not None:
         one = "1 Hz" if aim == "highest" else "1 % of room"

@@ -21,6 +21,7 @@ from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import FollowedMode
+from eigassign.case.units import shown_point
 from eigassign.errors import LostModeError
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -34,7 +35,6 @@ from eigassign.modal.exact.tracking import (
     places,
 )
 from eigassign.modal.model import Model
-from eigassign.study.planning import shown_point
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -102,9 +102,10 @@ class Follower:
 
     def _lost(self, lost: LostModeError, where: str, y: Floats) -> LostModeError:
         nearest = " and ".join(map(str, lost.candidates)) or "none of the modes"
+        design = shown_point(self.model.y_names, y, self.model.poses.case.design_units)
         message = (
-            f"{self.mode.name} is lost {where} with {shown_point(self.model.y_names, y)}: no mode "
-            f"has its shape there; nearest are {nearest}. Leave out that part of the trajectory "
+            f"{self.mode.name} is lost {where} with {design}: no mode has its shape "
+            f"there; nearest are {nearest}. Leave out that part of the trajectory "
             "(during), narrow the bounds, or name a mode by its number"
         )
         return LostModeError(lost.candidates, lost.step, message)

@@ -117,7 +117,6 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
             chosen.get(k),
             p.price,
             whole.get(k),
-            scene.file.in_degrees,
         )
         for k, (name, p) in enumerate(parameters.items())
     )

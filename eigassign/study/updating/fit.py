@@ -24,8 +24,8 @@ from eigassign.assignment.exact.identification import (
 )
 from eigassign.assignment.exact.sequential import PAYS, unseen
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import handy_unit
-from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
+from eigassign.case.units import handy, handy_unit
+from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds
 from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
@@ -111,7 +111,8 @@ class ExplainedMeasurement:
 class UnidentifiedDirection:
     """A common change of parameters (SI, by name) that the measurements do not notice."""
 
-    change: Annotated[Mapping[str, float], Fact("by their names", digits=listed)]
+    change: Annotated[Mapping[str, float], Fact("by their names")]
+    amounts: Annotated[str, Fact(heading="change", unwritten=True)]  # of it, as people read them
     words: Annotated[str, Fact("what cannot be told, in words", "what")]
 
 
@@ -119,7 +120,8 @@ class UnidentifiedDirection:
 class ExplainingMinimum:
     """One of several minima of χ² that explain the measurements: the parameters there, by name."""
 
-    values: Annotated[Mapping[str, float], Fact("SI, by their names", digits=listed)]
+    values: Annotated[Mapping[str, float], Fact("SI, by their names")]
+    amounts: Annotated[str, Fact(heading="values", unwritten=True)]  # as people read them
     chi_squared: Annotated[float, Fact(heading="χ²", digits=".4g")]
 
 
@@ -295,9 +297,10 @@ def collect_update(
         unidentified=directions,
         minima=tuple(
             ExplainingMinimum(
-                dict(zip(problem.model.y_names, one.y.tolist(), strict=True)), one.objective
+                values, ", ".join(map(": ".join, _amounts(problem, values).items())), one.objective
             )
             for one in found.minima
+            for values in [dict(zip(problem.model.y_names, one.y.tolist(), strict=True))]
         ),
         fit=FitRow(
             *(found.initial_chi_squared, found.chi_squared, found.degrees, found.p_value),
@@ -348,12 +351,21 @@ def _direction(change: Floats, y: Floats, problem: UpdateProblem) -> Unidentifie
     taking = [int(k) for k in np.flatnonzero(share > 1e-2 * share.max())]
     names = problem.model.y_names
     by_name = {names[k]: float(change[k]) for k in taking}
-    units = {problem.case.file.design_units[k] for k in taking}
+    units, amounts = {problem.case.file.design_units[k] for k in taking}, _amounts(problem, by_name)
     relative = change[taking] / y[taking] if np.all(y[taking] != 0.0) else None
-    return UnidentifiedDirection(by_name, _in_words(by_name, relative, len(units) == 1))
+    words = _in_words(amounts, by_name, relative, len(units) == 1)
+    return UnidentifiedDirection(by_name, ", ".join(map(": ".join, amounts.items())), words)
 
 
-def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bool) -> str:
+def _amounts(problem: UpdateProblem, values: Mapping[str, float]) -> dict[str, str]:
+    """SI values of parameters by their names, as people read them."""
+    units = dict(zip(problem.model.y_names, problem.case.file.design_units, strict=True))
+    return {name: handy(value, units[name], 4) for name, value in values.items()}
+
+
+def _in_words(
+    amounts: Mapping[str, str], change: Mapping[str, float], relative: Floats | None, one_unit: bool
+) -> str:
     """ "E can change unnoticed"; "m1 and m2 only as m1 + 0.5 m2"; or how they change, in per cent.
 
     ``relative`` is the change by the values, None where one of these is 0.
@@ -371,7 +383,7 @@ def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bo
         size = f"{abs(factor):.3g} " if abs(abs(factor) - 1.0) > 5e-4 else ""
         return f"{a} and {b} are determined only together, as {a} {sign} {size}{b}"
     if relative is None:
-        sizes = [f"{value:.3g} (SI)" for value in change.values()]
+        sizes = [*amounts.values()]
     else:
         sizes = [f"{v:.3g} %" for v in 10.0 * relative / np.abs(relative).max()]
     each = (f"{name} by {s.replace('-', '−')}" for name, s in zip(change, sizes, strict=True))

@@ -109,7 +109,7 @@ def test_a_lost_mode_is_named_with_place_design_and_nearest_candidates() -> None
         solved(scene, (0.038, 2.09))
     said, nearest = str(caught.value), caught.value.candidates
     assert "the mode like mode 1 (t = 0 s) is lost" in said
-    assert "height = 0.038, lamp = 2.09" in said
+    assert "height = 38 mm, lamp = 2.09 kg" in said
     assert "sample " in said
     assert all(f"mode {c.number} ({c.hz:.5g} Hz, MAC {c.mac:.2f})" in said for c in nearest)
     assert {c.number for c in nearest} == {1, 2}

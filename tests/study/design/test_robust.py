@@ -224,7 +224,7 @@ def test_a_limit_that_only_deviations_miss_is_said_to_contradict_for_them() -> N
     same = "  constraints: {same: {terms: {m1: 1, m2: -1}, min: 0, max: 0}}\n"
     _, results = solved(MASSES + same, "  - {mode: 1, at_least: 150 Hz}\n")
     assert results.assignment.verdict == "infeasible"
-    expected = "meets same (line 51) for all deviations within the tolerances (same at least 0 kg "
+    expected = "meets same (line 51) for all deviations within the tolerances (same at least 0 g "
     assert expected in results.assignment.reason
 
 

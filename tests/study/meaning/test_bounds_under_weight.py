@@ -187,5 +187,5 @@ def test_designs_that_buckle_are_no_designs(tmp_path: Any, design: str, asked: s
 def test_what_buckles_is_named_with_its_design(tmp_path: Any) -> None:
     (tmp_path / "mast.yaml").write_text(MAST + LOAD % "")
     model = ea.load_case(tmp_path / "mast.yaml").model()
-    with pytest.raises(MechanismError, match=r"in the pose tilt = 1.5 with m = 1500 \(sample 0\)"):
+    with pytest.raises(MechanismError, match=r"with m = 1500 kg \(sample 0\)"):
         model.frequencies([1.5], [1500.0], 1)

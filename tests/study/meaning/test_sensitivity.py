@@ -97,13 +97,13 @@ def test_nothing_is_studied_that_is_not_asked_for(tmp_path: Path) -> None:
     assert answered(tmp_path, text, Studies.NONE)[2] == Meaning()
 
 
-def test_a_limit_of_the_mass_is_relaxed_in_grams(tmp_path: Path) -> None:
+def test_a_limit_of_the_mass_is_relaxed_in_its_unit(tmp_path: Path) -> None:
     text = changed(
         ("samples: 152", "samples: 12"), ("\nexpansion:", "  mass: {max: 2.1 kg}\n\nexpansion:")
     )
     _, _, found = answered(tmp_path, text)
     (row,) = [row for row in found.relaxed if row.name == "design.mass"]
-    assert row.words.startswith(f"{2100.0 * row.amount:.3g} g more mass: rms error ")
+    assert row.words.startswith(f"{2.1 * row.amount:.3g} kg more mass: rms error ")
 
 
 def test_a_mass_of_zero_is_no_limit_that_could_be_relaxed(tmp_path: Path) -> None:
