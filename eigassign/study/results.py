@@ -866,7 +866,7 @@ class TrajectoryRow(Brief):
     duration_s: Seconds
     weight: float
     tip: Unwritten[Floats | None]
-    tip_unit: Unwritten[str]
+    tip_unit: Unwritten[str] = "m"
     loads: Annotated[
         Mapping[str, float] | None, Fact("properties that it sets, SI", name="set", optional=True)
     ] = None

@@ -235,7 +235,7 @@ def studied(results: RunResults) -> RunResults:
     """The same with all that can be said of what its answer means."""
     names = [row.name for row in results.design]
     sensitivity = tuple(
-        SensitivityRow(name, "kg", target.label, -30.0, -35.0, share, 1.3 * share)
+        SensitivityRow(name, "kg", target.label, ("kg", 1.0), -30.0, -35.0, share, 1.3 * share)
         for k, name in enumerate(names)
         for target in results.targets
         for share in [0.3 - 0.4 * (k / len(names)) - 0.05 * target.asked.mode]

@@ -112,7 +112,7 @@ def test_a_mode_that_is_lost_at_the_initial_design_is_refused() -> None:
     given = tree(TARGETS, coupled=0.1)
     given["mechanism"]["sections"]["rail"]["height"] = 0.038
     given["mechanism"]["bodies"]["lamp"]["mass"] = 2.09
-    with pytest.raises(LostModeError, match=r"sample \d+ .* with height = 0.038, lamp = 2.09"):
+    with pytest.raises(LostModeError, match=r"sample \d+ .* with height = 38 mm, lamp = 2.09"):
         solve_case(case_of(given))
 
 

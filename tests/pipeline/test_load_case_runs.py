@@ -69,7 +69,7 @@ def test_modes_take_the_coordinates_alone_or_with_the_loads(tmp_path: Path) -> N
 def test_check_counts_coordinates_and_says_what_is_set(tmp_path: Path) -> None:
     answer = check(written(tmp_path, text(arm(*LOADED))))
     assert answer.q_names == ("q1", "q2")
-    assert f"trajectory 'idle': {MASS} = 0.5 kg" in answer.notes
+    assert f"trajectory 'idle': {MASS} = 500 g" in answer.notes
 
 
 @pytest.mark.parametrize(

@@ -374,5 +374,5 @@ def test_a_carriage_beyond_its_beam_is_refused_with_its_trajectory(
     start, end = text.index("trajectory:"), text.index("design:")
     path = tmp_path / "gantry.yaml"
     path.write_text(f"{text[:start]}trajectory: {given}\n{text[end:]}", encoding="utf-8")
-    with pytest.raises(CaseError, match=rf"joints\.[a-z]+: .*x = 1\.7 \({where}\)"):
+    with pytest.raises(CaseError, match=rf"joints\.[a-z]+: .*x = 1\.7 m \({where}\)"):
         _ = ea.load_case(path).trajectory

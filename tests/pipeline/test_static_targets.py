@@ -69,17 +69,17 @@ def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
     assert kept["statics"][compliance.name]["limit"] == 5.5e-6
     assert kept["statics"][compliance.name]["optimal_curve"] == compliance.optimal_curve.tolist()
     rows = list(csv.DictReader(io.StringIO(sample_files(results)["statics.csv"].decode())))
-    assert [float(each[f"{compliance.name} exact [m/N]"]) for each in rows] == pytest.approx(
-        compliance.optimal_curve.tolist()
+    assert [float(each[f"{compliance.name} exact [um/N]"]) for each in rows] == pytest.approx(
+        (1e6 * compliance.optimal_curve).tolist()
     )
     assert "statics" in [plan.name for plan in run_figures(results)]
     (table,) = [each for each in run_tables(results) if each.title == "Limits and bands"]
     (line,) = [each for each in table.rows if each[0].startswith("compliance")]
-    assert line[2:] == ("5.5 µm/N", "met")
+    assert line[2:] == ("5.5 um/N", "met")
     card = verdict_of(results)
     assert card is not None
     assert any(
-        "Compliance of forearm.end along [0, 1] at most 5.5 µm/N" in f.label for f in card.findings
+        "Compliance of forearm.end along [0, 1] at most 5.5 um/N" in f.label for f in card.findings
     )
     assert [one.tone for one in card.findings] == ["good"] * 4
 

@@ -290,7 +290,7 @@ def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails 
         parameters.compiled(np.array(scalars, dtype=object).T),
         parameters.coordinates,
         case.coordinate_units,
-        tuple(SI("m", case.value_at(f"links.{link}.length")) for _, link in riders),
+        tuple(SI("m", case.value_at(f"links.{link}.length"), "m") for _, link in riders),
     )
 
 

@@ -249,7 +249,8 @@ def test_a_carriage_beyond_its_beam_is_refused_with_its_range(x: float) -> None:
     with pytest.raises(TravelError, match=r"from 0.00096 m to 1.59904 m") as caught:
         built(gantry("free")).lam([x], 1)
     assert caught.value.path == "mechanism.joints.car"
-    assert f"in the pose x = {x:.6g}" in caught.value.message
+    said = f"{x:.6g} m" if x >= 1.0 or not x else f"{1000.0 * x:.6g} mm"
+    assert f"in the pose x = {said}:" in caught.value.message
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -269,7 +270,7 @@ def test_a_carriage_near_the_end_keeps_its_digits(mirrored: bool) -> None:
 def test_the_first_sample_that_leaves_the_beam_is_named() -> None:
     model = built(gantry("free"))
     x = np.array([[0.5], [1.2], [1.7], [-1.0]])
-    with pytest.raises(TravelError, match=r"x = 1.7 \(sample 2\)") as caught:
+    with pytest.raises(TravelError, match=r"x = 1.7 m \(sample 2\)") as caught:
         eigenvalues(model.pencil, x, 1)
     assert caught.value.sample == 2
 

@@ -41,7 +41,7 @@ def refused(case: ea.Case, q: Any) -> str:
 
 def test_a_pose_that_would_fall_names_coordinate_and_sample() -> None:
     said = refused(rod(), [[-1.5], [-1.0], [1.5]])
-    assert "coordinates.q: would fall in the pose q = 1.5 (sample 2)" in said
+    assert "coordinates.q: would fall in the pose q = 1.5 rad (sample 2)" in said
     assert "give it a drive stiffness, lock it, or write `gravity: none`" in said
 
 
@@ -54,7 +54,7 @@ def test_a_load_beyond_buckling_names_its_factor(elements: int) -> None:
     critical = np.pi**2 * EI / (4 * 2.0**2)
     case = rod({"stiffness": 1e12}, 2.5 * critical / 9.81, elements)
     said = refused(case, [[-np.pi / 2], [np.pi / 2]])
-    assert "buckles under 0.4 times its weight in the pose q = 1.5708 (sample 1)" in said
+    assert "buckles under 0.4 times its weight in the pose q = 1.5708 rad (sample 1)" in said
     assert case.model().frequencies([-np.pi / 2], [], 1) > 0.0
 
 
