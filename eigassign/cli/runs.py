@@ -1,4 +1,4 @@
-"""The work on cases: `optimize`, `expand`, `update`, `validate`, `chart`."""
+"""The work on cases: `optimize`, `expand`, `update`, `compare`, `validate`, `chart`."""
 
 from __future__ import annotations
 
@@ -167,6 +167,41 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
     _show(as_json, done.folder, results, sum(results.timing_s.values()), told)
     return 0 if results.verdict == "fitted" else 1
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign optimize planar_arm.yaml --out results/before",
+        "eigassign optimize planar_arm.yaml --out results/after",
+        "eigassign compare results/before results/after",
+    )
+)
+@click.argument("runs", nargs=-1, required=True, type=arguments.PATH)
+@arguments.out("results")
+@arguments.json
+@arguments.common
+def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any) -> int:
+    """Put finished runs side by side.
+
+    RUNS are run folders of optimize, or case files that have one in results. Verdicts, designs,
+    errors, mass, price and room to limits are shown in tables, and with the frequencies over each
+    other on a page, compare.html.
+    """
+    from eigassign.output.console import print_tables
+    from eigassign.output.reports.compare import comparison, read_results
+    from eigassign.output.store.atomic import replace_synced
+
+    with reporting(how):
+        tables, page = comparison({str(run): read_results(run) for run in runs})
+        place = (out or Path("results")) / "compare.html"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        replace_synced(place, page)
+    if as_json:
+        print_json({"page": str(place), "tables": [table._asdict() for table in tables]})
+        return 0
+    print_tables(tables)
+    show(f"{place} written")
+    return 0
 
 
 @click.command(

@@ -158,6 +158,9 @@ class ValidationRow:
 # --- What an assignment reaches
 
 
+_READ_IN = Fact("unit, and its size in SI", "unit", digits=itemgetter(0), name="read_in")
+
+
 @dataclass(frozen=True)
 class DesignRow:
     """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
@@ -175,7 +178,7 @@ class DesignRow:
     lies_on: Unwritten[str] = ""  # which of its bounds
 
     @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+    def handy(self) -> Annotated[tuple[str, float], _READ_IN]:
         """The unit that people read it in, and the size of that in SI."""
         return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 

@@ -6,4 +6,5 @@ In reading order; each imports from those above it only:
     notebook  figures and tables of a case or result in a notebook
     update    the figures, the tables and the folder of an update
     chart     the figures, the tables and the folder of a chart
+    compare   runs side by side on a page
 """

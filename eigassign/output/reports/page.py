@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
     from eigassign.chart.results import Chart, Matrix
+    from eigassign.output.reports.compare import Compared
     from eigassign.study.updating.fit import UpdateResults
 
 Floats = NDArray[np.float64]
@@ -251,7 +252,7 @@ class Shown:
 
 
 def page(
-    f: RunResults | Chart | Matrix | UpdateResults,
+    f: RunResults | Chart | Matrix | UpdateResults | Compared,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
