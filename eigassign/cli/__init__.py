@@ -110,7 +110,7 @@ def cli() -> None:
     """
 
 
-FIRST = (init, check, optimize, compare, update, batch, docs)
-MORE = (modes, expand, validate, chart, schema)
+FIRST = (init, check, optimize, update, batch, docs)
+MORE = (compare, modes, expand, validate, chart, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

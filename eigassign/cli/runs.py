@@ -171,9 +171,8 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
 @click.command(
     epilog=arguments.examples(
-        "eigassign optimize planar_arm.yaml --out results/before",
-        "eigassign optimize planar_arm.yaml --out results/after",
-        "eigassign compare results/before results/after",
+        "eigassign compare planar_arm.yaml four_bar.yaml",
+        "eigassign compare results/planar_arm results/four_bar --out side",
     )
 )
 @click.argument("runs", nargs=-1, required=True, type=arguments.PATH)

@@ -146,6 +146,7 @@ LONG = (
     "batch",
     "optimize",
     "expand",
+    "compare",
     "update",
     "validate",
 )  # each over 3 s
@@ -160,6 +161,8 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
     if "init" not in lines[0]:
         for template in ("planar_arm", "four_bar"):
             assert main(["init", template]) == 0
+            if name == "eigassign compare":
+                assert main(["optimize", f"{template}.yaml", "--report", "none"]) == 0
         Path("cases/stress").mkdir(parents=True)
         shutil.copy(TWO_LINK, "cases")
         shutil.copy(CASES / "stress" / "straight_arm.yaml", "cases/stress")

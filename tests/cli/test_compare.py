@@ -1,0 +1,118 @@
+"""`eigassign compare`: runs side by side, and what is no run of this version by its name."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from eigassign.cli import main
+from eigassign.output import run_folder
+
+TEMPLATE = Path(__file__).parents[2] / "eigassign" / "starters" / "planar_arm.yaml"
+TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+LITTLE = ("--study", "none", "--report", "none", "--figures", "none", "--quiet")
+BAND = "clear of 24 … 26 Hz"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three runs: a case, the same with another target, name and duration, and another case."""
+    made = tmp_path_factory.mktemp("runs")
+    text = TEMPLATE.read_text().replace("samples: 101", "samples: 21")
+    other = text.replace("frequency: 15 Hz", "frequency: 14 Hz").replace(
+        "  diameter: {", "  pipe: {"
+    )
+    (made / "one.yaml").write_text(text)
+    (made / "two.yaml").write_text(other.replace("duration: 1 s", "duration: 2 s"))
+    short = TWO_LINK.read_text().replace("samples: 152", "samples: 12")
+    (made / "three.yaml").write_text(short)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(made)
+        for name in ("one", "two", "three"):
+            assert main(["optimize", f"{name}.yaml", *LITTLE]) == 0
+    return made
+
+
+@pytest.fixture
+def _here(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(folder, tmp_path / "work")
+    monkeypatch.chdir(tmp_path / "work")
+
+
+pytestmark = pytest.mark.usefixtures("_here")
+
+
+def compared(*runs: str, capsys: pytest.CaptureFixture[str]) -> dict[str, dict[str, list[str]]]:
+    """The cells of each row of each table."""
+    capsys.readouterr()
+    assert main(["compare", *runs, "--json", "--out", "side"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["page"] == "side/compare.html"
+    assert all(table["columns"][1:] == list(runs) for table in told["tables"])
+    return {t["title"]: {row[0]: row[1:] for row in t["rows"]} for t in told["tables"]}
+
+
+def test_runs_stand_side_by_side_and_what_one_lacks_is_empty(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    tables = compared("one.yaml", "results/two", "results/three", capsys=capsys)
+    assert tables["Runs"]["verdict"] == ["Reached"] * 3
+    found = [json.loads(Path("results", n, "results.json").read_text()) for n in ("one", "two")]
+    for k, name in enumerate(("diameter", "pipe")):
+        cells = tables["Design"][f"{name} [mm]"]
+        assert cells[k] == f"{1e3 * found[k]['design'][name]['optimal']:.4g}"
+        assert [cell for cell in cells if cell] == [cells[k]]
+    assert tables["Asked"]["mode 1 at 15 Hz"][1:] == ["", ""]
+    assert tables["Asked"][f"every mode {BAND}"][2] == ""
+    assert tables["Asked"][f"every mode {BAND}"][0].startswith("met")
+    masses = [f"{each['mass']['optimal']:.4g}" for each in found]
+    assert tables["Runs"]["mass [kg]"][:2] == masses
+
+
+def test_the_page_has_every_run_and_makes_no_request(capsys: pytest.CaptureFixture[str]) -> None:
+    compared("results/one", "results/two", capsys=capsys)
+    page = Path("side/compare.html").read_text()
+    plots = json.loads(page.partition('id="figures">')[2].partition("</script>")[0])
+    plot = plots["compared"]
+    assert {"mode 1, results/one", "mode 1, results/two"} <= {d.get("name") for d in plot["data"]}
+    assert {"mode 1 at 15 Hz", "mode 1 at 14 Hz"} <= {d.get("name") for d in plot["data"]}
+    assert "part of the duration" in json.dumps(plot["layout"])  # 1 s and 2 s
+    assert "default-src 'none'" in page
+
+
+def test_of_equal_durations_the_time_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    compared("results/one", "one.yaml", capsys=capsys)
+    assert '"time [s]"' in Path("side/compare.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "says"),
+    [
+        ("nowhere", 2, "nowhere is no finished run"),
+        ("missing.yaml", 2, "results/missing is no finished run"),
+        ("lost", 2, "lost: a file of it was changed or lost"),
+        ("edited", 2, "edited: a file of it was changed or lost"),
+        ("older", 2, "older: its results.json has schema 2, and"),
+        ("drawn", 2, "drawn is no run of eigassign optimize"),
+    ],
+)
+def test_what_is_no_run_is_refused_by_its_name(
+    name: str, code: int, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for copy in ("lost", "edited"):
+        shutil.copytree("results/one", copy)
+    Path("lost/frequencies.csv").unlink()
+    Path("edited/results.json").write_text("{")
+    for copy, text in (("older", '{"schema": 2}'), ("drawn", "")):
+        with run_folder(Path(copy), case_path=Path("one.yaml"), key="k") as hidden:
+            (hidden / ("results.json" if text else "picture.png")).write_text(text)
+    capsys.readouterr()
+    assert main(["compare", "results/two", name]) == code
+    assert says in capsys.readouterr().err
+    assert not Path("results/compare.html").exists()
+
+
+def test_a_page_that_cannot_be_written_is_an_io_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "results/one", "results/two", "--out", "one.yaml/side"]) == 3
+    assert "one.yaml" in capsys.readouterr().err
