@@ -92,7 +92,7 @@ pose = several(
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 common = several(
     click.option("--quiet", is_flag=True, help="Print only errors on stderr."),
-    click.option("-v", "--verbose", count=True, help="Print more on stderr (-vv: everything)."),
+    click.option("-v", "--verbose", count=True, help="Print all tables, and more on stderr (-vv: everything)."),
     click.option("--debug", is_flag=True, help="Print the traceback of an error."),
     click.option(
         "--allow-outside",

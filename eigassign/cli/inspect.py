@@ -163,11 +163,12 @@ def modes(
 
         print_json(results_document(answer))
     else:
-        _show_modes(answer, folder)
+        _show_modes(answer, folder, how["verbose"] > 0)
     return 0
 
 
-def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
+def _show_modes(answer: ModesAnswer, folder: Path | None, verbose: bool) -> None:
+    """The modes; ``verbose``: with what would raise each, and round-off."""
     from eigassign.facts import capital
     from eigassign.output.console import print_tables
     from eigassign.output.tables import modes_table
@@ -180,8 +181,8 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
         weight=answer.weight,
-        levers=answer.levers,
-        note=". ".join(map(capital, (rounding_line(answer.round_off), *answer.notes))),
+        levers=answer.levers if verbose else (),
+        note=". ".join(map(capital, (*[rounding_line(answer.round_off)] * verbose, *answer.notes))),
     )
     print_tables([found])
     if folder is not None:

@@ -97,9 +97,9 @@ def _finished(
         outcome = work(case, _options(how, reporter))
         results = outcome.results
         reporter.warn(results.warnings)
-        told = partial(print_assignment, results)
+        told = partial(print_assignment, results, verbose=reporter.level > 1)
         _show(as_json, outcome.folder, results, outcome.seconds, told)
-        if results.shortcoming is not None:
+        if results.shortcoming is not None and as_json:  # else it is in the verdict
             reporter.error(results.shortcoming)
         if results.interrupted:
             kept = "no finished run is replaced"
@@ -163,7 +163,9 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
     def told() -> None:
         print_verdict(results.headline, results.verdict)
-        print_tables(update_tables(results))
+        every, verbose = update_tables(results), how["verbose"] > 0
+        own = (one.without("parameter") for one in every if one.section == "parameters")
+        print_tables(every if verbose else own)
 
     _show(as_json, done.folder, results, sum(results.timing_s.values()), told)
     return 0 if results.verdict == "fitted" else 1
@@ -264,7 +266,9 @@ def validate(
         from eigassign.output.console import print_tables
         from eigassign.output.tables import validation_table
 
-        print_tables([validation_table(rows)] if rows else ())
+        table = validation_table(rows)
+        brief = table if how["verbose"] else table.without("points").without("order")
+        print_tables([brief] if rows else ())
     return max(codes)
 
 
@@ -333,7 +337,8 @@ def chart(
 
     def told() -> None:
         print_verdict(made.headline)
-        print_tables(table for table in chart_tables(made) if table.section != "appendix")
+        sections = ("fails", "write", "reach") if how["verbose"] else ("fails", "write")
+        print_tables(table for table in chart_tables(made) if table.section in sections)
 
     _show(as_json, folder, made, made.seconds, told)
     return int(failed)

@@ -12,15 +12,15 @@ from itertools import zip_longest
 from typing import TextIO
 
 from eigassign.files import printable
-from eigassign.output.tables import Table, headline, run_tables
+from eigassign.output.tables import Table, headline, helps, run_tables, tone_of
 from eigassign.study.results import RunResults
 
 _GAP = 2  # blanks between two columns of a table
 _COLOURS = {
-    "32": {"reached", "met", "ok", "checked", "fitted", "done"},  # green
-    "33": {"improved", "unfinished", "over tolerance"},  # yellow
+    "32": {"good", "reached", "met", "ok", "checked", "fitted", "done"},  # green
+    "33": {"fair", "improved", "unfinished", "over tolerance"},  # yellow
     "31": {  # red
-        *("unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),
+        *("bad", "unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),
         *("poor_fit", "not_identified", "no answer"),
     },
 }
@@ -47,11 +47,17 @@ def _words(line: str, room: int, indent: str = "", fold: bool = False) -> list[s
     )
 
 
-def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
-    """The verdict, then design, distances, limits, approximation and the solver's certificate."""
+def print_assignment(
+    results: RunResults, *, verbose: bool = False, stream: TextIO | None = None
+) -> None:
+    """The verdict, the design, what was asked, what would help; ``verbose``: every table."""
     if (line := headline(results)) is not None:
-        print_verdict(line, stream=stream)
-    print_tables(run_tables(results), stream=stream)
+        print_verdict(line, tone_of(results), stream=stream)
+    brief = not verbose and results.assignment is not None
+    print_tables(run_tables(results, brief), stream=stream)
+    if lines := [*helps(results)]:
+        out = sys.stdout if stream is None else stream
+        _write(out, [_styled("What would help", "1", out), *wrapped(lines, width())])
 
 
 def print_verdict(line: str, verdict: str = "", *, stream: TextIO | None = None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -23,9 +24,11 @@ from eigassign.facts import (
     verdict_word,
 )
 from eigassign.study.results import (
+    MET,
     DesignRow,
     ErrorSummary,
     LeverRow,
+    LimitRow,
     RunResults,
     TargetStudy,
     ValidationRow,
@@ -37,6 +40,7 @@ Floats = NDArray[np.float64]
 MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
+ANSWER = ("Design", "Objective", "Distance to the target", "Limits and bands")  # on a terminal
 _RANGES = "label lowest_hz highest_hz error"
 
 
@@ -57,6 +61,12 @@ class Table(NamedTuple):
         """True for each column of numbers, whatever their unit; empty cells do not count."""
         cells = ([row[k] for row in self.rows if row[k]] for k in range(len(self.columns)))
         return tuple(bool(column) and all(map(_is_number, column)) for column in cells)
+
+    def without(self, name: str) -> Table:
+        """The table without this column."""
+        kept = [k for k, column in enumerate(self.columns) if column != name]
+        rows = tuple(tuple(row[k] for k in kept) for row in self.rows)
+        return self._replace(columns=tuple(self.columns[k] for k in kept), rows=rows)
 
 
 def _is_number(cell: str) -> bool:
@@ -91,18 +101,50 @@ def _value(row: Any, name: str, one: Fact) -> Any:
     return found if size == 1.0 or found is None else found / size
 
 
-def run_tables(results: RunResults) -> tuple[Table, ...]:
-    """What there is something to show of, section by section of `_KINDS`."""
+def run_tables(results: RunResults, brief: bool = False) -> tuple[Table, ...]:
+    """What there is something to show of, section by section of `_KINDS`; ``brief``: the answer."""
     made = (
         table._replace(section=section)
         for section, kinds in _KINDS.items()
         for table in kinds(results)
     )
-    return tuple(table for table in made if table.rows)
+    if not brief:
+        return tuple(table for table in made if table.rows)
+    return tuple(one.without("parameter") for one in made if one.rows and one.title in ANSWER)
+
+
+def tone_of(results: RunResults) -> str:
+    """How good the answer is, in colours: good, fair (too little room at a limit, too) or bad."""
+    tone = TONES.get(results.assignment.verdict if results.assignment else "", "bad")
+    if results.shortcoming is not None:
+        return "bad"
+    return "fair" if results.thin else tone
+
+
+def helps(results: RunResults) -> Iterator[str]:
+    """What would help where something is missed: properties; what limits cost."""
+    met = all(target.satisfied for target in results.targets)
+    if results.assignment is None or (
+        met and all(one.satisfied for one in results.assignment.limits)
+    ):
+        return
+    for mode in dict.fromkeys(row.mode for row in results.meaning.levers):
+        own = [str(row) for row in results.meaning.levers if row.mode == mode][:3]
+        told = re.sub(r"\b[a-z]+\.([^\s.]+)((?:\.\w+)+)", _plain, ", ".join(own))
+        yield f"1 % more of what is no parameter changes {mode}: {told.replace(' -', ' −')}."
+    for row in results.meaning.relaxed[:2]:
+        if f"{row.before:.3g}" != f"{row.after:.3g}":
+            yield f"{capital(row.words)}."
+
+
+def _plain(path: re.Match[str]) -> str:
+    """A property as people say it: ``length of forearm`` for ``links.forearm.length``."""
+    what = path[2].replace(".", " ").replace("_", " ").replace("youngs", "Young's").strip()
+    return f"{what} of {path[1]}"
 
 
 def headline(results: RunResults) -> str | None:
-    """The verdict with its reason, then worst distance, worst violation and least room.
+    """The verdict with its reason, then worst distance, worst violation, and the least room.
 
     None where nothing was asked for.
     """
@@ -116,12 +158,26 @@ def headline(results: RunResults) -> str | None:
         before, after = (percent(one.max_relative) for one in (error.initial, error.exact))
         distance = f"{before} before, {after} after{beside}"
         said.append(f"Worst distance to the target: {distance}, solved exactly.")
+    if results.shortcoming is not None and row is not None and row.verdict in TONES:
+        said.append(f"{capital(results.shortcoming)}.")
+    named = None if violation is None else violation.exact_limit
+    if row is not None and named is not None and named in row.reason:
+        violation = None
     if violation is not None and (violation.initial or violation.exact or not goals):
         exactly = "" if goals else ", solved exactly"
         said.append(f"Worst violation of a limit: {violation.words}{exactly}.")
-    if row is not None and row.clearances and row.verdict == "reached":
-        least = min(row.clearances, key=lambda one: one.room)
-        said.append(f"Least room: {positive_percent(least.room)} ({least.label}).")
+    near = sorted((one.room, one.closest) for one in results.targets if one.room is not None)
+    if results.thin:
+        tight = [
+            f"{one.closest} by {percent(one.room or 0.0)}"
+            if (one.room or 0.0) > MET
+            else f"{one.closest} lies at its limit, as an optimum often does"
+            for one in results.thin
+        ]
+        said.append(f"{capital('; '.join(tight))}: any deviation loses it. Ask for more, or use ")
+        said[-1] += "`robust`."
+    elif near and row is not None and row.verdict == "reached":
+        said.append(f"Least room: {positive_percent(near[0][0])} ({near[0][1]}).")
     return " ".join(said) or None
 
 
@@ -171,32 +227,34 @@ def _errors(results: RunResults) -> Table:
         for what, of in (("worst", "max_relative"), ("rms", "rms_relative")):
             cells = ("" if error is None else percent(getattr(error, of)) for error in errors)
             rows.append((label, what, *cells))
-    caption = "Frequency against its target in Hz, relative to the target, along "
-    caption += f"{results.along}; predicted by the expansion, exact by solving every sample again."
+    caption = f"Relative to the target, along {results.along}; exact: every sample solved again."
     if len({target.asked.weight for target in wanted}) > 1:
         caption += " All: all targets, with equal weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
 
 
 def _required(results: RunResults) -> Table:
-    """Limits and bands: met, or violated by how much at worst, before and after; amounts."""
+    """Limits and bands: met, or violated by how much, before and after; amounts; room."""
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
     for target in results.targets:
         if not target.asked.is_goal and not target.asked.is_aim:
             cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
             said = ("" if e is None else violated(e.max_relative) for e in cells)
-            rows.append((target.label, *said, _met(target.satisfied)))
+            rows.append((target.label, *said, _room(target)))
     for row in () if results.assignment is None else results.assignment.limits:
         amounts = {"initial": row.initial, "exact": row.optimal}
         cells = (row.said(amounts[k]) if k in amounts else "" for k in kinds)
-        rows.append((row.words, *cells, _met(row.satisfied)))
-    caption = f"Violations are relative to the limit, along {results.along}."
-    return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
+        rows.append((row.words, *cells, _room(row)))
+    caption = "Violations, and the room that is left, relative to the limit."
+    return Table("Limits and bands", ("limit", *kinds, "room"), tuple(rows), caption)
 
 
-def _met(satisfied: bool) -> str:
-    return "met" if satisfied else "VIOLATED"
+def _room(limit: TargetStudy | LimitRow) -> str:
+    """The room to a limit that is kept."""
+    if not limit.satisfied:
+        return "VIOLATED"
+    return "none" if limit.room is None else positive_percent(limit.room)
 
 
 def _combinations(results: RunResults) -> Table:

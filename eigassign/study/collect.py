@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -29,6 +29,7 @@ from eigassign.study.pictures import draw_poses, rest_pose
 from eigassign.study.results import (
     WEIGHED,
     CaseRow,
+    ClearanceRow,
     DriveLoad,
     DriveRow,
     MassRow,
@@ -112,7 +113,7 @@ def _answer(
     on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}
     return {
         "design": tuple(replace(one, lies_on=on.get(one.name, "")) for one in rows),
-        "targets": targets,
+        "targets": tuple(_checked(one, row.clearances) for one in targets),
         "other_modes": mode_rows(_others(scene, assigned), solved.initial, solved.exact),
         "spectrum": mode_rows(range(1, solved.exact.hz.shape[1] + 1), solved.initial, solved.exact),
         "price": cost(scene, answer.y),
@@ -125,6 +126,14 @@ def _answer(
         "drives": _drives(scene, answer.y),
         "statics": tuple(_statics(scene, answer.y)),
     }
+
+
+def _checked(target: TargetStudy, found: Sequence[ClearanceRow]) -> TargetStudy:
+    """A target with the room of its band as it was checked, between the samples too."""
+    own = [one.room for one in found if one.clear and one.label.startswith(target.label)]
+    if not own or target.room is None or not target.satisfied:
+        return target
+    return replace(target, room=min(target.room, *own))
 
 
 def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:

@@ -51,6 +51,8 @@ SCHEMA = 3  # of results.json: raised when a field goes or means something else
 Row = TypeVar("Row")
 Kilograms = Annotated[float, Fact(unit="kg", digits=number)]
 MET = 1e-8  # a violation below it is round-off
+# Of a limit on a frequency: as much as 0.2 % of a stiffness or mass, which no machine is known to
+THIN = 1e-3
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 
@@ -365,11 +367,26 @@ class TargetStudy(Brief):
     along: Unwritten[tuple[TargetAlong, ...]]
     followed: Unwritten[tuple[FollowedRow, ...]] = ()
     near: Annotated[tuple[ModeRow, ...] | None, Fact("modes about a band", optional=True)] = None
+    room: Annotated[
+        Share | None, Fact("least distance to the limit, relative to it; below 0 it is missed")
+    ] = None
 
     @property
     def label(self) -> str:
         """What is asked, in words: "mode 2 at least 320 Hz"."""
         return self.asked.label
+
+    @property
+    @told()
+    def closest(self) -> str:
+        """What is asked of the mode that is nearest to it: "mode 2 clear of 24 … 26 Hz"."""
+        low, high, of = self.asked.lower, self.asked.upper, self.asked.modes
+        rows = [row for row in self.near or () if not of or row.mode in of]
+        if not rows:
+            return self.label
+        hz = np.array([row.optimal_hz for row in rows])
+        k = int(np.maximum(1.0 - hz / low, hz / high - 1.0).min(axis=1).argmin())
+        return f"mode {rows[k].mode} clear of{self.label.partition(' clear of')[2]}"
 
     @property
     @told()
@@ -466,6 +483,14 @@ class LimitRow:
     violation: Violation
     extreme: Annotated[InUnit | None, Fact("of the most extreme design, where none keeps it")]
     stated: Annotated[str, Fact("the limit with the amount of the answer, in words")]
+
+    @property
+    @told()
+    def room(self) -> Share | None:
+        """The least distance to the limit, relative to it; below 0 it is missed, null of 0."""
+        sides = ((1.0, self.lower), (-1.0, self.upper))
+        ways = (sign * (self.optimal - edge) / abs(edge) for sign, edge in sides if edge)
+        return min(ways, default=None)
 
     def said(self, amount: float) -> str:
         """An amount with the unit that the limit is said in: masses are in kg."""
@@ -1016,6 +1041,19 @@ class RunResults(Origin):
     def interrupted(self) -> bool:
         """True where Ctrl-C ended the search: what was found until then is the answer."""
         return self.assignment is not None and self.assignment.ended == "interrupted"
+
+    @property
+    def thin(self) -> tuple[TargetStudy, ...]:
+        """Limits on frequencies that are met with too little room, the least first.
+
+        Less than `THIN`, or than mesh and reduced links are off; a robust design has it all.
+        """
+        row = self.assignment
+        if row is None or row.verdict != "reached" or row.robust is not None:
+            return ()
+        least = max(THIN, row.model_error or 0.0)
+        found = (one for one in self.targets if one.room is not None and one.room < least)
+        return tuple(sorted(found, key=lambda one: one.room or 0.0))
 
     @property
     def shortcoming(self) -> str | None:

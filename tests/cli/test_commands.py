@@ -174,7 +174,7 @@ def test_optimize_leaves_a_run_folder_and_prints_what_it_found(ran: Ran) -> None
     written = {path.name for path in (ran.folder / "results/good").iterdir()}
     assert {"results.json", "report.html", "figures", "case.yaml", "log.txt"} <= written
     assert "results/good/report.html written in" in ran.out
-    assert "bodies.tool.mass" in ran.out
+    assert len(ran.out.splitlines()) <= 25
     assert "expanding the eigenvalues" in ran.err
 
 
@@ -197,7 +197,7 @@ def test_optimize_ends_with_1_when_the_expansion_is_over_the_asked_tolerance(
     text = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
     Path("strict.yaml").write_text(text)
     assert main(["optimize", "strict.yaml", *LITTLE]) == 1
-    assert "validation.max_error" in capsys.readouterr().err
+    assert "validation.max_error" in capsys.readouterr().out
     assert Path("results/strict/results.json").exists()
 
 
@@ -210,8 +210,8 @@ def test_optimize_ends_with_1_and_names_the_constraint_that_cannot_be_met(
     assert main(["optimize", "infeasible.yaml", *LITTLE]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("Infeasible: ")
-    assert "eigassign: infeasible: " in err
-    assert "heavy" in err
+    assert "no design within the bounds meets heavy" in out
+    assert "heavy" not in err
     kept = json.loads(Path("results/infeasible/results.json").read_text())["assignment"]
     assert kept["verdict"] == "infeasible"
     assert "heavy" in " ".join(kept["conflict"])
@@ -221,8 +221,10 @@ def test_a_target_out_of_reach_ends_with_1_and_says_what_can_be_reached(capsys: 
     Path("far.yaml").write_text(GOOD.replace("180 Hz", "100 Hz"))
     assert main(["optimize", "far.yaml", *LITTLE]) == 1
     out, err = capsys.readouterr()
-    assert out.startswith("Unreachable: mode 1 at 100 Hz")
-    assert re.search(r"eigassign: unreachable: mode 1 .* \(between 1\d\d.\d and 1\d\d.\d Hz", err)
+    assert re.match(r"Unreachable: mode 1 at 100 Hz .*between 1\d\d.\d and 1\d\d.\d Hz", out)
+    assert "100 Hz" not in err
+    assert main(["optimize", "far.yaml", "--json", *LITTLE]) == 1
+    assert "eigassign: unreachable: mode 1 at 100 Hz" in capsys.readouterr().err
 
 
 LIMITS_ONLY = (

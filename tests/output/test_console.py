@@ -37,9 +37,9 @@ def shown(*tables: Table, encoding: str = "utf-8") -> str:
     return read(out)
 
 
-def assignment() -> str:
+def assignment(verbose: bool = True) -> str:
     out = piped()
-    print_assignment(make_results(), stream=out)
+    print_assignment(make_results(), verbose=verbose, stream=out)
     return read(out)
 
 
@@ -49,6 +49,15 @@ def test_an_assignment_shows_its_numbers_without_colour_codes_in_a_pipe():
     for words in ("228.7", "6.00 %", "1.00 %", "solved", "3.1e-17", "Approximation"):
         assert words in text
     assert not any(line != line.rstrip() for line in text.splitlines())
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_the_answer_alone_is_short(columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    text = assignment(verbose=False)
+    assert len(text.splitlines()) <= 25
+    assert "Distance to the target" in text
+    assert not any(word in text for word in ("Approximation", "Sensitivity", "bodies."))
 
 
 def test_an_ascii_locale_gets_ascii():

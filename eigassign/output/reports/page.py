@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.facts import about, capital, number, percent
+from eigassign.facts import about, capital, number, percent, positive_percent
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.mechanism import mode_figures
@@ -30,7 +30,7 @@ from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figure
 from eigassign.output.result_files import sample_files
-from eigassign.output.tables import SECTIONS, TONES, Table, headline, run_tables
+from eigassign.output.tables import SECTIONS, TONES, Table, headline, helps, run_tables, tone_of
 from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetStudy, violated
 
 if TYPE_CHECKING:
@@ -126,42 +126,26 @@ def verdict_of(results: RunResults) -> FirstScreen | None:
     aim, tone = row.aim, TONES.get(row.verdict, "bad")
     findings = [] if aim is None else [Finding(capital(aim.label), aim.before, aim.after, tone)]
     targets = (target for target in results.targets if not target.asked.is_aim)
+    thin = {one.label for one in results.thin}
     word, _, sentence = (headline(results) or "").partition(": ")
     static = {one.name for one in results.statics}
     broken = [r for r in row.limits if r.violation or r.initial_violation or r.name in static]
-    findings += [*map(_kept, broken), *(_finding(target, row.max_error) for target in targets)]
+    findings += [
+        *map(_kept, broken),
+        *(_finding(one, row.max_error, one.label in thin) for one in targets),
+    ]
     return FirstScreen(
         word=word,
-        tone=tone if row.shortcoming is None else "bad",
+        tone=tone_of(results),
         sentence=sentence,
-        helps=tuple(_helps(results)),
+        helps=tuple(helps(results)),
         findings=tuple(findings[:MOST]),
         cost=tuple(_cost(results)),
         trust=tuple(_trust(results)),
     )
 
 
-def _helps(results: RunResults) -> Iterator[str]:
-    """What would help where something is missed: properties; what limits cost."""
-    met = all(target.satisfied for target in results.targets)
-    if met and all(one.satisfied for one in results.assignment.limits):  # type: ignore[union-attr]
-        return
-    for mode in dict.fromkeys(row.mode for row in results.meaning.levers):
-        own = [str(row) for row in results.meaning.levers if row.mode == mode][:3]
-        told = re.sub(r"\b[a-z]+\.([^\s.]+)((?:\.\w+)+)", _plain, ", ".join(own))
-        yield f"1 % more of what is no parameter changes {mode}: {told.replace(' -', ' −')}."
-    for row in results.meaning.relaxed[:2]:
-        if f"{row.before:.3g}" != f"{row.after:.3g}":
-            yield f"{capital(row.words)}."
-
-
-def _plain(path: re.Match[str]) -> str:
-    """A property as people say it: ``length of forearm`` for ``links.forearm.length``."""
-    what = path[2].replace(".", " ").replace("_", " ").replace("youngs", "Young's").strip()
-    return f"{what} of {path[1]}"
-
-
-def _finding(target: TargetStudy, accepted: float) -> Finding:
+def _finding(target: TargetStudy, accepted: float, thin: bool) -> Finding:
     """The worst distance before and after, with the rms where that alone fell; of limits theirs."""
     both = target.error.initial, target.error.exact
     before, after = (each.max_relative for each in both)
@@ -182,7 +166,9 @@ def _finding(target: TargetStudy, accepted: float) -> Finding:
         met = target.satisfied
         pair = violated(before), f"is {violated(after)}"
         more *= len(target.asked.terms) == 1
-    tone = "good" if met else "fair" if better else "bad"
+        if met and target.room is not None:
+            more.append(f"room {positive_percent(target.room)}")
+    tone = "fair" if thin else "good" if met else "fair" if better else "bad"
     return Finding(capital(target.label), *pair, tone, tuple(more))
 
 

@@ -101,6 +101,7 @@ def assignment_row(
             unproved=[*coarse, *_unproved(scene, own, largest)],
             unreachable=beyond,
             conflict=_in_words(scene, answer, conflict, optimality.kind == "proved"),
+            held=_held(scene, answer),
             of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
             unfinished=found.best.end.value if found is not None and found.best.end in CUT else "",
             max_error=keys.max_error,
@@ -309,6 +310,16 @@ def _in_words(scene: Scene, answer: Answer, contradiction: Conflict | None, prov
     together = " together" if len(contradiction.names) > 1 else ""
     deviating = " for all deviations within the tolerances" if answer.robust is not None else ""
     return f"no design within the bounds {meets} {listed}{together}{deviating}"
+
+
+def _held(scene: Scene, answer: Answer) -> str:
+    """``; held by the lower bound of a, b``: the bounds that the nearest design lies on."""
+    own = {"lower": list[str](), "upper": list[str]()}
+    for row in active_rows(scene, answer):
+        own[row.side] += [row.name] * (row.kind == "bound")
+    told = (f"the {side} bound of {', '.join(names)}" for side, names in own.items() if names)
+    listed = " and ".join(told)
+    return f"; held by {listed}" if listed else ""
 
 
 def _why_unproved(scene: Scene, found: Found) -> Iterator[str]:

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
@@ -106,7 +107,20 @@ def _studied(
         ),
         followed=tuple(_followed(asked, before, after)),
         near=None if near is None else mode_rows(near, before, after, asked.rows),
+        room=_room(asked, after),
     )
+
+
+def _room(asked: Requirement, solved: Solved) -> float | None:
+    """The least relative distance to its edges at the samples; None of what has no limit."""
+    if asked.is_goal or asked.is_aim:
+        return None
+    if asked.bands:
+        beyond = [float(one.errors_by_count(solved, Margin()).min()) for one in asked.bands]
+    else:
+        curve = asked.curve(solved)
+        beyond = [float((row.scale * (curve - row.edge)).max()) for row in asked.edge_rows()]
+    return None if np.isinf(max(beyond)) else -max(beyond)
 
 
 def _followed(asked: Requirement, before: Solved, after: Solved) -> Iterator[FollowedRow]:
@@ -169,11 +183,11 @@ class Facts(NamedTuple):
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
     why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
     so; ``unreachable`` which targets are out of reach; ``deviated`` what is met and is not within
-    the tolerances, of a ``robust`` design; ``conflict`` which limits contradict, and
-    ``of_frequencies`` whether some of these are on frequencies; ``unfinished`` how a search was
-    ended before it was done. ``max_error`` is the largest error accepted where the case says it.
-    ``aim`` says what an objective that is no error has come to, and ``is_optimal`` whether that is
-    first-order optimal.
+    the tolerances, of a ``robust`` design; ``conflict`` which limits contradict, ``of_frequencies``
+    whether some of these are on frequencies, and ``held`` which bounds the answer lies on;
+    ``unfinished`` how a search was ended before it was done. ``max_error`` is the largest error
+    accepted where the case says it. ``aim`` says what an objective that is no error has come to,
+    and ``is_optimal`` whether that is first-order optimal.
     """
 
     targets: Sequence[TargetStudy]
@@ -185,6 +199,7 @@ class Facts(NamedTuple):
     deviated: Sequence[str] = ()
     robust: bool = False
     conflict: str = ""
+    held: str = ""
     of_frequencies: bool = True
     unfinished: str = ""
     max_error: float | None = None
@@ -222,7 +237,7 @@ def _word(facts: Facts) -> tuple[str, str]:
     if facts.unreachable:
         return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
     if facts.conflict:
-        return "infeasible", _beside(facts.conflict, far)
+        return "infeasible", _beside(facts.conflict, far) + facts.held
     if not far:
         if facts.unproved:
             return "do_not_use", "; ".join(facts.unproved)
@@ -255,6 +270,10 @@ def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
 
 
 def _beside(conflict: str, far: Sequence[str]) -> str:
+    """The contradiction with what is missed, whose name is not said twice."""
+    name, _, how = _all(far).partition(": ")
+    if len(far) == 1 and how and name in conflict and conflict.count("(line ") == 1:
+        return f"{conflict}: {how}"
     return f"{conflict} ({_all(far)})" if far else conflict
 
 
@@ -265,12 +284,13 @@ def _all(far: Sequence[str]) -> str:
 def _far(target: TargetStudy) -> str:
     """Where the target ends, and how far off: ``mode 1 at 48 Hz: 45.11 Hz, 6.02 % off at worst``.
 
-    A band has no frequency of its own.
+    A band has no frequency of its own, but a mode that is in it.
     """
     asked, worst = target.asked, f"{100 * target.error.exact.max_relative:.3g} %"
     said = f"{worst} off at worst" if asked.is_goal else f"violated by {worst} at worst"
     if not asked.terms:
-        return f"{target.label}: {said}"
+        mode = target.closest.partition(" clear of")[0]
+        return f"{target.label}: {said}, by {mode}" if target.near else f"{target.label}: {said}"
     k = int(asked.outside(target.exact_hz, target.exact_hz).argmax())
     return f"{target.label}: {target.exact_hz[k]:.4g} Hz, {said}"
 
