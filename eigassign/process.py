@@ -6,6 +6,7 @@ import contextlib
 import errno
 import io
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -13,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
+from time import monotonic
 from types import FrameType
 from typing import Any, NamedTuple, TextIO
 
@@ -77,19 +79,41 @@ def report(error: BaseException, debug: bool = False) -> int:
     return failure.exit_code
 
 
-def say(lines: Iterable[str], passing: bool = False) -> None:
-    """Write lines to stderr, no raw escapes; if that is closed only the exit code is left.
-
-    On a terminal the next line is written over those that are ``passing``.
-    """
+def say(lines: Iterable[str]) -> None:
+    """Write lines to stderr, no raw escapes; if that is closed only the exit code is left."""
     with suppress(OSError, AttributeError, ValueError):
-        clears = sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+        end = "\x1b[K\n" if _writes_over() else "\n"
         for line in map(printable, lines):
-            if clears:
-                # 58 columns: a line that wraps cannot be written over
-                shown = f"\r{line[:58]}\x1b[K\r" if passing else f"{line}\x1b[K\n"
-            sys.stderr.write(shown if clears else f"{line}\n")
+            sys.stderr.write(f"{line}{end}")
         sys.stderr.flush()
+
+
+def _writes_over() -> bool:
+    """True on a terminal that can write over a line."""
+    return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+class Progress:
+    """Lines of progress on stderr: on a terminal one that is written over, else a few.
+
+    These begin after a second, one a second at most, and then one for each quarter of the time.
+    """
+
+    def __init__(self) -> None:
+        self._begun = monotonic()
+        self._due = self._begun + 1.0
+
+    def __call__(self, line: str) -> None:
+        """Show how far it is; an empty line clears the terminal's."""
+        now = monotonic()
+        with suppress(OSError, AttributeError, ValueError):
+            if _writes_over():  # a line that wraps cannot be written over
+                room = shutil.get_terminal_size().columns - 1
+                sys.stderr.write(f"\r{printable(line)[:room]}\x1b[K\r")
+                sys.stderr.flush()
+            elif line and now >= self._due:
+                self._due = now + max(1.0, 0.25 * (now - self._begun))
+                say([line.strip()])
 
 
 def _snippet(problem: Problem) -> Iterator[str]:

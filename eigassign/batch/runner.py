@@ -135,8 +135,16 @@ def run(
             folder.mkdir(parents=True, exist_ok=True)
             held.enter_context(alone_in(folder))
         on_start(len(batch.plan), len(rows))
+        stages = Stages(say)
+
+        def count(found: CaseOutcome) -> None:
+            on_outcome(found)
+            stages.advance(sum(index in rows for index in todo), len(todo))
+
         try:
-            _run(batch, todo, rows, workers, on_outcome)
+            with stages("cases", "optimizing"):
+                stages.advance(0, len(todo) or 1)
+                _run(batch, todo, rows, workers, count)
         finally:
             told = summarise(batch, rows)
     return told

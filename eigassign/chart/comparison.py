@@ -72,9 +72,9 @@ def compare_methods(
     exact, near = subject.exact(tests.x), _near_modes(subject, tests)
     shapes = _by_shape(subject, tests) if near else np.full_like(exact, np.nan)
     made = dict[str, tuple[ChartPoint, Built, Callable[[], object]]]()
-    for method, where, truth, by_shape in _tasks(subject, effort, tests, exact, shapes):
-        if method.curve not in {row.curve for row, *_ in made.values()}:
-            progress(f"charting {method.curve}")
+    tasks = _tasks(subject, effort, tests, exact, shapes)
+    for k, (method, where, truth, by_shape) in enumerate(tasks, 1):
+        progress(f"{k}: {method.curve}, {method.size}")
         try:
             learnt = subject.learnt(method.learns)
             built = method.build(learnt)

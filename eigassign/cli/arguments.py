@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ import click
 
 from eigassign.errors import Problem
 from eigassign.files import plain, printable
-from eigassign.process import say
+from eigassign.process import Progress, say
 
 # --- Options and arguments
 
@@ -92,7 +92,12 @@ pose = several(
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 common = several(
     click.option("--quiet", is_flag=True, help="Print only errors on stderr."),
-    click.option("-v", "--verbose", count=True, help="Print all tables, and more on stderr (-vv: everything)."),
+    click.option(
+        "-v",
+        "--verbose",
+        count=True,
+        help="All tables; more on stderr (-vv: everything).",
+    ),
     click.option("--debug", is_flag=True, help="Print the traceback of an error."),
     click.option(
         "--allow-outside",
@@ -160,14 +165,21 @@ _PLACE = re.compile(r"(.+?:\d+:\d+: )(.+)", re.DOTALL)  # of a problem that is t
 
 @dataclass(frozen=True)
 class Reporter:
-    """Writes to stderr. ``level`` 0: errors only; 1: warnings and stages; 2, 3: more of the log."""
+    """Writes to stderr. ``level`` 0: errors only; 1: warnings, progress; 2, 3: all, and the log."""
 
     level: int = 1
+    progress: Progress = field(default_factory=Progress)
 
     def stage(self, line: str) -> None:
-        """Progress of long work; of a line that begins with blanks a terminal shows the last."""
-        if self.level > 0:
-            say([line], passing=line.startswith(" "))
+        """Progress of long work."""
+        if self.level > 1:
+            say([line])
+        elif self.level > 0:
+            self.progress(line)
+
+    def note(self, line: str) -> None:
+        """A line that stays."""
+        say([line] if self.level > 0 else ())
 
     def warn(self, warnings: Iterable[Problem | str]) -> None:
         """``file:line:column: warning: path: message``, or without a place."""
@@ -191,7 +203,8 @@ def reporting(how: Mapping[str, Any]) -> Iterator[Reporter]:
     ours.addHandler(handler)
     ours.setLevel((logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)[min(level, 3)])
     try:
-        yield Reporter(level)
+        yield (reporter := Reporter(level))
+        reporter.progress("")
     finally:
         ours.removeHandler(handler)
         ours.setLevel(before)

@@ -113,21 +113,16 @@ def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
 
 
 def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> list[CaseOutcome]:
-    """Run it with a line of progress for each case; the rows of all."""
+    """Run it with progress; the rows of all."""
     from eigassign.batch import runner
 
-    left = ran = 0
-
     def on_start(total: int, done: int) -> None:
-        nonlocal left
-        left = total - done
         if done:
-            reporter.stage(f"{done} of {total} cases are done and still current: skipped")
+            reporter.note(f"{done} of {total} cases are done and still current: skipped")
 
     def on_outcome(found: CaseOutcome) -> None:
-        nonlocal ran
-        ran += 1
-        reporter.stage(f"  case {ran}/{left} {found.name}: {found.word}")
+        if found.status != "ok":
+            reporter.note(f"{found.name}: {found.word}")
 
     return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
 

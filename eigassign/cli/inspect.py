@@ -52,14 +52,14 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     with reporting(how) as reporter:
         for case in cases:
             try:
-                with Stages(reporter.stage)("check", f"checking {case}", at_once=False):
+                with Stages(reporter.stage)("check", f"checking {case}"):
                     answer = queries.check(case, how["allow_outside"])
                     notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
                     folder = queries.draw(case, None, *(how[key] for key in _DRAWING[1:]))
-                    reporter.stage(f"{folder}/figures written")
+                    reporter.note(f"{folder}/figures written")
             except EigassignError as error:
                 codes.append(process.report(error))
                 if as_json:
@@ -157,7 +157,7 @@ def modes(
             answer = queries.modes(case, q, y, count, how["allow_outside"])
         reporter.warn(answer.warnings)
         if as_json and folder is not None:
-            reporter.stage(f"{folder} written")
+            reporter.note(f"{folder} written")
     if as_json:
         from eigassign.output.documents import results_document
 

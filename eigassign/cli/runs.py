@@ -97,14 +97,14 @@ def _finished(
         outcome = work(case, _options(how, reporter))
         results = outcome.results
         reporter.warn(results.warnings)
-        told = partial(print_assignment, results, verbose=reporter.level > 1)
-        _show(as_json, outcome.folder, results, outcome.seconds, told)
-        if results.shortcoming is not None and as_json:  # else it is in the verdict
-            reporter.error(results.shortcoming)
-        if results.interrupted:
-            kept = "no finished run is replaced"
-            reporter.error(f"interrupted: the best design so far is in {outcome.folder}; {kept}")
-            return process.INTERRUPTED
+    told = partial(print_assignment, results, verbose=how["verbose"] > 0)
+    _show(as_json, outcome.folder, results, outcome.seconds, told)
+    if results.shortcoming is not None and as_json:  # else it is in the verdict
+        reporter.error(results.shortcoming)
+    if results.interrupted:
+        kept = "no finished run is replaced"
+        reporter.error(f"interrupted: the best design so far is in {outcome.folder}; {kept}")
+        return process.INTERRUPTED
     return 0 if results.shortcoming is None else 1
 
 
@@ -333,7 +333,7 @@ def chart(
             folder, made = charting.chart(paths[0], options, effort, accuracy)
         reporter.warn(made.warnings)
         for note in made.notes:
-            reporter.stage(note)
+            reporter.note(note)
 
     def told() -> None:
         print_verdict(made.headline)

@@ -45,19 +45,19 @@ def chart_case(
     with case.located(), stages("methods", "charting methods"):
         asked = case.file.expansion
         given = asked.accuracy if "accuracy" in asked.model_fields_set else ACCURACY
-        made = compare_methods(case, effort, accuracy or given, options.progress)
-        orders = list(_orders(case, made, options))
+        made = compare_methods(case, effort, accuracy or given, stages.tell)
+        orders = list(_orders(case, made, stages))
     return replace(advised(made, orders), seconds=stages.total_s)
 
 
-def _orders(case: BuiltCase, made: Chart, options: Options) -> Iterator[OrderRow]:
+def _orders(case: BuiltCase, made: Chart, stages: Stages) -> Iterator[OrderRow]:
     """What `optimize` makes of the orders, where something is asked of a model of modest size."""
     file = case.file
     if not (file.has_question and file.design.parameters and made.asked.n_dof <= SOLVED_DOF):
         return
     found = dict[int, tuple[dict[str, float], float | None]]()
     for order in (p for p in TRIED if any(each.size == f"order {p}" for each in made.points)):
-        options.progress(f"optimizing with order {order}")
+        stages.tell(f"optimizing with order {order}")
         expansion = file.expansion.model_copy(update={"order": order})
         try:
             quiet = replace(DEFAULT, use_cache=False, report="none", study="none")
@@ -90,7 +90,7 @@ def chart_cases(
                 try:
                     case = load_case(path, options.allow_outside)
                     with case.located():
-                        charts[name] = advised(compare_methods(case, effort, wanted))
+                        charts[name] = advised(compare_methods(case, effort, wanted, stages.tell))
                 except EigassignError as error:
                     refused[name] = str(error)
         if not charts:

@@ -146,7 +146,7 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     with case.located():
         prepared = prepare(case, stages, _cache(options), assigned=True)
         with stages("assignment", "assigning the frequencies"):
-            answer = find_answer(prepared, options.progress)
+            answer = find_answer(prepared, stages.tell)
         scene, solved = answer.scene, _solved(answer, stages)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, scene.wanted, solved, answer.predicted, accepted)
@@ -279,8 +279,8 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     case, ended = load_case(path, options.allow_outside), dict[str, bool]()
     with new_run_folder(case.file, options.out, options.force, outcome=ended) as folder:
         results = solve_case(case, options).results
-        options.progress("writing the report")
-        folder.write(results, options.figures, options.report)
+        with stages("report", "writing the report"):
+            folder.write(results, options.figures, options.report)
         ended |= {UNFINISHED: True} if results.interrupted else {}
     place = unfinished_beside(folder.path) if results.interrupted else folder.path
     return Outcome(place, results, stages.total_s)
@@ -307,8 +307,9 @@ def expand_case(
             studies, accuracy = study_modes(scene), study_accuracy(scene)
         moving = _moving(scene, scene.initial, (), options)
         results = collect_results(scene, studies, accuracy, None, moving, stages.timing_s)
-        options.progress("writing the report")
-        folder.write(results, options.figures, options.report, coefficient_files(scene, linear))
+        with stages("report", "writing the report"):
+            extra = coefficient_files(scene, linear)
+            folder.write(results, options.figures, options.report, extra)
     return Outcome(folder.path, results, stages.total_s)
 
 

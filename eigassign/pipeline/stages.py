@@ -1,7 +1,6 @@
 """The stages of a run, its folder and the log in it; expansions of a plan, and their files.
 
-A stage that lasts says every few seconds how far it is, in a line of progress that begins with two
-spaces: how many of its pieces are done where they are counted, else for how long it has been going.
+A stage that lasts says every second how far it is.
 """
 
 from __future__ import annotations
@@ -54,29 +53,26 @@ def silent(_line: str) -> None:
 class Stages:
     """A stopwatch with a lap for each stage; ``timing_s`` holds them in the order they ran.
 
-    The first line of progress comes after ``first_s``, each further one after twice as long as the
-    one before, 10 s at most.
+    While a stage lasts a line of progress, which begins with two blanks, says every ``pause_s``
+    what it is at, for how long, and what is left where its pieces are counted.
     """
 
-    def __init__(self, progress: Callable[[str], None], first_s: float = 2.0) -> None:
+    def __init__(self, progress: Callable[[str], None], pause_s: float = 1.0) -> None:
         self.timing_s: dict[str, float] = {}
-        self._progress, self._first_s = progress, first_s
-        self._begun = perf_counter()
-        self._counted = ""
+        self._progress, self._pause_s = progress, pause_s
+        self._begun = self._start = perf_counter()
+        self._stage = self._detail = ""
+        self._share = 0.0
 
     @contextmanager
-    def __call__(self, name: str, announcement: str, at_once: bool = True) -> Iterator[None]:
-        """Announce the stage, run the body, and add what it took to the stage ``name``.
-
-        Not ``at_once``: announced with the first line of progress, if it lasts so long.
-        """
-        if at_once:
-            self._progress(announcement)
-        self._counted = ""
-        start, over, late = perf_counter(), Event(), "" if at_once else announcement
-        clock = Thread(target=self._tell, args=(start, over, late), daemon=True)
+    def __call__(self, name: str, announcement: str) -> Iterator[None]:
+        """Announce the stage, run the body, and add what it took to the stage ``name``."""
+        self._progress(announcement)
+        self._stage, self._detail, self._share = announcement, "", 0.0
+        start, over = perf_counter(), Event()
+        self._start = start
         if self._progress is not silent:
-            clock.start()
+            Thread(target=self._tick, args=(over,), daemon=True).start()
         try:
             yield
         finally:
@@ -85,16 +81,22 @@ class Stages:
 
     def advance(self, done: int, of: int) -> None:
         """Count the pieces of the stage that are done."""
-        self._counted = f"{done} of {of}"
+        self._detail, self._share = f"{done} of {of}", done / of
 
-    def _tell(self, start: float, over: Event, late: str) -> None:
-        pause = self._first_s
-        while not over.wait(pause):
-            pause = min(2.0 * pause, 10.0)
-            if late:
-                self._progress(late)
-                late = ""
-            self._progress(f"  {self._counted or f'{perf_counter() - start:.0f} s'}")
+    def tell(self, detail: str) -> None:
+        """Say what the stage is at now."""
+        self._detail, self._share = detail.strip(), 0.0
+        self._say()
+
+    def _tick(self, over: Event) -> None:
+        while not over.wait(self._pause_s):
+            self._say()
+
+    def _say(self) -> None:
+        spent, share = perf_counter() - self._start, self._share
+        left = f"about {spent / share - spent:.0f} s left" if 0.0 < share < 1.0 else ""
+        told = ", ".join(filter(None, (self._detail, f"{spent:.0f} s", left)))
+        self._progress(f"  {self._stage}: {told}")
 
     @property
     def total_s(self) -> float:

@@ -26,24 +26,26 @@ class Lines:
 
 def test_a_stage_that_lasts_says_how_far_it_is() -> None:
     lines = Lines()
-    stages = Stages(lines, first_s=0.01)
+    stages = Stages(lines, pause_s=0.01)
     with stages("expansion", "expanding"):
         lines.wait(2)
+        stages.tell("start 2")
         stages.advance(7, 8)
         lines.wait(len(lines.lines) + 2)
     assert lines.lines[0] == "expanding"
-    assert lines.lines[1] == "  0 s"
-    assert lines.lines[-1] == "  7 of 8"
+    assert lines.lines[1] == "  expanding: 0 s"
+    assert "  expanding: start 2, 0 s" in lines.lines
+    assert lines.lines[-1] == "  expanding: 7 of 8, 0 s, about 0 s left"
     count = len(lines.lines)
     with stages("expansion", "again"):
         lines.wait(count + 2)
-    assert lines.lines[count + 1] == "  0 s"  # nothing is left of the stage before
+    assert lines.lines[-1] == "  again: 0 s"  # nothing is left of the stage before
     assert list(stages.timing_s) == ["expansion"]
 
 
 def test_a_stage_ends_its_progress_with_an_error_too_and_silent_ones_start_no_thread() -> None:
     before = threading.active_count()
-    with pytest.raises(ValueError, match="bad"), Stages(Lines(), first_s=60.0)("a", "b"):
+    with pytest.raises(ValueError, match="bad"), Stages(Lines(), pause_s=60.0)("a", "b"):
         raise ValueError("bad")
     with Stages(silent)("a", "b"):
         assert threading.active_count() <= before + 1

@@ -61,7 +61,7 @@ def test_no_time_leaves_the_initial_design_and_says_so(tmp_path: Path) -> None:
     starts: list[str] = []
     found = found_of(tmp_path, SHIPPED + "\nassignment: {seconds: 1e-9}\n", starts)
     assert found.best.end is End.SECONDS
-    assert starts == ["  time used up: judging the best that is known", "  from start 1"]
+    assert starts == ["  time used up: judging the best that is known", "  start 1 of 100 at most"]
     np.testing.assert_array_equal(found.best.y, [0.0, 0.0])
 
 

@@ -319,7 +319,7 @@ class _Search:
         steps, self.tried = self.task.scene.file.assignment.steps, self.tried + 1
         start, *_ = self.near(variant)
         self.every.level[k] = TRIED
-        self.progress(f"  choice {self.tried} of {len(self.every.of)}")
+        self.progress(f"  trying choice {self.tried} of {len(self.every.of)}")
         try:
             found = minimise(variant.problem, start, steps, self.deadline)
         except EigassignError:
@@ -344,8 +344,6 @@ class _Search:
         """The optima of a choice from all starts, with its bands clear between the samples too."""
         every, below = self.every, self.every.belows[self.every.of[k]]
         every.level[k] = DONE
-        if len(every.of) > 1:
-            self.progress(f"  {len(self.outcomes) + 1} of {len(every.of)} choices searched")
         margins = self.task.margins
         try:
             found = self.searched(k, margins, (), not every.is_discrete)
@@ -389,9 +387,12 @@ class _Search:
             starts = [self.leads[k]]
         alone = len(self.every.of) == 1
         most = most_starts(self.task.scene.file, alone) if spread else 0
-        found = search_starts(
-            *(levels, posed, starts, self.made, self.deadline, self.progress, most, self.ended)
-        )
+        choice = "" if alone else f"choice {len(self.outcomes) + 1} of {len(self.every.of)}, "
+
+        def progress(line: str) -> None:
+            self.progress(f"  {choice}{line}")
+
+        found = search_starts(levels, posed, starts, self.deadline, progress, most, self.ended)
         self.made, self.spent = self.made + found.starts, self.spent + found.exact_solves
         self.ended = found.ended or self.ended
         return found

@@ -307,7 +307,6 @@ def search_starts(
     levels: Sequence[Task],
     posed: Callable[[Task], PosedProblem],
     starts: Sequence[Floats],
-    made: int,
     deadline: float,
     progress: Callable[[str], None],
     most: int,
@@ -315,14 +314,14 @@ def search_starts(
 ) -> Searched:
     """The local optima of what is ``posed`` that ``starts`` lead to, and spread designs up to most.
 
-    So many starts were ``made`` before. Of a search that has ``ended`` the first is judged alone.
+    Of a search that has ``ended`` the first is judged alone.
     ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
     answer; with scenarios, in which others may have one, where none has.
     """
     first, keys = levels[0], levels[0].scene.file.assignment
     search, lost = Searched(posed(first), ended=ended), list[EigassignError]()
     for start in _in_turn(first, posed, search.variant, starts, most):
-        progress(f"  from start {made + search.starts + 1}")
+        progress(f"start {search.starts + 1} of {max(most, len(starts))} at most")
         try:
             search = _after(search, start, keys.steps, deadline)
         except EigassignError as error:
@@ -337,7 +336,7 @@ def search_starts(
     responses = [search.variant.response]
     for level in levels[1:]:
         if not search.ended:
-            progress("  from what was found, on all samples and exactly")
+            progress("from what was found, on all samples and exactly")
         refined = replace(search, variant=posed(level), optima=())
         finer = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
         search = replace(finer, tally=search.tally)
