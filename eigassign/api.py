@@ -27,7 +27,6 @@ from eigassign.process import one_thread
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case
 from eigassign.study import pictures as drawing
-from eigassign.study.results import ModePictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,16 +76,12 @@ class Case(built_case.BuiltCase):
         where the trajectory starts, and for the design as written. Raises UsageError for wrong
         lengths and for more modes than there are.
         """
-        return drawn(mode_figures(self._pictures(mode, q, y))[mode - 1])
-
-    def _pictures(
-        self, mode: int, q: Sequence[float] | None, y: Sequence[float] | None
-    ) -> ModePictures:
         if mode < 1:
             raise UsageError(f"modes are numbered from 1, got {mode}")
         at = queries.pose_and_design(self, q, y)
         with self.located():
-            return drawing.draw_modes(self.file, self.model(), *at, mode)
+            pictures = drawing.draw_modes(self.file, self.model(), *at, mode)
+        return drawn(mode_figures(pictures)[mode - 1])
 
 
 @one_thread

@@ -267,21 +267,6 @@ def _set_threads(counts: Sequence[int]) -> None:
 one_thread = _OneThread()
 
 
-@contextlib.contextmanager
-def environment(changes: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for the processes started inside."""
-    before = {name: os.environ.get(name) for name in changes}
-    os.environ.update(changes)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
 class _ClosedOutput(io.TextIOBase):
     """A stdout that was closed before the process began: writing to it fails."""
 

@@ -28,12 +28,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from eigassign.errors import EigassignError
-from eigassign.process import (
-    ONE_THREAD,
-    environment,
-    raise_terminated,
-    unwind_when_terminated,
-)
+from eigassign.process import ONE_THREAD, raise_terminated, unwind_when_terminated
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -84,14 +79,13 @@ class _Pool(ProcessPoolExecutor):
 def process_pool(workers: int) -> Iterator[Executor]:
     """Fresh processes, each with one BLAS thread; on an error inside they are stopped at once."""
     others = set(multiprocessing.active_children())
-    with environment(ONE_THREAD):  # before NumPy is imported there
-        context = multiprocessing.get_context("spawn")
-        with _Pool(workers, context, _prepare_worker) as pool:
-            try:
-                yield pool
-            except BaseException:
-                _stop(pool, set(multiprocessing.active_children()) - others)
-                raise
+    os.environ.update(ONE_THREAD)  # for these, before they import NumPy: this one has it
+    with _Pool(workers, multiprocessing.get_context("spawn"), _prepare_worker) as pool:
+        try:
+            yield pool
+        except BaseException:
+            _stop(pool, set(multiprocessing.active_children()) - others)
+            raise
 
 
 def _stop(pool: Executor, workers: set[Any]) -> None:

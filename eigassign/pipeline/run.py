@@ -237,23 +237,12 @@ def _result(
     results: RunResults, expansions: Expansions | None, assignment: Assignment | None
 ) -> Result:
     full, linear = None, None
-    time_s, target_hz, initial_hz, predicted_hz, exact_hz = _first_curve(results)
     if expansions is not None:
         several = len(expansions.fulls.parts) > 1
         full = expansions.fulls if several else expansions.full
         linear = expansions.linears if several else expansions.linear
-    return Result(
-        design={row.name: row.optimal for row in results.design},
-        time_s=time_s,
-        target_hz=target_hz,
-        initial_hz=initial_hz,
-        predicted_hz=predicted_hz,
-        exact_hz=exact_hz,
-        results=results,
-        expansion=full,
-        linearised=linear,
-        assignment=assignment,
-    )
+    design = {row.name: row.optimal for row in results.design}
+    return Result(design, *_first_curve(results), results, full, linear, assignment)
 
 
 def _first_curve(results: RunResults) -> tuple[Floats, Floats, Floats, Floats | None, Floats]:
