@@ -132,9 +132,9 @@ def test_one_reduced_model_reaches_over_it():
 # --- Straight and folded, an arm's joint angles have no derivative with respect to its tip
 
 
-def test_a_tip_path_out_of_reach_is_refused_at_its_sample():
+def test_a_tip_path_out_of_reach_is_refused_at_its_waypoint():
     with pytest.raises(
-        CaseError, match=r"straight_arm\.yaml:\d+:\d+: .*sample \d+ .* out of reach"
+        CaseError, match=r"straight_arm\.yaml:\d+:\d+: .*waypoint \d+ .* out of reach"
     ):
         _ = case("straight_arm").trajectory
 

@@ -245,10 +245,19 @@ class Course(NamedTuple):
         length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         return max(length, float(np.linalg.norm(points, axis=1).max()))
 
+    def waypoint(self, k: int) -> int | None:
+        """The waypoint (from 0) that sample k is due at, None between two."""
+        near = np.flatnonzero(np.abs(self.path.knots - self.s[k]) < _ROUND_OFF)
+        return int(near[0]) if len(near) else None
+
     def label(self, k: int) -> str:
-        """Sample, time and point in words."""
+        """Sample, time and point in words, or the waypoint."""
         point = ", ".join(f"{x:.6g}" for x in self.path.value(self.s[k])[0])
-        return f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"
+        if (i := self.waypoint(k)) is not None:
+            return f"waypoint {i + 1} ({point}) m"
+        i = int(np.searchsorted(self.path.knots, self.s[k]))
+        sample = f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"
+        return f"between waypoints {i} and {i + 1}, {sample}"
 
 
 Bools = NDArray[np.bool_]
@@ -293,6 +302,16 @@ class TipChain:
     def n_q(self) -> int:
         """Number of coordinates."""
         return len(self.joints)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the coordinates, of their joints where no case is known."""
+        return self.joints if self.tables is None else tuple(self.tables.case.coordinates)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """rad or m of each coordinate."""
+        return tuple("m" if kind == "slide" else "rad" for kind in self.kinds[: self.n_q])
 
     @property
     def y_names(self) -> tuple[str, ...]:

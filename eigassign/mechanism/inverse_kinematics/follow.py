@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -50,12 +51,22 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     trace,
 )
-from eigassign.mechanism.kinematics.loop_closure import wrapped
+from eigassign.mechanism.kinematics.loop_closure import as_assembly, wrapped, written
 
 
 def pose(ik: TipProblem, u: Floats) -> str:
     """The coordinates of a state in words."""
-    return "q = (" + ", ".join(f"{value:.6g}" for value in ik.coordinates(u[None])[0]) + ")"
+    q, turning = ik.coordinates(u[None])[0], ik.chain.of_kind("turn")[: ik.n_q]
+    named = zip(ik.chain.names, np.where(turning, wrapped(q), q), ik.chain.units, strict=True)
+    return ", ".join(f"{name} = {written(value, unit)}" for name, value, unit in named)
+
+
+def _assembly(ik: TipProblem, u: Floats) -> str:
+    """The key `assembly` that puts the loops together as they are in a state."""
+    q, p = np.split(u * ik.scale, [ik.n_q])
+    tables = ik.chain.tables
+    key = tables and as_assembly(tables.case, tables.motion.tree, q, p)
+    return f"mechanism.assembly: {key or pose(ik, u)}"
 
 
 def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
@@ -65,7 +76,13 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
     near = "(" + ", ".join(f"{x:.6g}" for x in seen.point[0]) + ") m"
     if ik.chain.assembly is not None:
         near += f", at {pose(ik, u)}"
-    key, message = WAYPOINTS, f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
+    elif len(seen.point[0]) == 2 and ik.chain.kinds[0] == "turn":
+        spin = np.linalg.inv(ik.chain.relative_map[0])[:, 0]  # of joint coordinate 1 alone
+        reach = float(np.linalg.norm(seen.jacobian[0, :2, : ik.n_q] @ spin))
+        near += f", {reach:.3g} m from joint {ik.chain.joints[0]}"
+    i = course.waypoint(k)
+    key = WAYPOINTS if i is None else f"{WAYPOINTS}[{i}]"
+    message = f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
     # a turn within 1e-6 rad is reached: the blame is the position's
     if course.attitude is not None and turn[0] > 1e-6:
         key = f"trajectory.{course.attitude.key}"
@@ -94,7 +111,8 @@ def outside(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryErro
     if kind != "slide":
         value, low, high = (float(np.degrees(x)) for x in (value, low, high))
     if kind == "turn":
-        value, modulo = value % 360.0, " (modulo 360)"
+        least = 0.5 * (low + high) - 180.0  # the turn nearest to the range
+        value, modulo = least + (value - least) % 360.0, " (modulo 360)"
     joint = ik.chain.joints[row]
     message = (
         f"{course.label(k)} needs joint {joint} at {value:.6g} {unit}, "
@@ -150,14 +168,56 @@ def follow(
         except TrajectoryError as error:
             failures.append(error)
             continue
+        turns = _turns(ik, u)
+        u, path = u - turns, path._replace(u=path.u - turns)
         return Followed(ik.coordinates(u), _notes(ik, candidates), ik, u, path)
     if not failures:
         message = (
             f"{course.label(0)} can be reached only with the loops put together otherwise than at "
-            f"{pose(ik, ik.seeds[0])}, or past a dead point: move the path, or mechanism.assembly"
+            f"{pose(ik, ik.seeds[0])}, or past a dead point: move the path, or write "
+            f"{' or '.join(_assembly(ik, u) for u in candidates[:4])}"
         )
         raise TrajectoryError(WAYPOINTS, message, 0)
-    raise max(failures, key=lambda error: error.sample)
+    furthest = max(failures, key=lambda failure: failure.sample)
+    _require_waypoints(ik, course, furthest.sample)
+    raise furthest
+
+
+def _turns(ik: TipProblem, u: Floats) -> Floats:
+    """The whole turns (n_z,) in rad between the middle of a path (n, n_z) and what is nearest to it
+    in the branch, or to 0; none where there is a start.
+    """
+    turns, (matrix, offset) = np.zeros(u.shape[1]), ik.chain.relative_map
+    if ik.start is not None:
+        return turns
+    q, rows = ik.coordinates(u), list(ik.rows)
+    turning, middle = ik.chain.of_kind("turn")[: ik.n_q], 0.5 * (q.min(axis=0) + q.max(axis=0))
+
+    def whole(angle: Floats) -> Floats:  # half a turn, but for round-off, stays
+        return np.asarray(2.0 * np.pi * np.ceil((angle - np.pi - 1e-9) / (2.0 * np.pi)))
+
+    back = np.where(turning, whole(middle), 0.0)
+    wanted = np.zeros(ik.n_q)
+    own = (matrix @ (middle - back) + offset)[rows] - (ik.low + 0.5 * ik.width)
+    wanted[rows] = np.where(turning[rows], whole(own), 0.0)
+    turns[: ik.n_q] = back + np.linalg.solve(matrix, wanted)
+    return turns
+
+
+def _require_waypoints(ik: TipProblem, course: Course, sample: int) -> None:
+    """Raises TrajectoryError for the first waypoint out of reach, about what stops a ``sample``."""
+    there = course._replace(s=course.path.knots)
+    # loops come no nearer to a dead point, see `_blocked`
+    tolerance = (RESIDUAL if ik.chain.assembly is None else 1e-6) * ik.lever
+    for i, s in enumerate(there.s):
+        u = ik.seeds
+        for iterations in (8, 20, 100):  # as at the first sample
+            u, miss = levenberg(ik, u, course.target(s[None]), iterations)
+            if miss.min() <= tolerance:
+                break
+        else:
+            error = out_of_reach(ik, there, i, u[np.argmin(miss)])
+            raise TrajectoryError(error.path, error.message, sample)
 
 
 def at_parameters(followed: Followed, course: Course) -> Floats:
@@ -210,7 +270,7 @@ def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
         k = int(np.argmax(other))
         message = (
             f"{course.label(k)} is reached at {pose(ik, u[k])}, but on the straight way there the "
-            "model puts its loops together otherwise: choose mechanism.assembly.at nearer"
+            f"model puts its loops together otherwise: write {_assembly(ik, u[k])}"
         )
         raise TrajectoryError(WAYPOINTS, message, k)
     return own
@@ -263,10 +323,27 @@ def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
     if ik.chain.assembly is not None:
         said = "the solution nearest to mechanism.assembly is taken at the first sample"
         return (f"{said}: name a branch or a start for another",)
+    ways = [_branch(ik, candidates, k) for k in range(min(len(candidates), 8))]
+    others = " | ".join([*ways[1:], "…"][: len(ways) - 1 + (len(candidates) > 8)])
     return (
-        f"the first sample can be reached in {len(candidates)} ways, of which one is taken: name a "
-        "branch or a start for another",
+        f"the first sample can be reached in {len(candidates)} ways; taken is branch: {ways[0]}, "
+        f"others are {others}",
     )
+
+
+def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
+    """The shortest `branch` that only one of the candidates is in: half turns of few joints."""
+    joints, own = ik.chain.joints, np.degrees(ik.joint_coordinates(np.array(candidates)))
+    turning = np.flatnonzero(ik.chain.of_kind("turn")[: ik.n_q])
+    halves = [(j, low) for j in turning for low in (0, -180, -90, 90)]
+    halves.sort(key=lambda half: (half[0] == 0, abs((own[k, half[0]] - half[1]) % 360.0 - 90.0)))
+    for few in (some for n in (1, 2, 3) for some in combinations(halves, n)):
+        inside = np.all([(own[:, j] - low) % 360.0 < 180.0 for j, low in few], axis=0)
+        if inside[k] and inside.sum() == 1 and len({j for j, _ in few}) == len(few):
+            named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in few)
+            return f"{{{', '.join(named)}}}"
+    q = zip(ik.coordinates(candidates[k][None])[0], ik.chain.units, strict=True)
+    return f"start: [{', '.join(written(value, unit) for value, unit in q)}]"
 
 
 # --- the first sample

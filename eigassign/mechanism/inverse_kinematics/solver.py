@@ -57,8 +57,9 @@ class TipProblem(NamedTuple):
         return self.chain.n_q
 
     def coordinates(self, u: Floats) -> Floats:
-        """q (n, n_q) in rad or m, or rates of it."""
-        return np.ascontiguousarray((u * self.scale)[:, : self.n_q])
+        """q (n, n_q) in rad or m, or rates of it; 0 for what is round-off, below 1e-12."""
+        q = np.ascontiguousarray((u * self.scale)[:, : self.n_q])
+        return np.where(np.abs(q) < 1e-12, 0.0, q)
 
     def task(self, course: Course, s: ArrayLike, order: int = 1) -> Floats:
         """dp/ds or d²p/ds² (n, m): the point in m, the turning times the lever."""

@@ -93,9 +93,15 @@ def test_coordinates_that_are_given_do_not_follow() -> None:
 @pytest.mark.parametrize(
     ("lengths", "words"),
     [
-        ((0.3, 0.1), r"with a = 0\.3, b = 0\.1: sample \d+ .* is 0\.\d+ m out of reach"),
-        ((0.7, 0.3), r"with a = 0\.7, b = 0\.3: sample \d+ .* is 0\.\d+ m out of reach"),
-        ((0.2, 0.2), r"with a = 0\.2, b = 0\.2: sample \d+ .* needs joint elbow at"),
+        (
+            (0.3, 0.1),
+            r"with a = 0\.3, b = 0\.1: between .* 4 and 5, .* is 0\.\d+ m out of reach",
+        ),
+        (
+            (0.7, 0.3),
+            r"with a = 0\.7, b = 0\.3: between .* 4 and 5, .* is 0\.\d+ m out of reach",
+        ),
+        ((0.2, 0.2), r"with a = 0\.2, b = 0\.2: waypoint 1 .* needs joint elbow at"),
     ],
 )
 def test_a_design_that_cannot_follow_is_refused_with_its_lengths_and_sample(
