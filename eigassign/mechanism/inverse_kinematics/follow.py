@@ -211,7 +211,7 @@ def _require_waypoints(ik: TipProblem, course: Course, sample: int) -> None:
     tolerance = (RESIDUAL if ik.chain.assembly is None else 1e-6) * ik.lever
     for i, s in enumerate(there.s):
         u = ik.seeds
-        for iterations in (8, 20, 100):  # as at the first sample
+        for iterations in (28, 100):  # as at the first sample
             u, miss = levenberg(ik, u, course.target(s[None]), iterations)
             if miss.min() <= tolerance:
                 break
@@ -340,7 +340,7 @@ def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
     for few in (some for n in (1, 2, 3) for some in combinations(halves, n)):
         inside = np.all([(own[:, j] - low) % 360.0 < 180.0 for j, low in few], axis=0)
         if inside[k] and inside.sum() == 1 and len({j for j, _ in few}) == len(few):
-            named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in few)
+            named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in sorted(few))
             return f"{{{', '.join(named)}}}"
     q = zip(ik.coordinates(candidates[k][None])[0], ik.chain.units, strict=True)
     return f"start: [{', '.join(written(value, unit) for value, unit in q)}]"
@@ -357,7 +357,8 @@ def first_solutions(ik: TipProblem, course: Course) -> list[Floats]:
     """
     target = course.target(course.s[:1])
     u = ik.seeds
-    for iterations in (8, 20, 100):  # the last for targets at the end of the reach
+    # 28 find all eight ways of a six-axis arm; the last for targets at the end of the reach
+    for iterations in (28, 100):
         u, miss = levenberg(ik, u, target, iterations)
         reached = miss <= RESIDUAL * ik.lever
         wanted = reached & ik.inside(u).all(axis=1)
