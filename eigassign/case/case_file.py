@@ -36,6 +36,7 @@ from eigassign.case.reader import (
     read_mapping,
     read_yaml,
     resolve,
+    told_once,
     value_below,
     with_values,
 )
@@ -484,7 +485,7 @@ def checked(
     findings = bad + [finding for finding in found if finding[0] not in unread]
     if document is not None and not findings:
         findings = [*islice(inconsistent(document), MOST_PROBLEMS)]
-    problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
+    problems = [*source.problems, *(source.problem(*each) for each in told_once(findings))]
     if problems or document is None:
         raise CaseError(tuple(dict.fromkeys(problems))[:MOST_PROBLEMS])
     doubts = [*implausible(document), *unreadable([each for each in named if each.spare])]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from itertools import accumulate, islice
 from pathlib import PurePath
@@ -149,6 +149,30 @@ class Source(NamedTuple):
         """Problem at the line and column of ``path``, or of the nearest key that exists."""
         mark = self.marks.find(path)
         return Problem(self.file, mark.line, mark.column, dotted(path), message)
+
+
+_MEANT = re.compile(r"unknown key; did you mean '(.*?)'")
+_UNKNOWN = re.compile(r"(?:unknown (?!key)[a-z ]+|expected .*, got) '([^']*)'; did you mean")
+
+
+def told_once(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings without those that others explain.
+
+    A mistyped key is not missing too, and one that says what a part is explains all else there. A
+    name that does not exist is told once, with the other places.
+    """
+    typed = {path: m[1] for path, message in findings if (m := _MEANT.match(message))}
+    missing = {(*path[:-1], meant) for path, meant in typed.items()}
+    kinds = {path[:-1]: path for path, meant in typed.items() if meant in ("shape", "type")}
+    told: dict[object, Finding] = {}
+    for path, message in findings:
+        if path in missing or kinds.get(path[:-1], path) != path:
+            continue
+        name = _UNKNOWN.match(message)
+        key = name[1] if name else (path, message)
+        first, said = told.get(key, (path, message))
+        told[key] = first, said + f"; also at {dotted(path)}" * (path != first)
+    return [*told.values()]
 
 
 def dotted(path: KeyPath) -> str:

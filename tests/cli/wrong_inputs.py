@@ -73,12 +73,12 @@ def wrong_inputs() -> Iterator[Wrong]:
     yield Wrong(
         "an unreachable path",
         _edited(("[0.4, 0.4]", "[4.0, 0.4]")),
-        "trajectory.waypoints: sample 1 (t = 0.25 s",
+        "trajectory.waypoints[1]: waypoint 2 (4, 0.4) m is 3.13 m out of reach",
     )
     yield Wrong(
         "a branch never taken",
         _edited(("[0 deg, 180 deg]", "[1 deg, 2 deg]")),
-        "trajectory.branch.elbow: sample 0",
+        "trajectory.branch.elbow: waypoint 1 ",
     )
     yield Wrong(
         "a missing CSV file",

@@ -171,7 +171,7 @@ def branches_are_ranges_of_driven_joints(document: Document) -> Iterator[Finding
             path: KeyPath = (*place, "branch", joint)
             if joint not in ranged:
                 yield path, unknown("joint with one freedom", joint, ranged)
-            elif joint not in moved:
+            elif joint not in moved and moved <= {*mechanism.joints}:
                 known = listed([name for name in ranged if name in moved])
                 yield path, f"no coordinate moves this joint, but the loop does; use {known}"
             elif isinstance(mechanism.joints[joint], RevoluteJoint) and high - low > 2 * math.pi:

@@ -87,7 +87,8 @@ def node_problem(mechanism: Mechanism, value: str, also: str = "") -> str | None
     few = [repr(f"{link}.{name}") for name in nodes]
     spelt = few if len(nodes) <= 6 else [f"'{link}.<node>' ({listed(nodes)})"]
     expected = " or ".join([*or_else, *spelt])
-    return f"expected {expected}, got {shown(value)}{suggestion(node, nodes)}"
+    near = suggestion(node, nodes).replace("mean '", f"mean '{link}.")
+    return f"expected {expected}, got {shown(value)}{near}"
 
 
 # --- Materials and sections
