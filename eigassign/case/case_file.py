@@ -49,7 +49,11 @@ from eigassign.case.rules.consistency import (
     too_many,
     unreadable,
 )
-from eigassign.case.rules.plausibility import bounds_hold_nothing_impossible, implausible
+from eigassign.case.rules.plausibility import (
+    bare_lengths_are_of_machines,
+    bounds_hold_nothing_impossible,
+    implausible,
+)
 from eigassign.case.rules.properties import (
     below,
     coordinate_lists,
@@ -501,7 +505,8 @@ def checked(
         in_degrees=_in_degrees(source, written.data),
     )
     if impossible := [source.problem(*each) for each in bounds_hold_nothing_impossible(case)]:
-        raise CaseError(tuple(impossible[:MOST_PROBLEMS]))
+        bare = [source.problem(*each) for each in bare_lengths_are_of_machines(document)]
+        raise CaseError(tuple((bare or impossible)[:MOST_PROBLEMS]))
     return case
 
 

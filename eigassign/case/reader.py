@@ -98,6 +98,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
 
 
 MAX_DEPTH = 50  # levels; a case has ten, and Python calls itself a thousand times
+COMMA = "decimals take a point, not a comma"
 _TOO_DEEP = f"nested more than {MAX_DEPTH} levels deep"
 ENTRIES = 200_000  # of all lists and mappings: some seconds and 400 MB, whatever is wrong with them
 KeyPath = tuple[str | int, ...]
@@ -326,13 +327,22 @@ class _Builder:
     def _mapping(self, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
         values: dict[str, object] = {}
         marks: dict[str | int, Mark] = {}
+        number = ""  # of the entry before
         for event in events:
             if isinstance(event, yaml.MappingEndEvent):
                 break
-            place = _mark(event)
+            place, rest = _mark(event), getattr(event, "value", "")
             key, _ = self.node(event, events, (*path, "?"), place)
+            event = next(events)
+            value, mark = self.node(event, events, (*path, str(key)[:80]), place)
+            if value is None and number.lstrip("-+").isdecimal() and rest[:1].isdecimal():
+                number, (last, there) = f"{number}.{rest}", marks.popitem()
+                values[str(last)], marks[last] = resolve(number), there
+                where, why = dotted((*path, last)), f"{COMMA}: write {number}"
+                self.problems.append(Problem(self.file, there.line, there.column, where, why))
+                continue
             usable = self._usable(key, values, marks, path, place)
-            value, mark = self.node(next(events), events, (*path, str(key)[:80]), place)
+            number = getattr(event, "value", "") if usable else ""
             if usable and value is None and (hint := unspaced(key)):
                 key, _, rest = key.partition(":")
                 value, where = resolve(rest), dotted((*path, key))
@@ -347,7 +357,7 @@ class _Builder:
     ) -> bool:
         if not isinstance(key, str):
             number = isinstance(key, (int, float)) and not isinstance(key, bool)
-            comma = " (decimals take a point, not a comma)" if number else ""
+            comma = f" ({COMMA})" if number else ""
             message = f"keys must be text, got {shown(key)}: put it in quotes{comma}"
         elif key in seen:
             message = f"{shown(key)} is given twice; first in line {marks[key].line}"

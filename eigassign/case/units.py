@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple, Self
 
-from eigassign.case.reader import NUMBER, shown, suggestion
+from eigassign.case.reader import COMMA, NUMBER, shown, suggestion
 
 SHOWN = 8  # values of a pose or design that are named
 Exponents = tuple[int, ...]  # of kg, m, s, rad, cycle
@@ -161,6 +161,15 @@ def _unit_of(given: object) -> str:
     return getattr(given, "answered", given if isinstance(given, str) else "")
 
 
+LEFT_OUT = {  # by what a bare number is in: the unit that is easily left out, and its size
+    "m": ("mm", 1e-3),
+    "kg": ("g", 1e-3),
+    "Pa": ("GPa", 1e9),
+    "N/m": ("kN/m", 1e3),
+    "N m/rad": ("kN m/rad", 1e3),
+}
+
+
 def handy_unit(unit: str, *values: float) -> tuple[str, float]:
     """The unit that amounts in SI ``unit`` are answered in, and its size in SI.
 
@@ -184,6 +193,14 @@ def written(amount: float, unit: str = "", *others: float) -> str:
     """An amount in the unit that the file has for it, or for ``others``; else in SI ``unit``."""
     name, size = handy_unit(SI(unit, amount, *others))
     return f"{amount / size:.12g} {name}".rstrip()
+
+
+def slip(amount: float, si: str) -> str:
+    """A hint at the unit that may have been left out: of a number that has one, none."""
+    meant = LEFT_OUT.get(si, ("", 0.0))[0]
+    if not meant or SI("", amount).answered:
+        return ""
+    return f"; {amount:g} is {amount:g} {si} without a unit; did you mean {amount:g} {meant}?"
 
 
 def shown_point(names: Iterable[str], values: Iterable[float], units: Iterable[str]) -> str:
@@ -305,7 +322,7 @@ def _split(text: str, dimension: Dimension | None) -> tuple[str, str]:
         raise QuantityError(f"{_expected(dimension)}, got text {shown(text)}")
     rest = stripped[match.end() :].strip()
     if re.match(r",\d", rest):
-        raise QuantityError(f"decimals take a point, not a comma: {shown(text)}")
+        raise QuantityError(f"{COMMA}: write {text.replace(',', '.', 1)}")
     return match.group(), rest
 
 

@@ -19,7 +19,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, entries, listed, unknown
+from eigassign.case.reader import COMMA, Finding, KeyPath, Tree, entries, listed, unknown
 from eigassign.case.rules import mechanism, properties
 from eigassign.case.rules.properties import coordinate_lists, followed_modes, freedoms, walk
 from eigassign.case.schema.design import Choices
@@ -38,6 +38,7 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
+from eigassign.case.units import written
 from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
 _SPARE = ("measurements", "sweep")
@@ -187,7 +188,10 @@ def bounds_go_upwards(document: Document) -> Iterator[Finding]:
     for path, part in limited.items():
         low, high = getattr(part, "min", None), getattr(part, "max", None)
         if low is not None and high is not None and low > high:
-            yield (*path, "min"), f"min {low:g} is above max {high:g} (SI units)"
+            yield (
+                (*path, "min"),
+                f"min {written(low, '', high)} is above max {written(high, '', low)}",
+            )
 
 
 def constraints_are_between_design_parameters(document: Document) -> Iterator[Finding]:
@@ -232,7 +236,7 @@ def times_are_of_trajectories(document: Document) -> Iterator[Finding]:
             first, last = time if isinstance(time, tuple) else (time, time)
             if not (motion[0] <= last and first <= motion[1]):
                 lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
-                what = "lies" if isinstance(time, tuple) else f"{time:g} s is"
+                what = "lies" if isinstance(time, tuple) else f"{written(time, 's')} is"
                 yield (*path, key), f"{what} outside: {lasts}"
 
 
@@ -381,7 +385,7 @@ def keys_have_values(tree: Tree) -> Iterator[Finding]:
     """No key and no entry of a list is left empty."""
     for path, node in properties.walk(tree):
         if node is None:
-            hint = " (decimals take a point, not a comma)" if str(path[-1])[:1].isdigit() else ""
+            hint = f" ({COMMA})" if str(path[-1])[:1].isdigit() else ""
             yield path, f"has no value: give one, or leave the key out{hint}"
 
 

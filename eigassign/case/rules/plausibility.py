@@ -26,7 +26,7 @@ from eigassign.case.schema.links import BareSection, BeamLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body, freedom_of
 from eigassign.case.schema.parts import semidefinite, spread
 from eigassign.case.schema.trajectory import Added, named_trajectories
-from eigassign.case.units import TWO_TURNS
+from eigassign.case.units import LEFT_OUT, SI, TWO_TURNS, Given, slip, written
 
 LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
 DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
@@ -49,19 +49,14 @@ SIZES = {  # of the properties of a group, by key
     ("sections", "shear_coefficient"): (0.05, 1.2, ""),  # thin-walled … solid (5/6, 9/10)
     **{
         ("sections", key): (*DEPTH, "m")
-        for key in ("diameter", "outer_diameter", "inner_diameter", "width", "height")
+        for key in (
+            *("diameter", "outer_diameter", "inner_diameter", "width", "height"),
+            *("thickness", "flange_thickness", "web_thickness"),
+        )
     },
     ("trajectory", "waypoints"): (*_FAR, "m"),
     ("trajectory", "angle"): (*_TURNS, "rad"),
     ("trajectory", "orientation"): (*_TURNS, "rad"),
-}
-# By what a bare number is in: the unit that is easily left out, and its size.
-_MEANT = {
-    "m": ("mm", 1e-3),
-    "kg": ("g", 1e-3),
-    "Pa": ("GPa", 1e9),
-    "N/m": ("kN/m", 1e3),
-    "N m/rad": ("kN m/rad", 1e3),
 }
 
 
@@ -132,20 +127,39 @@ def implausible(document: Document) -> Iterator[Finding]:
 
 def numbers_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
     """Properties as written, as the design and load cases change them, and places of paths."""
-    found: dict[KeyPath, str] = {}
+    bare, found = dict(bare_lengths_are_of_machines(document)), dict[KeyPath, str]()
     for place, group, key, value in _given(document):
         low, high, unit = SIZES.get((group, key), (-math.inf, math.inf, ""))
-        if not low <= value <= high:
+        if not low <= value <= high and place not in bare:
             found.setdefault(place, _outside(value, low, high, unit))
     yield from found.items()
 
 
 def _outside(value: float, low: float, high: float, unit: str) -> str:
+    unit = SI(unit, value)
     if unit == "rad":
-        return f"{abs(value):g} rad is more than two turns: was it meant in deg?"
-    bare = f" A bare number is in {unit}" if unit in ("m", "m2") and value > high else ""
-    bare += f": write {value:g} mm if that was meant" if bare and unit == "m" else ""
-    return f"{value:g} {unit} is outside {low:g} … {high:g}: is the unit right?{bare}"
+        meant = "" if unit.answered else ": was it meant in deg?"
+        return f"{written(value, unit).lstrip('-')} is more than two turns{meant}"
+    meant = " A bare number is in m2" if unit == "m2" and value > high else ""
+    ends = f"{written(low, unit)} … {written(high, unit)}"
+    return f"{written(value, unit)} is outside {ends}: is the unit right?{meant}"
+
+
+def bare_lengths_are_of_machines(document: Document) -> Iterator[Finding]:
+    """No bare number of 1 or more is longer than any machine, nor deeper than all links are long.
+
+    Nor is it a length of ten times those that have a unit.
+    """
+    links = document.mechanism.links.values()
+    lengths = [n for link in links if isinstance(n := getattr(link, "length", None), float)]
+    longest = max([n for n in lengths if SI("", n).answered] or lengths, default=math.inf)
+    most = {"sections": longest, "links": 10.0 * longest}
+    found: dict[KeyPath, str] = {}
+    for place, group, key, value in _given(document):
+        _, high, unit = SIZES.get((group, key), (0.0, math.inf, ""))
+        if unit == "m" and value > max(1.0, min(high, most.get(group, high))):
+            found.setdefault(place, slip(value, unit).replace("; ", f"{place[-1]} ", 1))
+    yield from ((place, why) for place, why in found.items() if why)
 
 
 def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
@@ -167,9 +181,9 @@ def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
         if kind != "screw" and freedom_of(kind, c.component) != "translation":
             turning.append(k)
     for place, row in coordinate_lists(document):  # screws turn many times
-        angles = [abs(row[k]) for k in turning]
+        angles = [row[k] for k in turning]
         place = place[:-1] if isinstance(place[-1], int) else place
-        yield place, "trajectory", "angle", max(angles, default=0.0)
+        yield place, "trajectory", "angle", max(angles, key=abs, default=0.0)
     for place, varied, number in _varied(document):
         group, _, key, *_ = varied.split(".")
         yield place, group, key, number
@@ -186,7 +200,8 @@ def _varied(document: Document) -> Iterator[tuple[KeyPath, str, float]]:
         for key, end in zip(("min", "max"), entry.range, strict=True):
             key = key if entry.values is None else "values"
             for path, factor in entry.factors.items():
-                yield ("design", name, key), path, factor * end
+                own = Given(factor * end, getattr(end, "text", math.nan))
+                yield ("design", name, key), path, own
     for place, _, motion in named_trajectories(document.trajectory):
         for path, value in motion.set.items():
             yield (*place, "set", path), path, value.add if isinstance(value, Added) else value
@@ -204,10 +219,10 @@ def bare_sections_can_exist(document: Document) -> Iterator[Finding]:
             if inertia is not None and not STOUTNESS[0] <= inertia / A / A <= STOUTNESS[1]:
                 yield (
                     ("mechanism", "sections", name, key),
-                    f"area {A:g} m2 and {key} {inertia:g} m4 cannot belong to one section: its "
-                    f"radius of gyration would be {math.sqrt(inertia / A):.3g} m, and a solid "
-                    f"round bar of that area has {A * A / (4 * math.pi):.3g} m4; check the "
-                    "exponents",
+                    f"area {written(A, 'm2')} and {key} {written(inertia, 'm4')} cannot belong to "
+                    f"one section: its radius of gyration would be {math.sqrt(inertia / A):.3g} m, "
+                    f"and a solid round bar of that area has {A * A / (4 * math.pi):.3g} m4; check "
+                    "the exponents",
                 )
 
 
@@ -252,19 +267,26 @@ def starts_outside(document: Document) -> Iterator[Finding]:
     chosen = {k for catalogue in design.catalogues for k in catalogue.columns}
     for k, (name, column) in enumerate(design.parameters.items()):
         dimension = property_at(document, column.parameter).dimension
-        unit, bounds = dimension.si if dimension else "", f"[{column.min:g}, {column.max:g}]"
-        value = value_at(document, column.parameter)
-        meant, size = _MEANT.get(unit, ("", 0.0))
-        slip = size * column.min <= value <= size * column.max
-        if column.min <= value <= column.max or (k in chosen and not slip):
+        unit, ends = dimension.si if dimension else "", (column.min, column.max)
+        value, bare = value_at(document, column.parameter), not SI("", *ends).answered
+        meant, size = LEFT_OUT.get(unit, ("", 0.0))
+        slipped = bare and size * column.min <= value <= size * column.max
+        if column.min <= value <= column.max or (k in chosen and not slipped):
             continue
-        why = f"a bare number is in {unit}: was {bounds} {meant} meant?" if slip else ""
-        message = f"initial value {value:g} {unit} of {column.parameter} is outside "
-        yield ("design", name), f"{message}{bounds} {unit}; {why or 'the optimum will lie inside'}"
+        low, high = (written(end, "" if bare else unit, *ends) for end in ends)
+        bounds, why = f"[{low}, {high}]", "; the optimum will lie inside"
+        if slipped:
+            why = f"; a bare number is in {unit}: was {bounds} {meant} meant?"
+        elif column.min <= size * value <= column.max:
+            why = slip(value, unit) or why
+        bounds += f" {unit}" * bare
+        message = f"initial value {written(value, unit)} of {column.parameter} is outside "
+        yield ("design", name), f"{message}{bounds}{why}"
 
 
 WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     numbers_have_the_size_of_machines,
+    bare_lengths_are_of_machines,
     bare_sections_can_exist,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,

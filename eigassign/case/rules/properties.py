@@ -21,7 +21,7 @@ from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism, Nut
 from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, Written, quantity
 from eigassign.case.schema.targets import FREQUENCY, FollowedMode
 from eigassign.case.schema.trajectory import Added, named_trajectories
-from eigassign.case.units import DIMENSIONS, QuantityError, read_quantity, read_rate
+from eigassign.case.units import DIMENSIONS, SI, QuantityError, read_quantity, read_rate, written
 
 ANY = Quantity()  # dimension unknown because of an error elsewhere
 
@@ -441,11 +441,11 @@ def parameters_agree_with_the_file(document: Document) -> Iterator[Finding]:
             # digits that a product has and no file: 0.8 × 0.04 is not 0.032 to the last one
             if abs(value - wanted) > 1e-9 * abs(wanted):
                 dimension = property_at(document, path).dimension
-                unit = f" {dimension.si}".rstrip() if dimension else ""
+                unit = SI(dimension.si if dimension else "", value, first)
                 yield (
                     placed[name][path],
-                    f"is {value:.12g}{unit} in this file, where {factor:.12g} × "
-                    f"{column.parameter} is {wanted:.12g}{unit}: write that, or another factor",
+                    f"is {written(value, unit)} in this file, where {factor:.12g} × "
+                    f"{column.parameter} is {written(wanted, unit)}: write that, or another factor",
                 )
 
 
@@ -473,7 +473,7 @@ def limits(case: Any) -> Iterator[Limit]:
         return Limit({k: f for k, f in factors.items() if f}, offset, strict, words)
 
     for path, kind in zip(case.varied, case.quantities(case.varied), strict=True):
-        unit = f" {kind.dimension.si}" if kind.dimension and kind.dimension.si else ""
+        own = [case.value_at(path)]
         for sign, value, factor in (
             (">", kind.above, 1.0),
             (">=", kind.at_least, 1.0),
@@ -481,7 +481,8 @@ def limits(case: Any) -> Iterator[Limit]:
             ("<=", kind.at_most, -1.0),
         ):
             if value is not None:
-                words = f"{path} must be {sign} {value:g}{unit}"
+                edge = written(value, kind.dimension.si if kind.dimension else "", *own)
+                words = f"{path} must be {sign} {edge}"
                 yield limit({path: factor}, -factor * value, sign in "<>", words)
     for name, section in case.mechanism.sections.items():
         for own in section.limits():

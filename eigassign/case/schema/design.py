@@ -133,7 +133,7 @@ class Parameter(Part):
         Annotated[
             tuple[YValue, ...],
             Field(min_length=1, max_length=MOST_CHOICES),
-            distinct("{:g} (SI units) is listed twice"),
+            distinct("{} is listed twice"),
         ]
         | None
     ) = None

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import (
+    COMMA,
     Finding,
     Tree,
     shown,
@@ -143,7 +144,7 @@ _WORDS = {
     "string_too_short": "expected some text, got {got}",
     "string_too_long": "is longer than {max_length} characters",
     "too_short": "needs at least {min_length} entries, got {actual_length}",
-    "too_long": "takes at most {max_length} entries, got {actual_length}",
+    "too_long": f"takes at most {{max_length}} entries, got {{actual_length}}; {COMMA}",
     "greater_than_equal": "must be >= {ge}, got {got}",
     "less_than_equal": "must be <= {le}, got {got}",
 }

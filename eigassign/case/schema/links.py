@@ -38,6 +38,7 @@ from eigassign.case.schema.parts import (
     space_of,
     wrong,
 )
+from eigassign.case.units import slip, written
 
 MODULUS = quantity("pressure or modulus", above=0)
 SECOND_MOMENT = quantity("second moment of area", above=0)
@@ -100,9 +101,10 @@ class SectionBase(Part):
     @model_validator(mode="after")
     def _exists(self) -> Self:
         for limit in self.limits():
-            large = getattr(self, limit.large)
-            if not limit.holds(getattr(self, limit.small), large):
-                raise wrong(f"{limit}, which is {large / limit.factor:g} m", limit.small)
+            small, large = getattr(self, limit.small), getattr(self, limit.large)
+            if not limit.holds(small, large):
+                most = written(large / limit.factor, "m", large)
+                raise wrong(f"{limit}, which is {most}{slip(small, 'm')}", limit.small)
         return self
 
 

@@ -36,7 +36,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-from eigassign.case.reader import listed, shown, suggestion, unknown, unspaced
+from eigassign.case.reader import COMMA, listed, shown, suggestion, unknown, unspaced
 from eigassign.case.units import (
     DIMENSIONS,
     PLAIN,
@@ -45,6 +45,7 @@ from eigassign.case.units import (
     QuantityError,
     read_quantity,
     read_rate,
+    written,
 )
 
 TAG = "\0"  # in what pydantic adds to the place of an error: no key of a file has it
@@ -160,7 +161,7 @@ def distinct(text: str) -> AfterValidator:
     def checked(values: tuple[T, ...]) -> tuple[T, ...]:
         for k, value in enumerate(values):
             if value in values[:k]:
-                raise wrong(text.format(value), k)
+                raise wrong(text.format(written(value) if isinstance(value, float) else value), k)
         return values
 
     return AfterValidator(checked)
@@ -219,7 +220,8 @@ class Quantity:
 
         Nothing but 0 may be too small to calculate with.
         """
-        unit = f" {self.dimension.si}" if self.dimension and self.dimension.si else ""
+        known = self.dimension or PLAIN
+        own = [Given(si, given)] if known.si and isinstance(given, str) else []
         for sign, limit, holds in (
             (">", self.above, self.above is None or si > self.above),
             (">=", self.at_least, self.at_least is None or si >= self.at_least),
@@ -227,13 +229,14 @@ class Quantity:
             ("<=", self.at_most, self.at_most is None or si <= self.at_most),
         ):
             if not holds:
-                raise QuantityError(f"must be {sign} {limit:g}{unit}, got {shown(given)}")
-        known, positive = self.dimension or PLAIN, 0 in (self.above, self.at_least)
+                edge = written(limit or 0.0, known.si, *own)
+                raise QuantityError(f"must be {sign} {edge}, got {shown(given)}")
+        positive = 0 in (self.above, self.at_least)
         least = known.smallest if positive else _NOTHING
         if 0 < abs(si) < least:
             zero = "" if self.above == 0 else "0 or "
             message = f"too small to calculate with, got {shown(given)}; {zero}at least "
-            raise QuantityError(f"{message}{least:g}{unit}")
+            raise QuantityError(f"{message}{written(least, known.si)}")
         return si
 
     def _validate(self, value: object) -> float:
@@ -458,7 +461,7 @@ def _one_for_each_axis(value: Any, info: ValidationInfo) -> Any:
     axes = _AXES.get(space)
     if axes and isinstance(value, tuple) and len(value) != len(axes):
         needed = f"{space}: needs {len(axes)} components ({', '.join(axes)})"
-        raise wrong(f"{needed}, got {len(value)}")
+        raise wrong(f"{needed}, got {len(value)}{f'; {COMMA}' * (len(value) > len(axes))}")
     return value
 
 

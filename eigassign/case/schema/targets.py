@@ -29,7 +29,7 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.trajectory import TIME, Coordinates, Times
-from eigassign.case.units import DIMENSIONS
+from eigassign.case.units import DIMENSIONS, written
 
 FREQUENCY = quantity("frequency", above=0)
 Frequency: TypeAlias = Annotated[float, FREQUENCY]
@@ -115,9 +115,9 @@ class FollowedMode(Part):
 
     @property
     def name(self) -> str:
-        """The mode in words, and where it is named, in SI units."""
-        q = " ".join(f"{value:.6g}" for value in self.at.q or ())
-        where = f"t = {self.at.time:g} s" if self.at.q is None else f"q = {q}"
+        """The mode in words, and where it is named, as the file does."""
+        q = " ".join(map(written, self.at.q or ()))
+        where = f"q = {q}" if self.at.time is None else f"t = {written(self.at.time, 's')}"
         where += f" of {self.at.trajectory!r}" if self.at.trajectory else ""
         return f"the mode like mode {self.like} ({where})"
 
@@ -174,8 +174,8 @@ class AnyTarget(Part):
     def _lasts(self) -> Self:
         if self.during is not None and self.during[0] >= self.during[1]:
             first, last = self.during
-            message = f"the first time must be before the last, got [{first:g}, {last:g}] s"
-            raise wrong(message, "during")
+            got = f"[{written(first, 's')}, {written(last, 's')}]"
+            raise wrong(f"the first time must be before the last, got {got}", "during")
         return self
 
 

@@ -33,6 +33,7 @@ from eigassign.case.schema.parts import (
     quantity,
     wrong,
 )
+from eigassign.case.units import written
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
@@ -41,7 +42,9 @@ TIME = quantity("time")
 def _increasing(times: tuple[float, ...]) -> tuple[float, ...]:
     for k, (before, after) in enumerate(pairwise(times), 1):
         if after <= before:
-            raise wrong(f"time must increase: {after:g} s after {before:g} s", k)
+            raise wrong(
+                f"time must increase: {written(after, 's')} after {written(before, 's')}", k
+            )
     return times
 
 

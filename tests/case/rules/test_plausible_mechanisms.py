@@ -11,8 +11,8 @@ from eigassign.case import load
 
 # fmt: off
 SLIPS = {
-    "node in mm": (PLANAR, "tip: [0.2, 0], top: [0, 200 mm]}\n      beams:\n        lower", "tip: [200, 0], top: [200, 200 mm]}\n      beams:\n        lower", "200 m is outside"),
-    "length of a rigid link in mm": (PLANAR, "length: 0.2, mass: 5", "¦length: 200, mass: 5", "is the unit right?"),
+    "node in mm": (PLANAR, "tip: [0.2, 0], top: [0, 200 mm]}\n      beams:\n        lower", "tip: [200, 0], top: [200, 200 mm]}\n      beams:\n        lower", "nodes 200 is 200 m without a unit; did you mean 200 mm?"),
+    "length of a rigid link in mm": (PLANAR, "length: 0.2, mass: 5", "¦length: 200, mass: 5", "length 200 is 200 m without a unit"),
     "stubby taper": (PLANAR, "length: 0.5, material: steel, section: {start: bar, end: thin}, elements: 4, shear: true", "¦length: 0.09, material: steel, section: {start: thin, end: bar}, elements: 4", "9 times the depth of section 'bar'"),
     "stubby profile": (PLANAR, "length: 2, material", "¦length: 0.7, material", "8.8 times the depth of section 'profile'"),
     "inertia of another section": (SPATIAL, "inertia_y: 2 cm4", "¦inertia_y: 20000 cm4", "cannot belong to one section"),

@@ -155,7 +155,7 @@ def test_every_entry_reads_back_equal_and_is_described_by_the_schema(text: str) 
     [
         (BOOM, []),
         (LISTED.replace("30 mm, ", ""), []),
-        (D.replace("40 mm", "25 mm"), ["initial value 0.03 m of sections.rod.diameter is outside"]),
+        (D.replace("40 mm", "25 mm"), ["initial value 30 mm of sections.rod.diameter is outside"]),
     ],
 )
 def test_the_start_may_lie_outside_bounds_and_lists_with_a_warning(

@@ -98,7 +98,7 @@ def test_requirements_are_called_by_what_they_ask_for() -> None:
         "every mode clear of 0.5 times its profile ± 10 %",
         "modes 1 and 3 at least 20 Hz apart",
         "the mode like mode 2 (t = 0.2 s) at 20 Hz",
-        "the mode like mode 2 (q = 0.174533 1) at least 20 Hz",
+        "the mode like mode 2 (q = 10 deg 1) at least 20 Hz",
     ]
 
 
