@@ -144,7 +144,7 @@ def test_a_design_outside_its_bounds_is_warned_of(capsys: Captured) -> None:
     args = ("modes", TWO_LINK, "--y", "0.3 0", "--count", 1, "--json")
     assert main([str(a) for a in args]) == 0
     out, err = capsys.readouterr()
-    assert "warning: m1 = 0.3 kg is outside its bounds, 0 to 0.25 kg" in err
+    assert "warning: m1 = 300 g is outside its bounds, 0 g to 250 g" in err
     beyond = json.loads(out)["frequencies_hz"][0]
     inside = json.loads(answer(capsys, *args[:3], "0.25 0", *args[4:]))["frequencies_hz"][0]
     assert beyond < inside
@@ -409,5 +409,5 @@ def test_lengths_that_look_like_millimetres_are_named_beside_a_path_out_of_reach
     assert main(["check", "mm.yaml"]) == 2
     said = capsys.readouterr().err
     assert "trajectory.waypoints" in said
-    assert "may be why the trajectory cannot be followed: 600 m is outside" in said
-    assert "write 600 mm if that was meant" in said
+    assert "may be why the trajectory cannot be followed: length 600 is 600 m without a un" in said
+    assert "did you mean 600 mm?" in said
