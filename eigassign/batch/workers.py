@@ -79,13 +79,19 @@ class _Pool(ProcessPoolExecutor):
 def process_pool(workers: int) -> Iterator[Executor]:
     """Fresh processes, each with one BLAS thread; on an error inside they are stopped at once."""
     others = set(multiprocessing.active_children())
-    os.environ.update(ONE_THREAD)  # for these, before they import NumPy: this one has it
-    with _Pool(workers, multiprocessing.get_context("spawn"), _prepare_worker) as pool:
-        try:
-            yield pool
-        except BaseException:
-            _stop(pool, set(multiprocessing.active_children()) - others)
-            raise
+    own = dict(os.environ)
+    os.environ.update(ONE_THREAD)  # for these, before they import NumPy
+    try:
+        with _Pool(workers, multiprocessing.get_context("spawn"), _prepare_worker) as pool:
+            try:
+                yield pool
+            except BaseException:
+                _stop(pool, set(multiprocessing.active_children()) - others)
+                raise
+    finally:
+        for name in ONE_THREAD:
+            del os.environ[name]
+        os.environ.update(own)
 
 
 def _stop(pool: Executor, workers: set[Any]) -> None:
