@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from eigassign.batch.plan import STUDY, Variant, content_of, key_of
+from eigassign.batch.plan import STUDY, BatchPlan, Variant, content_of, key_of
+from eigassign.batch.variants import OPTION
 from eigassign.case.case_file import Unchecked, checked, read
+from eigassign.case.reader import dotted, key_path
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
 from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_folder import MARKER, read_record
@@ -20,7 +22,7 @@ from eigassign.pipeline.run import Options, solve_case
 from eigassign.pipeline.stages import new_run_folder
 from eigassign.process import failure_of
 from eigassign.study.built_case import BuiltCase
-from eigassign.study.results import RunResults
+from eigassign.study.results import DriveRow, RunResults
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # not of one case only
 
@@ -64,6 +66,26 @@ def check_cases(
         except EigassignError as error:
             found.append((variant.index, (Problem(variant.path, 0, 0, "", str(error)),)))
     return found
+
+
+def idle_keys(plan: BatchPlan, options: CaseOptions) -> Iterator[Problem]:
+    """Warn of swept initial values of design parameters, on which an optimum does not depend."""
+    for planned in plan.files:
+        try:
+            file, source = load(planned.variant(0, 0), options).file, _written(planned.path).source
+        except EigassignError:  # it is told of where variants are checked
+            continue
+        parameters, one_shot = file.design.parameters, file.assignment.method == "one_shot"
+        if one_shot or any(column.price for column in parameters.values()):
+            continue  # its answer depends on where it begins
+        owners = {path: k for k, column in parameters.items() for path in column.factors}
+        for key in planned.variants.keys:
+            path = dotted(key_path(source.tree, key)).removeprefix("mechanism.")
+            if name := owners.get(path):
+                why = f"this is where the design parameter {name} begins: every variant may find "
+                why += f"the same optimum; sweep design.{name}.max, or take {name} out of design"
+                where = source.problem(("sweep", "parameters", key), why)
+                yield Problem(OPTION, 0, 0, key, why) if planned.is_set else where
 
 
 def load(variant: Variant, options: CaseOptions) -> BuiltCase:
@@ -168,10 +190,20 @@ def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
         "exact_violation": violation and violation.exact,
         "mass": results.mass and results.mass.optimal,
         "price": results.price,
+        "room": min((t.room for t in results.targets if t.room is not None), default=None),
         "design": tuple((row.name, row.optimal) for row in results.design),
-        "units": {**case.file.variant_units, **{row.name: row.unit for row in results.design}},
-        "frequencies": frequency_ranges(results),
+        "drives": tuple((_peak(row), row.optimal.peak) for row in results.drives),
+        "units": {
+            **case.file.variant_units,
+            **{row.name: row.unit for row in results.design},
+            **{_peak(row): row.unit for row in results.drives},
+        },
+        "frequencies": frequency_ranges(results, case.file.variant),
     }
+
+
+def _peak(row: DriveRow) -> str:
+    return f"peak{row.quantity} of {row.name}"
 
 
 def _status(results: RunResults) -> Status:

@@ -66,6 +66,7 @@ def batch(
     others. Exit code 1 if a case failed.
     """
     from eigassign.batch.plan import cases_in, plan_of
+    from eigassign.batch.work import idle_keys
     from eigassign.batch.workers import this_machine
 
     cases = cases_in(paths)
@@ -75,6 +76,7 @@ def batch(
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
         workers = this_machine(jobs)
+        reporter.warn(idle_keys(plan, asked.options))
         if dry_run:
             return _tell(asked, workers, reporter)
         rows = _watched(asked, workers, reporter)
@@ -105,10 +107,10 @@ def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
 
     bad = [row for row in rows if row.status != "ok"]
     listed = [*rows] if len(rows) <= _MANY else bad[:_MANY]
-    console.print_tables([batch_table(listed)] if listed else [])
+    console.print_tables([batch_table(listed, console.width(100))] if listed else [])
     if bad:
         reporter.error(f"{len(bad)} of {_cases(len(rows))} gave no answer to use")
-    show(f"{_cases(len(rows))} in {folder}: {said(rows) or 'nothing to run'}")
+    show(f"{folder / 'index.html'}: {_cases(len(rows))}, {said(rows) or 'nothing to run'}")
     return 1 if bad else 0
 
 
@@ -121,8 +123,7 @@ def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> list[CaseOut
             reporter.note(f"{done} of {total} cases are done and still current: skipped")
 
     def on_outcome(found: CaseOutcome) -> None:
-        if found.status != "ok":
-            reporter.note(f"{found.name}: {found.word}")
+        reporter.stage(f"{found.name}: {found.word}")
 
     return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
 

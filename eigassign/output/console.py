@@ -26,9 +26,9 @@ _COLOURS = {
 }
 
 
-def width() -> int:
+def width(endless: int = 100_000) -> int:
     """Columns: those of COLUMNS, else of the terminal; without either lines have no end."""
-    return shutil.get_terminal_size((100_000, 0)).columns
+    return shutil.get_terminal_size((endless, 0)).columns
 
 
 def wrapped(lines: Iterable[str], room: int) -> list[str]:

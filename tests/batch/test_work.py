@@ -60,7 +60,11 @@ def test_an_outcome_has_units_and_what_a_design_weighs_and_how_far_off_it_is(
     plan = plan_of([case], [*settings, "title=x", "expansion.order=2"])
     found = run_case(plan[0], options)
     bare = {"title": "", "expansion.order": ""}
-    assert found.units == {key: unit for key, (_, unit) in swept.items()} | bare | {"m": "kg"}
+    assert found.units == {key: unit for key, (_, unit) in swept.items()} | bare | {
+        "m": "kg",
+        "peak torque of q1": "N m",
+        "peak torque of q2": "N m",
+    }
     results = json.loads((tmp_path / "out" / plan[0].name / "results.json").read_text())
     assert found.mass == results["mass"]["optimal"]
     assert found.exact_rms_relative == results["error"]["exact"]["rms_relative"]

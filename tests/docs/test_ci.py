@@ -69,7 +69,7 @@ def test_the_first_job_passes_and_fails_when_an_expansion_is_too_far_off() -> No
 def test_the_sweep_leaves_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
     (sweep,) = commands("sweep")
     run(f"{sweep} --reports none --jobs 1 --quiet")
-    assert "5 cases in sweep" in capsys.readouterr().out
+    assert "sweep/index.html: 5 cases, " in capsys.readouterr().out
 
 
 def test_the_hook_takes_good_cases_and_no_wrong_one() -> None:

@@ -17,7 +17,7 @@ from eigassign._version import __version__
 from eigassign.brief import cut
 from eigassign.case.reader import short_keys
 from eigassign.case.units import QuantityError, handy, handy_unit, number_and_unit
-from eigassign.facts import capital, fact
+from eigassign.facts import fact
 from eigassign.output.batch.summary import (
     NUMBERS,
     CaseOutcome,
@@ -33,6 +33,7 @@ from eigassign.output.store.atomic import replace_synced
 from eigassign.output.tables import TONES
 
 _MANY = 100  # values of a key: more are a sample's, which need not be told apart
+SAME = 1e-3  # of a peak: what a drive exerts that changes less is no column
 _MESSAGE = 400  # characters of it: a page of a thousand rows stays below 2 MB
 _LIKE = {"ok": "reached", "tolerance": "improved"}  # how cases without a verdict look
 # Name, unit and kind (name, swept, word, number, text, hidden: for plots only); and the cells
@@ -120,14 +121,20 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
         unit = next((row.units[name] for row in rows if name in row.units), "")
         yield _numbers(name, "number", [design.get(name) for design in designs], unit)
     yield ("design", "", "text"), [_told(row, own) for row in rows]
+    drives = [dict(row.drives) for row in rows]
+    for name in dict.fromkeys(name for each in drives for name in each):
+        peaks = [each.get(name) for each in drives]
+        unit = next(row.units[name] for row in rows if name in row.units)
+        known = [peak for peak in peaks if peak is not None]
+        if max(known) - min(known) > SAME * max(known):  # what is swept changes it
+            yield _numbers(name, "number", peaks, unit)
     ranges = [{name: hz for name, *hz in row.frequencies} for row in rows]
     for name in dict.fromkeys(name for each in ranges for name in each):
         for k, which in ((0, "lowest"), (2, "highest")):
             hz = [each[name][k] if name in each else None for each in ranges]
             yield _numbers(f"{name}, {which}", "hidden", hz, "Hz")
     yield _numbers("time", "hidden", [row.seconds for row in rows], "s")
-    told = (row.message.removeprefix(f"{row.verdict.replace('_', ' ')}: ") for row in rows)
-    yield ("message", "", "text"), [cut(capital(text), _MESSAGE) for text in told]
+    yield ("message", "", "text"), [cut(row.why, _MESSAGE) for row in rows]
 
 
 def _told(row: CaseOutcome, but: Sequence[str]) -> str:

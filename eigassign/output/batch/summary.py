@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from eigassign._version import __version__
 from eigassign.case.schema.document import typed
 from eigassign.case.units import QuantityError, read_quantity
-from eigassign.facts import Fact, Seconds, Share, verdict_word
+from eigassign.facts import Fact, Seconds, Share, capital, verdict_word
 from eigassign.files import name_of, printable
 from eigassign.output.documents import results_document
 from eigassign.output.tables import Table, facts_table
@@ -34,8 +34,8 @@ class CaseOutcome:
     there is no answer: infeasible, unreachable); error (wrong input, no disk, a bug).
     Errors are fractions of the target; None where there is no number. ``values`` are what a sweep
     sets, by key; ``frequencies`` the lowest, mean and highest exact frequency in Hz that each
-    target has along the trajectory at the answer; ``units`` those in SI of swept values and of the
-    design, by name.
+    target has along the trajectory at the answer; ``units`` those in SI of swept values, of the
+    design and of drives, by name.
     """
 
     index: Annotated[int, Fact("place in the batch")] = field(default=0, kw_only=True)
@@ -56,11 +56,19 @@ class CaseOutcome:
     mass: Annotated[float | None, Fact("of all links and bodies", "total mass", "kg")] = None
     price: Annotated[float | None, Fact("of the choices and of the change")] = None
     design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
+    drives: Annotated[Sequence[tuple[str, float]], Fact("peaks with the answer, SI")] = ()
+    room: Annotated[Share | None, Fact("least to a limit on frequencies", "least room")] = None
     frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
     verdict: str = ""
     units: Annotated[Mapping[str, str], Fact("SI, of values and design")] = field(
         default_factory=dict
     )
+
+    @property
+    def why(self) -> Annotated[str, Fact(heading="message")]:
+        """The message on one line, without the verdict before it."""
+        own = self.message.removeprefix(f"{self.verdict.replace('_', ' ')}: ")
+        return capital(" ".join(own.split()))
 
     @property
     def word(self) -> Annotated[str, Fact(heading="verdict")]:
@@ -72,7 +80,7 @@ _WITHOUT = {"ok": "Done", "tolerance": "Over tolerance", "failed": "No answer", 
 _SURROGATE = re.compile(r"\\ud[89a-f][0-9a-f]{2}")
 NUMBERS = (  # that every case has, or lacks
     "initial_max_relative", "predicted_max_relative", "exact_max_relative", "exact_rms_relative",
-    "initial_violation", "exact_violation", "mass", "price",
+    "initial_violation", "exact_violation", "room", "mass", "price",
 )  # fmt: skip
 
 
@@ -94,15 +102,18 @@ def from_plain(row: Any) -> CaseOutcome:
     return found
 
 
-def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
-    """The ``frequencies`` of a run, each under a name of its own.
+def frequency_ranges(results: RunResults, swept: Iterable[str] = ()) -> tuple[Range, ...]:
+    """The ``frequencies`` of a run, each under a name of its own; of a band the nearest mode.
 
-    What is wanted is not in the names: it may be swept.
+    What is wanted is not in the names where it is ``swept``, or may be.
     """
     found: dict[str, Range] = {}
     for target in results.targets:
         asked, hz = target.asked, target.exact_hz.tolist()
         name = asked.form.curve_of(asked.curve_name)
+        if target.near:
+            edges = any(key.startswith(f"{asked.place}.") for key in swept)
+            name = target.closest.partition(" of ")[0] + " of the band" if edges else target.closest
         name += "" if asked.trajectory is None else f" along {asked.trajectory!r}"
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
         free = next(each for each in names if each not in found)
@@ -143,9 +154,10 @@ def summary_csv(rows: Sequence[CaseOutcome]) -> str:
     A key that has words beside numbers has a column of each.
     """
     units = {name: unit for row in rows for name, unit in row.units.items()}
-    values, designs, ranges = ([*map(cells, rows)] for cells in (_values, _design, _ranges))
+    values, ranges = ([*map(cells, rows)] for cells in (_values, _ranges))
+    designs, drives = ([dict(getattr(row, of)) for row in rows] for of in ("design", "drives"))
     parts: list[tuple[str, Sequence[Mapping[str, Cell]]]] = [("", values)]
-    parts += [("design/", designs), ("frequencies/", ranges)]
+    parts += [("design/", designs), ("drives/", drives), ("frequencies/", ranges)]
     columns: dict[str, list[Cell]] = {"name": [row.name for row in rows]}
     for prefix, every in parts:
         names = dict.fromkeys(name for row in every for name in row)
@@ -176,10 +188,6 @@ def _values(row: CaseOutcome) -> dict[str, Cell]:
     return found
 
 
-def _design(row: CaseOutcome) -> dict[str, Cell]:
-    return dict(row.design)
-
-
 def _ranges(row: CaseOutcome) -> dict[str, Cell]:
     statistics = ("lowest_hz", "mean_hz", "highest_hz")
     pairs = ((name, zip(statistics, hz, strict=True)) for name, *hz in row.frequencies)
@@ -201,10 +209,23 @@ def cell(text: str) -> str:
     return "'" + text if text.startswith(_FORMULA) else text
 
 
-def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
-    """One line a case: its name, verdict, worst exact error if there is one, time, message."""
-    rows = [replace(o, name=n) for o, n in zip(outcomes, bare_names(outcomes), strict=True)]
-    return facts_table("Batch", rows, "name word exact_max_relative seconds message")
+def batch_table(outcomes: Sequence[CaseOutcome], room: int = 100) -> Table:
+    """One line a case: its name, verdict, worst exact error if there is one, time, message.
+
+    Name and message are cut to the ``room``; files have all of them.
+    """
+    names = [_cut(name, max(room // 2, 12)) for name in bare_names(outcomes)]
+    rows = [replace(o, name=name) for o, name in zip(outcomes, names, strict=True)]
+    made = facts_table("Batch", rows, "name word exact_max_relative seconds why")
+    if made.columns[-1] != "message":
+        return made
+    wide = [max(map(len, column)) for column in zip(made.columns, *made.rows, strict=True)]
+    left = max(room - sum(wide[:-1]) - 2 * len(wide[:-1]), 7)
+    return made._replace(rows=tuple((*row[:-1], _cut(row[-1], left)) for row in made.rows))
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 def bare_names(outcomes: Sequence[CaseOutcome]) -> list[str]:

@@ -16,6 +16,7 @@ ROW = CaseOutcome(
     status="ok",
     seconds=0.25,
     design=[["m1", 0.1 + 0.2]],
+    drives=[["peak torque of q1", 1.5]],
     frequencies=[["mode 1", 180.0, 190.0, 200.0]],
     verdict="reached",
     values={"mechanism.bodies.tool.mass": "100 g"},

@@ -13,8 +13,8 @@ from eigassign.output import CaseOutcome, to_plain, write_files
 
 AHEAD = [
     "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
-    "exact_max_relative", "exact_rms_relative", "initial_violation", "exact_violation", "mass",
-    "price",
+    "exact_max_relative", "exact_rms_relative", "initial_violation", "exact_violation", "room",
+    "mass", "price",
 ]  # fmt: skip
 LAST = ["message", "path", "run_folder"]
 GOOD = CaseOutcome(
