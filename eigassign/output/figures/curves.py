@@ -181,13 +181,17 @@ def _range(target: TargetStudy, spectrum: Sequence[ModeRow]) -> tuple[float, flo
     """The frequencies that a panel has to hold of a target: its edges, and modes beside them."""
     asked = target.asked
     low, high = asked.forbidden_hz
-    if not asked.terms:  # a band: the nearest modes that are near
+    if not asked.terms:  # a band: the nearest mode, and all that are near
         edges = [edge for edge in (low, high) if edge is not None]
         bottom, top = graph.bounds(edges)
         room = ROOM * top
         every = [hz for row in spectrum for hz in (row.initial_hz, row.optimal_hz)]
         near = np.array(every)[:, asked.rows]
-        return graph.bounds([*edges, near[(near > bottom - room) & (near < top + room)]])
+        after = np.array([row.optimal_hz[asked.rows] for row in spectrum])
+        k = int(np.maximum(bottom - after, after - top).min(axis=1).argmin())
+        nearest = [np.array(every)[2 * k : 2 * k + 2, asked.rows]]
+        near = near[(near > bottom - room) & (near < top + room)]
+        return graph.bounds([*edges, near, *nearest])
     own = [target.initial_hz, target.exact_hz]
     if not _is_far(target):
         own += [target.asked.hz] if asked.is_goal else [e for e in (low, high) if e is not None]

@@ -11,6 +11,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ class Shade:
 class Rule:
     """A straight line across the panel at this height, or ``upright`` at this abscissa.
 
-    ``label`` is for the legend, ``note`` is written at its left end.
+    ``label`` is for the legend, ``note`` is written at its right end.
     """
 
     at: float
@@ -150,11 +151,15 @@ class Panel:
         return low, high
 
     def ends(self) -> list[tuple[str, float, str]]:
-        """The names at the curves' ends, where they do not overlap, and their colours."""
+        """The names at the curves' ends, where they do not overlap, and their colours.
+
+        Of a curve that leaves the panel it stands at the edge that it leaves through.
+        """
         low, high = self.limits
-        inside = (c for c in self.curves if c.end and low <= c.y[-1] <= high)
-        named = sorted(inside, key=lambda c: float(c.y[-1]))
-        places = spread([float(c.y[-1]) for c in named], 0.15 * (high - low) / self.height)
+        inside = (c for c in self.curves if c.end and np.any((low <= c.y) & (c.y <= high)))
+        ends = sorted(((float(np.clip(c.y[-1], low, high)), c) for c in inside), key=itemgetter(0))
+        named = [c for _, c in ends]
+        places = spread([at for at, _ in ends], 0.15 * (high - low) / self.height)
         return [(c.end, at, c.look.colour) for c, at in zip(named, places, strict=True)]
 
 

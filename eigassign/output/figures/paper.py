@@ -274,8 +274,8 @@ def _rule(axes: Axes, rule: Rule) -> Any:
     line = (axes.axvline if rule.upright else axes.axhline)(rule.at, **look, label=rule.label)
     if rule.note:
         axes.annotate(
-            short(rule.note, 60), (0.0, rule.at), (4.0, 2.0), textcoords="offset points",
-            va="bottom", xycoords=("axes fraction", "data"), size=8.0,
+            short(rule.note, 60), (1.0, rule.at), (-4.0, 2.0), textcoords="offset points",
+            ha="right", va="bottom", xycoords=("axes fraction", "data"), size=8.0,
         )  # fmt: skip
     return line
 

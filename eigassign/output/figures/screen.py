@@ -35,7 +35,6 @@ _DASHES = {
     "dash-dotted": "dashdot",
     "fine": "4px,4px",
 }
-_NAMED = "%{hovertext}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
 _MARKERS = {"o": "circle", "s": "square"}
 
 
@@ -102,6 +101,8 @@ def screen_figure(shown: Graph) -> Json:
     if shown.clock is not None:
         layout["meta"] = {"clock": shown.clock, "whole": _whole(shown)}
     layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
+    if across := _unit(shown.x_label):
+        layout["xaxis"]["unifiedhovertitle"] = {"text": f"%{{x}} {across}"}
     named = [*(mark.label for panel in shown.panels for mark in panel.marks if mark.label)]
     named += [name for panel in shown.panels for name, _ in panel.key]
     rows = (
@@ -164,7 +165,9 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     plotted = _plotted(y)
     look = curve.look
     name = short(curve.hover or curve.label or curve.end or names.get(look, ""), 60)
-    unit = panel.label.rpartition("[")[2].partition("]")[0] if "[" in panel.label else ""
+    up, across = _unit(panel.label), _unit(shown.x_label)
+    point = f"%{{y:.3~g}} {up} at %{{x:.3~g}} {across}".rstrip()
+    named = "%{hovertext}" + f"<br>{point}" * (not panel.names) + "<extra></extra>"
     single = x.size == 1 and not look.marker
     drawn = (("lines", look.width), ("markers", look.marker), ("text", curve.marks))
     parts = [part for part, there in drawn if there]
@@ -185,13 +188,16 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
         "line": _line(look),
         **({"marker": marker} if look.marker or single else {}),
         "cliponaxis": not look.marker,
-        "hovertemplate": f"%{{y:.4~g}} {unit}".rstrip()
-        if not shown.x_logarithmic
-        else "%{y:.3~g} at %{x:.3~g}",
-        **({"hovertext": list(curve.names), "hovertemplate": _NAMED} if curve.names else {}),
+        "hovertemplate": point if shown.x_logarithmic else f"%{{y:.4~g}} {up}".rstrip(),
+        **({"hovertext": list(curve.names), "hovertemplate": named} if curve.names else {}),
         **({"text": list(curve.marks), "textposition": "top right"} if curve.marks else {}),
         **({} if name else {"hoverinfo": "skip", "hovertemplate": None}),
     }
+
+
+def _unit(label: str) -> str:
+    """``Hz`` of ``frequency [Hz]``."""
+    return label.rpartition("[")[2].partition("]")[0] if "[" in label else ""
 
 
 def _key(name: str, look: Look) -> Json:
@@ -227,7 +233,7 @@ def _note(rule: Rule, axis: str) -> Iterator[Json]:
     if rule.note:
         at = float(np.log10(rule.at))  # only logarithmic panels have such rules
         yield {
-            "text": short(rule.note, 60), "x": 0.0, "xref": "paper", "xanchor": "left", "y": at,
+            "text": short(rule.note, 60), "x": 1.0, "xref": "paper", "xanchor": "right", "y": at,
             "yref": axis, "yanchor": "bottom", "showarrow": False,
         }  # fmt: skip
 

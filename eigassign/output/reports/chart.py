@@ -99,7 +99,7 @@ def _curve(
     names = tuple(f"{p.method}, rms {percent(p.rms_relative)}" for p in points)
     marks = list[str]()
     for p, place in zip(points, np.log10([x, np.maximum(y, 1e-12)]).T, strict=True):
-        is_free = all(np.abs((place - other) / (0.06, 0.5)).max() > 1.0 for other in written)
+        is_free = all(np.abs((place - other) / (0.12, 0.6)).max() > 1.0 for other in written)
         size = "case" if p.size.endswith("the case") else "".join(re.findall(r"\d+", p.size)[:1])
         marks.append(size if is_free else "")
         written += [place] if is_free else []

@@ -18,9 +18,8 @@ from eigassign.study.updating.fit import OUTLIER, UpdateResults
 
 Floats = NDArray[np.float64]
 _BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
-_AFTER = Look(graph.BLUE, 0.0, marker="o")
-_DEVIATION = Look(graph.BLACK, 1.2)
-_STEM = Look(graph.BLUE, 1.2)
+_AFTER = Look(graph.BLACK, 0.0, marker="o")
+_STEM = Look(graph.BLACK, 1.2)
 _OUTLIER = Look(graph.GREY, 0.9, "dashed")
 _INTERVAL = Look(graph.SKY, 5.0)
 
@@ -41,9 +40,9 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
         FigurePlan(
             "parameters",
             "Parameters with their 95 % intervals",
-            "Each parameter between its bounds: as in the file, as updated, and the interval of "
-            "values that the measurements allow while the others are fitted anew.",
-            "One line for each parameter between its bounds, with its interval.",
+            "Of each parameter the interval of values that the measurements allow while the others "
+            "are fitted anew, in % of the value found; the file's value where it is so near.",
+            "One line for each parameter about its value, with its interval.",
             _parameters(results),
             "parameters",
         ),
@@ -51,7 +50,10 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
 
 
 def _measurements(results: UpdateResults) -> Graph:
-    """Frequencies relative to the measured ones above, standardised residuals below."""
+    """Frequencies relative to the measured ones before and after, standardised residuals below.
+
+    Each has a panel: beside the errors before, the bars of one standard deviation would be points.
+    """
     rows = results.measurements
     at = np.arange(1.0, len(rows) + 1.0)
     measured = np.array([row.measured_hz for row in rows])
@@ -60,12 +62,11 @@ def _measurements(results: UpdateResults) -> Graph:
         for when in ("initial_hz", "updated_hz")
     )
     names = tuple(f"{row.label}, mode {row.mode}" for row in rows)
+    bars = _deviations(at, 100.0 * np.array([row.deviation_hz for row in rows]) / measured)
+    initial = (Rule(0.0, LEVEL), Curve(before, _BEFORE, "model before", names=names))
     above: tuple[Mark, ...] = (
-        Rule(0.0, LEVEL),
-        _deviations(at, 100.0 * np.array([row.deviation_hz for row in rows]) / measured),
-        Curve(before, _BEFORE, "model before", names=names),
-        Curve(after, _AFTER, "model after", names=names),
-    )
+        Rule(0.0, LEVEL), bars, Curve(after, _AFTER, "model after", names=names)
+    )  # fmt: skip
     residual = np.array([row.residual for row in rows])
     below: tuple[Mark, ...] = (
         Rule(0.0, LEVEL),
@@ -75,7 +76,8 @@ def _measurements(results: UpdateResults) -> Graph:
     )
     room = np.array([-OUTLIER - 0.5, OUTLIER + 0.5])
     panels = (
-        Panel("off the measured [%]", above, 2.2),
+        Panel("before, off [%]", initial, 1.2, holds=(np.zeros(1),)),
+        Panel("after, off [%]", above, 2.2),
         Panel("residual [σ]", below, 1.6, holds=(room,)),
     )
     ends = 0.4, at.size + 0.6
@@ -88,31 +90,34 @@ def _deviations(at: Floats, bars: Floats) -> Mark:
     label = "measured ± standard deviation"
     if at.size > 150:
         return Shade(-bars, bars, graph.GREY, label, 0.35)
-    return graph.segments(at, -bars, bars, _DEVIATION, label)
+    return graph.segments(at, -bars, bars, _INTERVAL, label)
 
 
 def _parameters(results: UpdateResults) -> Graph:
-    """One line a parameter from bound to bound, with its interval and value."""
+    """One line a parameter with its interval about the value found; the start where it is near."""
     rows = [row for row in results.parameters if row.upper > row.lower]
     at = -np.arange(float(len(rows)))
-    low, high, value, initial = (
-        np.array([(getattr(row, of) - row.lower) / (row.upper - row.lower) for row in rows])
-        for of in ("low", "high", "value", "initial")
-    )
+    low, high, initial = (
+        np.array([100.0 * (getattr(row, of) - row.value) / (abs(row.value) or row.upper - row.lower)
+                  for row in rows])
+        for of in ("low", "high", "initial")
+    )  # fmt: skip
+    ends = graph.bounds([1.2 * low, 1.2 * high, np.zeros(1)])
+    initial = np.where((initial >= ends[0]) & (initial <= ends[1]), initial, np.nan)
     names = tuple(
-        f"{row.name} = {row.value / size:.4g} {unit}".rstrip()  # k1 = 52.47 kN m/rad
-        for row in rows
+        f"{row.name}: {row.initial / size:.4g} → {row.value / size:.4g} {unit}".rstrip()
+        for row in rows  # k1: 40 → 52.47 kN m/rad
         for unit, size in [row.handy]
     )
     curves = (
         graph.segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
         Curve(at, _BEFORE, "before", initial, names=names),
-        Curve(at, _AFTER, "after", value, names=names),
+        Curve(at, _AFTER, "after", np.zeros(at.size), names=names),
     )
     room = np.array([0.5, 0.5 - len(rows)])
     panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
-    title, label = "Parameters with their 95 % intervals", "from bound to bound"
-    return Graph(title, label, np.zeros(0), (panel,), x_limits=(-0.02, 1.02))
+    title, label = "Parameters with their 95 % intervals", "off the value found [%]"
+    return Graph(title, label, np.zeros(0), (panel,), x_limits=ends)
 
 
 SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}

@@ -419,7 +419,7 @@
   let width = 0;
   new ResizeObserver(() => {
     const now = document.querySelector(".plots").clientWidth;
-    if (now !== width && width) draws.forEach((draw) => draw());
+    if (now !== width) draws.forEach((draw) => draw());
     width = now;
   }).observe(document.querySelector(".plots"));
 })();

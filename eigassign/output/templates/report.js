@@ -19,8 +19,9 @@ const eigassign = (function () {
 
   // --- Plots in the page's colours
 
-  const config = { displaylogo: false, responsive: true, scrollZoom: false,
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  // These buttons and no other: Plotly's own set has one that sends the figure to a cloud.
+  const config = { displaylogo: false, responsive: true, scrollZoom: false, showSendToCloud: false, plotlyServerURL: "",
+    modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]] };
   // A small screen has no room for buttons.
   const touched = !matchMedia("(hover: hover)").matches || innerWidth < 600;
   if (touched) config.displayModeBar = false;
@@ -32,7 +33,8 @@ const eigassign = (function () {
       if (/^[xy]axis/.test(key)) copy.layout[key] = { ...axis, ...copy.layout[key] };
     }
     const ends = (copy.layout.annotations || []).some((note) => note.xanchor === "left" && note.x === 1);
-    copy.layout = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    if (innerWidth < 600) copy.data.forEach((trace) => { trace.mode = trace.mode.replace("+text", ""); });
+    copy.layout = { paper_bgcolor: css("--page"), plot_bgcolor: css("--page"),
       font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
       margin: { l: 10, r: ends ? (touched ? 58 : 92) : (touched ? 12 : 34), t: 10, b: 10 },
       modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") },
@@ -46,7 +48,8 @@ const eigassign = (function () {
     const figure = themed(figures[box.dataset.figure]), meta = figure.layout.meta || {};
     const again = drawn.has(box);
     drawn.add(box);
-    return Plotly.react(box, figure.data, figure.layout, config).then(() => {
+    const save = { toImageButtonOptions: { filename: box.dataset.figure, scale: 2 } };
+    return Plotly.react(box, figure.data, figure.layout, { ...config, ...save }).then(() => {
       if (again || meta.clock === undefined) return;
       const line = box.appendChild(document.createElement("div"));
       line.className = "cursor";
@@ -87,11 +90,12 @@ const eigassign = (function () {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach(draw));
     const open = () => boxes.filter((box) => !box.closest("details:not([open])"));
     // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels.
-    addEventListener("beforeprint", () => open().forEach((box) => {
-      if (!drawn.has(box)) draw(box);
-      Plotly.relayout(box, { autosize: false, width: 688 });
-    }));
-    addEventListener("afterprint", () => open().forEach((box) => Plotly.relayout(box, { autosize: true, width: null })));
+    const paper = (on) => {
+      document.documentElement.classList.toggle("paper", on);
+      open().forEach((box) => { draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688 } : { autosize: true, width: null }); });
+    };
+    addEventListener("beforeprint", () => paper(true));
+    addEventListener("afterprint", () => paper(false));
   }
 
   // The page is seen before 5 MB of script are compiled.
@@ -113,11 +117,20 @@ const eigassign = (function () {
     link.click();
     URL.revokeObjectURL(link.href);
   }
-  const quoted = (text) => '"' + String(text).replaceAll('"', '""') + '"';
-  function csv(name) {
-    const rows = figures[name].data.flatMap((trace) => trace.x.map((x, i) =>
-      [trace.yaxis, quoted(trace.name || ""), quoted(x ?? ""), quoted(trace.y[i] ?? "")].join()));
-    return ["panel,series,x,y", ...rows].join("\n") + "\n";
+  const quoted = (text) => /[",\n]/.test(text) ? '"' + String(text).replaceAll('"', '""') + '"' : String(text);
+  function csv(name) {  // a column a curve over one abscissa; of named points a row a point
+    const { data, layout } = figures[name], across = layout.xaxis.title.text || "x", columns = new Map(), points = data.filter((t) => t.hovertext);
+    const axis = (trace) => layout[trace.yaxis.replace("y", "yaxis")].title.text;
+    const lines = (rows) => rows.map((row) => row.map((cell) => quoted(cell ?? "")).join()).join("\n") + "\n";
+    if (points.length) return lines([["point", "series", across, axis(points[0])], ...points.flatMap((t) => t.x.map((x, i) => [t.hovertext[i], t.name, x, t.y[i]]))]);
+    const add = (head, x, y) => { if (!columns.has(head)) columns.set(head, new Map(x.map((at, i) => [at, y[i]]))); };
+    for (const t of data.filter((trace) => trace.name && trace.yaxis)) {
+      const n = t.x.length / 2, head = `${t.name}: ${axis(t)}`;
+      if (!t.fill) add(head, t.x, t.y);
+      else { add(head + ", from", t.x.slice(0, n), t.y.slice(0, n)); add(head + ", to", t.x.slice(0, n), t.y.slice(n).reverse()); }
+    }
+    const every = [...new Set([...columns.values()].flatMap((own) => [...own.keys()]))].filter((x) => x !== null).sort((a, b) => a - b);
+    return lines([[across, ...columns.keys()], ...every.map((x) => [x, ...[...columns.values()].map((own) => own.get(x))])]);
   }
   all("button[data-csv]").forEach((button) => button.addEventListener("click",
     () => save(button.dataset.csv + ".csv", csv(button.dataset.csv), "text/csv")));
@@ -173,9 +186,9 @@ const eigassign = (function () {
       pen.lineCap = pen.lineJoin = "round";
       const k = +time.value, mode = scene.modes[+modes.value], s = mode ? +scale.value * Math.sin(phase * Math.PI / 180) : 0;
       const rest = mix(scene.rest, k), motion = mode && mix(mode.motion, k), axes = scene.axes.length ? mix(scene.axes, k) : null;
-      const pixels = Math.min((W - 40) / scene.size[0], (H - 60) / scene.size[1]);
+      const pixels = Math.min((W - 40) / scene.size[0], (H - 110) / scene.size[1]);  // below it axes and scale
       const inch = 96 * Math.min(Math.max(scene.thick * pixels / 96 / scene.symbol[0], 1), scene.symbol[1]) * (W < 420 ? 0.8 : 1);
-      const on = ([u, v]) => [W / 2 + pixels * u, H / 2 - pixels * v];
+      const on = ([u, v]) => [W / 2 + pixels * u, H / 2 - 30 - pixels * v];
       const look = { body: "#d55e00", spring: css("--good"), ground: css("--soft") }, page = css("--page");
       const heading = (axis) => {
         if (axis === null) return [1, 0];
