@@ -1,12 +1,15 @@
 """Reports in a real browser: no error, no request, nothing too wide, sliders and keys that work."""
 
+import csv
 import json
 import re
 import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -60,7 +63,7 @@ def at(browser: Any, page: Path, width: int) -> None:
 def drawn(browser: Any) -> None:
     """Open what is folded, and scroll through the page until every plot on it is there."""
     browser.execute_script("document.querySelectorAll('details').forEach((e) => e.open = true)")
-    boxes = browser.find_elements("css selector", ".plot")
+    boxes = browser.find_elements("css selector", ".plot[data-figure]")
     for box in boxes:
         browser.execute_script("arguments[0].scrollIntoView()", box)
         end = time.monotonic() + 30.0
@@ -87,6 +90,136 @@ def test_all_plots_are_drawn_without_error_or_request(browser, reports, name):
     drawn(browser)
     assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
     assert requests(browser) == [reports[name].as_uri()]
+
+
+# --- Nothing leaves the machine
+
+BUTTONS = ["Zoom", "Pan", "Reset axes", "Download plot as a PNG"]
+SENDING = """const url = arguments[0], done = arguments[1], failed = () => null;
+  const form = document.body.appendChild(document.createElement("form"));
+  form.action = url; form.target = "_self"; form.method = "post"; form.submit();
+  for (const [tag, key] of Object.entries(
+      {img: "src", script: "src", iframe: "src", link: "href", object: "data"})) {
+    const made = document.createElement(tag);
+    if (tag === "link") made.rel = "stylesheet";
+    made[key] = url;
+    document.body.append(made);
+  }
+  const request = new XMLHttpRequest();
+  try { request.open("POST", url); request.onerror = failed; request.send("x"); } catch { }
+  try { navigator.sendBeacon(url, "x"); } catch { }
+  try { new WebSocket(url.replace("http", "ws")); } catch { }
+  fetch(url, { method: "POST", body: "x" }).catch(failed).then(() => setTimeout(done, 500));"""
+ABROAD = r"""const abroad = (e) => ["src", "href", "action", "data", "srcset"].some(
+  (key) => /^(https?:)?\/\//.test(e.getAttribute(key) || ""));
+  return [...document.querySelectorAll("*")].filter((e) =>
+  abroad(e) || /^(iframe|form|object|embed|base)$/i.test(
+  e.tagName)).map((e) => e.outerHTML.slice(0, 200))"""
+
+
+@pytest.fixture
+def listener() -> Iterator[tuple[str, list[str]]]:
+    """A server on this machine, and the requests that it got."""
+    heard: list[str] = []
+
+    class Heard(BaseHTTPRequestHandler):
+        timeout = 1.0  # a browser opens connections that it does not use
+
+        def do_GET(self) -> None:
+            heard.append(self.requestline)
+
+        do_POST = do_GET  # noqa: N815
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Heard)
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/", heard
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.fixture(scope="module")
+def pages(reports, batch, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A page of every kind that we write."""
+    folder, root = tmp_path_factory.mktemp("kinds"), Path(__file__).parents[2]
+    found = {"run": reports["two_link"], "batch": batch}
+    for name, command in {
+        "update": ["update", root / "cases" / "arm_update.yaml"],
+        "chart": ["chart", root / "benchmarks" / "small_arm.yaml", "--quick"],
+        "light": ["optimize", root / "benchmarks" / "small_arm.yaml", "--report", "light"],
+    }.items():
+        main([*map(str, command), "--quiet", "--out", str(folder / name)])
+        found[name] = folder / name / "report.html"
+    return found
+
+
+@pytest.mark.parametrize("kind", ["run", "batch", "update", "chart", "light"])
+def test_no_page_can_send_anything(browser, pages, listener, kind):
+    url, heard = listener
+    at(browser, pages[kind], 1200)
+    drawn(browser)
+    assert browser.execute_script(ABROAD) == []
+    for bar in browser.find_elements("css selector", ".modebar"):
+        buttons = bar.find_elements("css selector", ".modebar-btn")
+        assert [button.get_attribute("data-title") for button in buttons] == BUTTONS
+    assert (
+        "cloud"
+        not in browser.execute_script("return document.body.innerHTML")
+        .split("<script", 1)[0]
+        .lower()
+    )
+    requests(browser)
+    browser.execute_async_script(SENDING, url)
+    assert heard == []
+    assert browser.current_url == pages[kind].as_uri()
+
+
+def test_a_page_without_its_policy_could_send(browser, pages, listener, tmp_path):
+    """The test above would see it."""
+    url, heard = listener
+    html = pages["light"].read_text(encoding="utf-8")
+    (tmp_path / "open.html").write_text(html.replace("default-src 'none'", "default-src *"))
+    at(browser, tmp_path / "open.html", 1200)
+    browser.execute_async_script(SENDING, url)
+    assert heard
+
+
+def test_a_plot_is_saved_as_one_table_with_units(browser, reports):
+    at(browser, reports["two_link"], 1200)
+    script = "return eigassign.csv(arguments[0])"
+    head, *rows = csv.reader(browser.execute_script(script, "frequencies").splitlines())
+    assert head[0] == "time [s]"
+    assert head[1:4] == [
+        "mode 1 at 190 Hz: frequency [Hz]",
+        "mode 1, initial design: frequency [Hz]",
+        "mode 1: frequency [Hz]",
+    ]
+    assert len(set(head)) == len(head)
+    final = json.loads((reports["two_link"].parent / "results.json").read_text())["frequencies"]
+    samples = {float(row[0]): row for row in rows}
+    assert [float(samples[float(f"{t:.7g}")][3]) for t in final["time_s"]] == pytest.approx(
+        final["exact_hz"], rel=1e-6
+    )
+    assert all(len(row) == len(head) for row in rows)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_print_is_light_and_cuts_no_figure(browser, reports, scheme):
+    media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    at(browser, reports["two_link"], 1200)
+    drawn(browser)
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    colour = """return getComputedStyle(document.querySelector(
+      "[data-figure=frequencies] .xaxislayer-above text")).fill"""
+    assert browser.execute_script(colour) == "rgb(26, 26, 26)"
+    whole = "return getComputedStyle(document.querySelector('figure')).breakInside"
+    assert browser.execute_script(whole) == "avoid"
+    browser.execute_script("dispatchEvent(new Event('afterprint'))")
+    if scheme == "dark":
+        assert browser.execute_script(colour) == "rgb(232, 232, 232)"
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -89,6 +89,19 @@ def test_the_report_asks_nothing_of_the_network(full):
     assert not re.search(r"url\(|@import", html.split("<script>")[0])
 
 
+def test_a_page_cannot_send_and_its_plots_have_no_button_that_would():
+    html, _, _ = made(make_results(), full=True)
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', html)
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert [rules[key] for key in ("default-src", "form-action", "base-uri")] == ["'none'"] * 3
+    assert not {"connect-src", "frame-src", "object-src"} & rules.keys()
+    assert "http" not in policy
+    (config,) = re.findall(r"const config = (\{.*?\});", html, re.S)
+    assert "displaylogo: false" in config
+    assert 'showSendToCloud: false, plotlyServerURL: ""' in config
+    assert '[["zoom2d", "pan2d", "resetScale2d", "toImage"]]' in config
+
+
 def test_every_figure_is_inside_with_its_alternative_text_and_caption():
     results = make_results()
     _, parsed, images = made(results)

@@ -335,5 +335,5 @@ const eigassign = (function () {
     return [[-s, c, 0], [-low * c, -low * s, tall]];
   }
   all("#motion-player").forEach(player);
-  return { begin, setTime };
+  return { begin, setTime, csv };
 })();
