@@ -7,7 +7,7 @@ commands ``optimize``, ``expand`` and ``validate`` do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from eigassign.output.store.run_folder import UNFINISHED, unfinished_beside
 from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
-from eigassign.study.collect import collect_results
+from eigassign.study.collect import between_samples, collect_results
 from eigassign.study.design.account import VerifiedAssignment
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.conclusions import proof
@@ -162,6 +162,9 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     found = VerifiedAssignment(answer, targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
     results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s)
+    if options.figures or options.report != "none":
+        between = between_samples(scene, answer.y, len(results.spectrum))
+        results = replace(results, between=between)
     return _result(results, scene.expanded, answer.one_shot)
 
 

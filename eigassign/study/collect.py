@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import SI, handy_unit
-from eigassign.errors import TrajectoryError
+from eigassign.errors import EigassignError, TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks import Accuracy, MotionStudy, study_motion
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
@@ -33,6 +33,7 @@ from eigassign.study.results import (
     DriveLoad,
     DriveRow,
     MassRow,
+    ModeRow,
     Motion,
     RunResults,
     StaticRow,
@@ -99,6 +100,32 @@ def collect_results(
         moving=moving,
         **answer,
     )
+
+
+SMOOTH = 100  # samples of a trajectory: a curve through more has no kinks to be seen
+
+
+def between_samples(
+    scene: Scene, y: Floats, count: int
+) -> dict[str, tuple[Floats, tuple[ModeRow, ...]]]:
+    """The lowest ``count`` modes before and after at many instants, for smooth pictures.
+
+    By trajectory, with the times in s. None where a solve is dear, and where curves are smooth.
+    """
+    if not scene.model.pencil.is_dense or len(scene.path.time_s) > SMOOTH * len(scene.path.parts):
+        return {}
+    try:
+        fine = scene.path.finely
+        both = [scene.model.frequencies(fine.at(one)[0], one, count) for one in (scene.initial, y)]
+    except EigassignError:  # between samples the tip may leave its path
+        return {}
+    return {
+        part.name: (
+            fine.time_s[rows],
+            tuple(ModeRow(k + 1, *(hz[rows, k] for hz in both)) for k in range(count)),
+        )
+        for part, rows in zip(fine.parts, fine.rows, strict=True)
+    }
 
 
 def _answer(

@@ -24,6 +24,8 @@ from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import mounting, multiply, sliding_axis
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
+from eigassign.mechanism.solids.elements import KINDS
+from eigassign.mechanism.solids.part import couplings
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model, ModeShapes
@@ -31,6 +33,7 @@ from eigassign.study.results import (
     DrawnBody,
     DrawnJoint,
     DrawnPoses,
+    DrawnSolid,
     DrawnSpring,
     ModePictures,
     Motion,
@@ -146,9 +149,11 @@ def displaced(
         lines.append(tuple(frozen(spread(line, points or len(line))) for line in whole))
     axes = model.poses.values(x, joint_axes(file, model.poses))
     y = x[0, len(model.q_names) :]
+    solids = _solids(file, model, x) if points is None else ()
     return DrawnPoses(
         time_s=np.zeros(n),
         lines=tuple(lines),
+        solids=tuple(_moved(solid, found, factors) for solid in solids),
         **_symbols(file, model, y, at, [axis[:, :d] for axis in axes]),
     )
 
@@ -172,6 +177,7 @@ def _posed(
         time_s=frozen(time_s),
         lines=tuple(tuple(frozen(line[k]) for line in lines) for k in range(len(x))),
         tip_path=tip_path,
+        solids=tuple(_solids(file, model, x)),
         **_symbols(file, model, x[0, len(model.q_names) :], place.__getitem__, directions),
     )
 
@@ -191,6 +197,37 @@ def _symbols(
         "springs": springs(file, at),
         "depths": depths(file, poses.links, poses.drawn),
     }
+
+
+def _solids(file: CaseFile, model: Model, x: Floats) -> Iterator[DrawnSolid]:
+    """The surfaces of meshed links at samples x (n, n_x), undeformed."""
+    for link in (link for link in model.poses.links if link_type(file, link) == "solid"):
+        mesh, _ = couplings(file.mechanism.links[link], f"mechanism.links.{link}")
+        faces = [(part, f) for n, part in mesh.elements.items() for f in KINDS[n].faces]
+        keys = [np.sort(np.pad(part[:, f], ((0, 0), (0, 4 - len(f))), constant_values=-1), axis=1)
+                for part, f in faces]  # fmt: skip
+        _, first, count = np.unique(
+            np.concatenate(keys), axis=0, return_index=True, return_counts=True
+        )
+        every = np.concatenate([part[:, [*f, f[-1]][:4]] for part, f in faces])
+        used, corners = np.unique(every[first[count == 1]], return_inverse=True)
+        frame = [model.poses.motion.placement(link).at(X)[1] for X in (np.zeros(3), *np.eye(3))]
+        origin, *ends = model.poses.values(x, frame)
+        axes = np.stack(ends, axis=1) - origin[:, None]
+        places = (origin[:, None] + mesh.x[used] @ axes)[..., : _dimension(file)]
+        yield DrawnSolid(link, frozen(places), corners.reshape(-1, 4))
+
+
+def _moved(solid: DrawnSolid, found: Sequence[ModeShapes], factors: Floats) -> DrawnSolid:
+    """The surface where modes take it, about: each point goes with the nodes that are near."""
+    places = solid.places.copy()
+    for one, f, own, rest in zip(found, factors, places, solid.places, strict=True):
+        nodes = [node for (link, _), node in one.nodes.items() if link == solid.link]
+        arms = np.stack([rest - node.place for node in nodes])
+        near = 1.0 / ((arms**2).sum(axis=2, keepdims=True) + 1e-12)
+        v = np.stack([f @ node.motion for node in nodes])[:, None]
+        own += (near / near.sum(axis=0) * (v[..., :3] + np.cross(v[..., 3:], arms))).sum(axis=0)
+    return replace(solid, places=frozen(places))
 
 
 def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:

@@ -827,6 +827,15 @@ class DrawnSpring(Brief):
 
 
 @dataclass(frozen=True, repr=False)
+class DrawnSolid(Brief):
+    """The surface of a meshed link in n poses."""
+
+    link: str
+    places: Floats  # (n, n_points, d)
+    faces: NDArray[np.intp]  # (m, 4) corners of each, the last one twice of a triangle
+
+
+@dataclass(frozen=True, repr=False)
 class DrawnPoses(Brief):
     """The mechanism in n poses: ``lines[pose][line]`` is a polyline (n_points, d)."""
 
@@ -841,6 +850,7 @@ class DrawnPoses(Brief):
     springs: tuple[DrawnSpring, ...] = ()
     # per line: the depth of its section at start and end, m; 0 without a section
     depths: tuple[tuple[float, float], ...] = ()
+    solids: tuple[DrawnSolid, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -1020,6 +1030,10 @@ class RunResults(Origin):
     reduced: Unwritten[bool] = False  # links are
     given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
     spectrum: Unwritten[tuple[ModeRow, ...]] = ()  # up to the mode above the highest asked for
+    # by trajectory: instants between the samples too, and the modes there, where that is cheap
+    between: Unwritten[Mapping[str, tuple[Floats, tuple[ModeRow, ...]]]] = field(
+        default_factory=dict
+    )
     only: Unwritten[str | None] = None  # of several trajectories the one that these are of
     moving: Unwritten[tuple[Motion, ...]] = ()  # of every trajectory, where a report shows it
 

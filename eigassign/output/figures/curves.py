@@ -127,7 +127,11 @@ FAR = 0.5  # of a limit that is kept: as far from it nothing is seen in one pane
 def overview(results: RunResults, spectrum: Sequence[ModeRow]) -> FigurePlan:
     """Targets, limits and bands with the modes around them; what lies far apart in own panels."""
     groups, time_s = _groups(results, spectrum), results.time_s
-    modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
+    x, shown = results.between.get(results.trajectories[0].name, (None, spectrum))
+    modes = sorted(before_and_after(shown, x), key=lambda one: bool(one.end))  # after on top
+    if x is not None:  # the samples that the answer is judged at
+        looks = (Look(mode_colour(row.mode), 0.0, marker="o", size=3.0) for row in spectrum)
+        modes += [Curve(r.optimal_hz, look) for r, look in zip(spectrum, looks, strict=True)]
     height = {1: 2.9, 2: 1.9}.get(len(groups), 1.5)
     panels = []
     for own, (low, high) in groups:
@@ -248,10 +252,14 @@ def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
     asked = target.asked
     colour = mode_colour(asked.mode)
     name = asked.curve_name
-    stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, name))
-    for hz, look, end in stages:
-        off = 100.0 * (hz / target.asked.hz - 1.0)
-        x = results.time_s[asked.rows]
+    x, wanted, both = results.time_s[asked.rows], asked.hz, (target.initial_hz, target.exact_hz)
+    fine, modes = results.between.get(results.trajectories[0].name, (x, ()))
+    if modes and asked.mode and not asked.followed:
+        within = (fine >= x[0]) & (fine <= x[-1])
+        both = (modes[asked.mode - 1].initial_hz[within], modes[asked.mode - 1].optimal_hz[within])
+        x, wanted = fine[within], np.interp(fine[within], x, wanted)
+    for hz, look, end in zip(both, (_BEFORE, _AFTER), ("", name), strict=True):
+        off = 100.0 * (hz / wanted - 1.0)
         hover = f"{name}, initial design" * (not end)
         yield Curve(off, replace(look, colour=colour), x=x, end=end, hover=hover)
 
@@ -261,12 +269,12 @@ def mode_colour(mode: int) -> str:
     return _MODES[(mode - 1) % len(_MODES)]
 
 
-def before_and_after(shown: Sequence[ModeRow]) -> tuple[Curve, ...]:
+def before_and_after(shown: Sequence[ModeRow], x: Floats | None = None) -> tuple[Curve, ...]:
     """One colour a mode: dashed before, solid after, its number at the end of its curve."""
     found = []
     for row in shown:
         before, after = (replace(look, colour=mode_colour(row.mode)) for look in (_BEFORE, _AFTER))
         name = f"mode {row.mode}"
-        found.append(Curve(row.initial_hz, before, hover=f"{name}, initial design"))
-        found.append(Curve(row.optimal_hz, after, end=name))
+        found.append(Curve(row.initial_hz, before, x=x, hover=f"{name}, initial design"))
+        found.append(Curve(row.optimal_hz, after, x=x, end=name))
     return tuple(found)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,8 @@ Floats = NDArray[np.float64]
 # --- A parallel projection
 
 _ELEVATIONS = np.radians([22.0, 50.0])
-_AZIMUTHS = np.radians([-60.0, -30.0, -90.0, -120.0, -5.0, -150.0])  # of the viewer
+# of the viewer; along an axis what lies on one sheet with it would seem to be plane
+_AZIMUTHS = np.radians([-60.0, -30.0, -75.0, -120.0, -15.0, -150.0])
 
 
 @dataclass(frozen=True)
@@ -176,6 +178,7 @@ def points_of(poses: DrawnPoses) -> Floats:
     parts += [body.places for body in poses.bodies]
     parts += [joint.places for joint in poses.joints]
     parts += [] if poses.tip_path is None else [poses.tip_path]
+    parts += [solid.places.reshape(-1, solid.places.shape[2]) for solid in poses.solids]
     every = np.concatenate(parts)
     return every[np.isfinite(every).all(axis=1)]
 
@@ -187,7 +190,9 @@ def drawn(
     for part in shown:
         own, at = look.get(part.role, colour), min(pose, len(part.places) - 1)
         places = held.view.flat(part.places[at])
-        if part.kind == "line":
+        if part.faces is not None:
+            yield polyline(silhouette(places, part.faces), Look(own, 1.0))
+        elif part.kind == "line":
             yield from _thick(held, places, part.ends, own)
         elif part.kind == "spring":
             zigzag = scene.zigzagged((places[1] - places[0]) / held.inch)
@@ -201,6 +206,21 @@ def drawn(
         else:
             turned = None if part.axes is None else held.heading(part.axes[at])
             yield from (_stamp(held, places[0], shape, turned, own) for shape in part.shapes)
+
+
+def silhouette(flat: Floats, faces: NDArray[np.intp]) -> Floats:
+    """Where faces (m, 4) turn away from the viewer: segments between ``flat`` points (n, 2).
+
+    NaN between them, (3 k, 2).
+    """
+    a, b, c = (flat[faces[:, k]] for k in range(3))
+    front = np.linalg.det(np.stack([b - a, c - a], axis=1)) > 0.0
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    apart = edges[:, 0] != edges[:, 1]  # a triangle has three
+    pairs, which = np.unique(edges[apart], axis=0, return_inverse=True)
+    seen = np.bincount(which.ravel(), np.repeat(front, 4)[apart])
+    ends = flat[pairs[(seen > 0) & (seen < np.bincount(which.ravel()))]]
+    return np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1).reshape(-1, 2)
 
 
 def _stamp(held: Extent, at: Floats, shape: Shape, along: Floats | None, colour: str) -> Curve:
@@ -315,7 +335,7 @@ def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
             f"Mode {k + 1}: {hz:.5g} Hz",
             caption,
             f"Mode {k + 1} of the mechanism at {hz:.5g} Hz, deformed over undeformed.",
-            held.graph(title, marks, note=short(pictures.where, 100)),
+            held.graph(title, marks, note="\n".join(wrap(pictures.where, 105)[:2])),
         )
 
     return tuple(figure(k, hz) for k, hz in enumerate(pictures.frequencies_hz))

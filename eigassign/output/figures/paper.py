@@ -187,7 +187,8 @@ def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
     if shown.x_names:
         places = np.arange(1, 1 + len(shown.x_names))
         found[-1].set_xticks(places, shown.x_names, rotation=30, ha="right")
-    found[-1].xaxis.set_label_coords(0.5, -0.37 / shown.panels[-1].height)
+    below = 0.12 if shown.sheet == "bare" else 0.37  # of ticks and their numbers
+    found[-1].xaxis.set_label_coords(0.5, -below / shown.panels[-1].height)
     if shown.sheet:
         axes.set_aspect("equal")
     if shown.sheet == "bare":

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from eigassign.study.results import DrawnJoint, DrawnPoses
 
 Floats = NDArray[np.float64]
-Kind = Literal["line", "stamp", "spring", "rail"]
+Kind = Literal["line", "stamp", "spring", "rail", "solid"]
 LEAST_SHARE = 1.0 / 45.0  # of the extent: so thick is the thickest section at least
 MOST_SHARE = 0.25  # and at most
 NOMINAL_SHARE = 1.0 / 70.0  # of the extent: a link without a section
@@ -48,7 +48,7 @@ class Part:
 
     A line runs through them, as thick as ``ends`` say, m; a stamp has its shapes at the one place,
     turned so that they lie along ``axes`` (n, d), or upright without; a spring is between two; a
-    rail lies beside the way from one to the other.
+    rail lies beside the way from one to the other; of a solid the outline of its ``faces``.
     """
 
     kind: Kind
@@ -58,6 +58,7 @@ class Part:
     axes: Floats | None = None
     ends: tuple[float, float] = (0.0, 0.0)
     shapes: tuple[Shape, ...] = ()
+    faces: NDArray[np.intp] | None = None
 
 
 def box(half: float, tall: float) -> Floats:
@@ -155,10 +156,15 @@ def zigzagged(along: Floats) -> Floats:
 
 
 def links(poses: DrawnPoses) -> Iterator[Part]:
-    """Yield the links as lines, as thick as they are drawn."""
+    """Yield the links: solids, the others as lines as thick as they are drawn."""
     times, nominal = thickening(poses), NOMINAL_SHARE * extent_of(poses)
     depths = poses.depths or ((0.0, 0.0),) * len(poses.line_links)
+    for solid in poses.solids:
+        yield Part("solid", "link", solid.link, solid.places, faces=solid.faces)
+    outlined = {solid.link for solid in poses.solids}
     for k, (name, pair) in enumerate(zip(poses.line_links, depths, strict=True)):
+        if name in outlined:
+            continue
         places = np.stack([lines[k] for lines in poses.lines])
         known = any(pair)
         ends = (times * pair[0], times * pair[1]) if known else (nominal, nominal)

@@ -416,7 +416,7 @@
     draws.push(drawCloud);
   }
   show();
-  let width = 0;
+  let width = document.querySelector(".plots").clientWidth;
   new ResizeObserver(() => {
     const now = document.querySelector(".plots").clientWidth;
     if (now !== width) draws.forEach((draw) => draw());
