@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import RIDING, SLIDING
-from eigassign.case.units import shown_point
+from eigassign.case.units import SI, shown_point
 from eigassign.mechanism.kinematics.forward import LinkFrames
 from eigassign.mechanism.kinematics.joints import mounting, multiply, sliding_axis
 from eigassign.mechanism.kinematics.parameters import initial_design, link_type
@@ -82,7 +82,8 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     Raises what `Model.shapes` raises.
     """
     shapes, x = model.shapes(q, y, count), model.one(q, y)
-    names, units = (*model.q_names, *model.y_names), (*file.q_units, *file.design_units)
+    names, q_units = (*model.q_names, *model.y_names), map(str, file.q_units)
+    units = (*(SI(unit, "deg" * (unit == "rad")) for unit in q_units), *file.design_units)
     scales = AMPLITUDE * extent_of(shapes) / largest_of(shapes) * _phase(shapes)
     return ModePictures(
         title=file.title,

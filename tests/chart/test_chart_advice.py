@@ -117,9 +117,9 @@ def test_a_folder_holds_every_point_and_the_page_begins_with_the_answer(
     above, folded = page.split("<details", 1)
     assert "An &lt;arm&gt; &amp; more" in above
     assert "Write <code>order: 2</code> under <code>expansion</code>" in above
-    assert page.count("data:image/png;base64") == 3
+    assert page.count("data:image/png;base64") == 2
     assert all(table.title in page for table in chart_tables(chart))
     assert "All methods" in folded
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert figures == {"plane", "boxes", "claims"}
+    assert figures == {"plane", "boxes"}
     assert f"Not drawn: {sum(p.worst_relative > 1.0 for p in chart.points)} over 100 %" in page

@@ -4,6 +4,7 @@ import dataclasses
 import io
 import unicodedata
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -12,7 +13,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import as_limit, make_results, studied
 
-from eigassign.output import FigurePlan, draw, render, run_figures
+import eigassign as ea
+from eigassign.output import Curve, FigurePlan, Look, Panel, draw, render, run_figures
 from eigassign.study import RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
@@ -30,6 +32,7 @@ EVERY = {
 }
 BY_DEFAULT = "long names in space"  # of these figures; all of them: a minute
 VERMILLION = "#D55E00"
+SMALL = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +109,45 @@ def test_what_was_asked_is_drawn_with_the_modes_around_it_and_its_distance(paper
     assert (above.get_ylabel(), below.get_ylabel()) == ("frequency [Hz]", "off target [%]")
     assert below.get_xlabel() == "time [s]"
     assert set(legend(figure)) == {"mode 1 at 190 Hz", "initial design", "optimal design"}
+
+
+@pytest.mark.parametrize("times", [0.2, 3.0])
+def test_the_panel_of_a_band_holds_the_answer_however_far_it_is(paper, times):
+    edges = [times * paper.targets[0].asked.hz[0] * share for share in (0.98, 1.02)]
+    band = (np.full(paper.time_s.size, edge) for edge in edges)
+    found = with_limits(paper, ("keep_out", *band))
+    (asked,) = (target.asked for target in found.targets)
+    target = dataclasses.replace(found.targets[0], asked=dataclasses.replace(asked, terms=()))
+    (plan,) = plans_of(dataclasses.replace(found, targets=(target,)), "frequencies")
+    low, high = plan.shows.panels[0].limits
+    assert low <= edges[0] < edges[1] <= high
+    inside = [((low < c.y) & (c.y < high)).all() for c in plan.shows.panels[0].curves if c.end]
+    assert any(inside)
+
+
+def test_a_curve_that_leaves_its_panel_is_named_at_the_edge():
+    look, x = Look(VERMILLION), np.arange(3.0)
+    curves = (
+        Curve(np.array([1.0, 2.0, 9.0]), look, end="leaves"),
+        Curve(x + 7.0, look, end="never seen"),
+    )
+    panel = Panel("f [Hz]", curves, within=(0.0, 5.0))
+    assert panel.ends() == [("leaves", 5.0, VERMILLION)]
+
+
+def test_curves_of_few_samples_are_solved_between_them_and_keep_their_points():
+    results = ea.assign(ea.load_case(SMALL)).results
+    ((name, (time_s, rows)),) = results.between.items()
+    assert name == results.trajectories[0].name
+    assert time_s.size > 200 > results.time_s.size
+    for row, sampled in zip(rows, results.spectrum, strict=True):
+        at = np.searchsorted(time_s, results.time_s - 1e-9)
+        np.testing.assert_allclose(row.optimal_hz[at], sampled.optimal_hz, rtol=1e-9)
+        np.testing.assert_allclose(row.initial_hz[at], sampled.initial_hz, rtol=1e-9)
+    (plan,) = plans_of(results, "frequencies")
+    curves = plan.shows.panels[0].curves
+    assert any(curve.y is rows[0].optimal_hz for curve in curves)
+    assert any(c.y is results.spectrum[0].optimal_hz and c.look.marker for c in curves)
 
 
 def test_all_that_is_forbidden_is_shaded(paper):

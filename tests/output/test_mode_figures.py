@@ -74,6 +74,28 @@ def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it()
     assert figure.axes[0].get_xlabel() == found.where
 
 
+def test_a_solid_is_drawn_by_its_outline_at_the_scale_of_its_mesh() -> None:
+    case = ea.load_case(CASES / "casting_arm.yaml")
+    found = pictures("casting_arm")
+    (solid,) = found.rest.solids
+    text = (CASES / "casting_arm" / "forearm.msh").read_text()
+    nodes = text.partition("$Nodes")[2].partition("$EndNodes")[0].split("\n")
+    mesh = 1e-3 * np.array([row.split() for row in nodes if len(row.split()) == 3], dtype=float)
+    farthest = np.linalg.norm(mesh[:, None] - mesh[None, ::7], axis=2).max()
+    places = solid.places[0]
+    assert np.linalg.norm(places[:, None] - places[None], axis=2).max() == pytest.approx(
+        farthest, rel=0.02
+    )
+    (moved,) = found.deformed.solids
+    assert np.linalg.norm(moved.places - places, axis=2).max() < 0.5 * farthest
+    lines = [line.get_xydata() for line in draw(mode_figures(found)[0]).axes[0].get_lines()]
+    outline = [xy for xy in lines if np.isnan(xy).any() and len(xy) > 60]
+    assert len(outline) >= 2  # at rest, and deformed
+    assert "deg" in found.where
+    assert "rad" not in found.where.replace("m/rad", "")
+    assert case.file.title == found.title
+
+
 def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> None:
     expected = {f"{name}_report.png" for name in ALL}
     assert {path.name for path in GALLERY.glob("*.png")} == expected, "run cases/gallery/draw.py"

@@ -29,7 +29,6 @@ COLOURS: dict[str, str] = dict(zip(Kind, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
 Floats = NDArray[np.float64]
-LEAST = 1e-10  # %, of claims: what is below is as good as nothing
 WANTED = Look(graph.BLACK, 1.0, "fine")
 SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
 COSTS = {0.01: "≤ 1/100", 0.1: "≤ 1/10", 1.0: "≤ 1", np.inf: "over 1"}
@@ -38,8 +37,8 @@ SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to wr
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """Error against time; where something varies, against the size of the box, and as claimed."""
-    return (_plane(chart), *((_boxes(chart), _claims(chart)) if chart.boxes else ()))
+    """Error against time; where something varies, against the size of the box."""
+    return (_plane(chart), *((_boxes(chart),) if chart.boxes else ()))
 
 
 def _figure(
@@ -135,25 +134,6 @@ def _boxes(chart: Chart) -> FigurePlan:
         "no longer as accurate as wanted."
     )
     return _figure("boxes", heading, caption, "half-width of the ranges", panels, "reach")
-
-
-def _claims(chart: Chart) -> FigurePlan:
-    """What methods say of their own error, over what is true."""
-    ends, marks = np.array([LEAST, 1e2]), list[Mark]()
-    for method, look in _looks(chart.boxes).items():
-        own = [r for r in chart.boxes if r.method == method and r.worst_relative < 1.0]
-        pairs = [(r.worst_relative, r.claimed) for r in own if r.claimed is not None]
-        if pairs:
-            x, y = 100.0 * np.array(pairs).T
-            marks.append(Curve(np.maximum(y, LEAST), replace(look, width=0.0), method, x))
-    marks.append(Curve(ends, WANTED, "claimed = true", ends))
-    caption = (
-        "In every box: the share of a series' last degree, or Kriging's own deviation, against the "
-        "worst error that was measured. Below the diagonal a method is surer than it should be."
-    )
-    panel = Panel("claimed error [%]", tuple(marks), 4.0, True, 16)
-    heading = "Claimed and true errors"
-    return _figure("claims", heading, caption, "worst error [%]", [panel], "reach")
 
 
 def chart_tables(made: Chart | Matrix) -> tuple[Table, ...]:

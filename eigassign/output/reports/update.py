@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eigassign.output.documents import to_json
 from eigassign.output.figures import graph
 from eigassign.output.figures.curves import LEVEL
-from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.updating.fit import OUTLIER, UpdateResults
@@ -62,11 +62,13 @@ def _measurements(results: UpdateResults) -> Graph:
         for when in ("initial_hz", "updated_hz")
     )
     names = tuple(f"{row.label}, mode {row.mode}" for row in rows)
-    bars = _deviations(at, 100.0 * np.array([row.deviation_hz for row in rows]) / measured)
+    bars = 100.0 * np.array([row.deviation_hz for row in rows]) / measured
     initial = (Rule(0.0, LEVEL), Curve(before, _BEFORE, "model before", names=names))
     above: tuple[Mark, ...] = (
-        Rule(0.0, LEVEL), bars, Curve(after, _AFTER, "model after", names=names)
-    )  # fmt: skip
+        Rule(0.0, LEVEL),
+        graph.segments(at, -bars, bars, _INTERVAL, "measured ± standard deviation"),
+        Curve(after, _AFTER, "model after", names=names),
+    )
     residual = np.array([row.residual for row in rows])
     below: tuple[Mark, ...] = (
         Rule(0.0, LEVEL),
@@ -83,14 +85,6 @@ def _measurements(results: UpdateResults) -> Graph:
     ends = 0.4, at.size + 0.6
     title = "Measured frequencies and the model"
     return Graph(title, "measurement", at, panels, x_limits=ends)
-
-
-def _deviations(at: Floats, bars: Floats) -> Mark:
-    """One standard deviation to either side of each measurement: bars, a band where they merge."""
-    label = "measured ± standard deviation"
-    if at.size > 150:
-        return Shade(-bars, bars, graph.GREY, label, 0.35)
-    return graph.segments(at, -bars, bars, _INTERVAL, label)
 
 
 def _parameters(results: UpdateResults) -> Graph:
