@@ -22,7 +22,7 @@ __all__, __getattr__, __dir__ = face(
         "adaptive_order": "MARGIN raise_order",
         "exact.inertia": "count_below",
         "exact.solver": "clusters eigenvalues exact_slopes lowest_modes modes rounding_error",
-        "exact.large": "solve_large solve_sparse solve_together",
+        "exact.large": "solve_large",
         "exact.tracking": "FollowedShape ModesAtPoint MoreModesError follow places",
         "expansion": "Expansion NearestExpansion expand expansion_arrays tree_arrays",
         "model": "Model",

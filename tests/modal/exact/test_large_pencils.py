@@ -1,4 +1,4 @@
-"""Many samples of a large pencil together: the modes of every sample, and none missed."""
+"""Samples of a large pencil, by Lanczos' method: the modes of each, and none missed."""
 
 from pathlib import Path
 from typing import Any
@@ -16,18 +16,16 @@ from eigassign.modal import (
     modes,
     rounding_error,
     solve_large,
-    solve_together,
 )
 
 CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
-SAMPLES = 24
+SAMPLES = 8
 
 
 def agree(pencil: Pencil, x: np.ndarray, count: int) -> None:
-    """Every sample is proved, with the frequencies and shapes of the dense solver."""
+    """Every sample has the frequencies and shapes of the dense solver."""
     theta = pencil.theta(x)
-    found = solve_together(pencil, theta, count, True)
-    assert found is not None
+    found = solve_large(pencil, theta, count, True)
     dense = modes(large(pencil, 10**6), x, count + 1)
     rounding = max(rounding_error(pencil, row, count) for row in x[:: len(x) // 4])
     hz, expected = np.sqrt(found.lam), np.sqrt(dense.lam[:, :count])
@@ -51,7 +49,7 @@ def test_shipped_cases_have_the_modes_of_the_dense_solver(path: Path) -> None:
     if case.file.trajectory is None:
         pytest.skip("no trajectory")
     model = case.model()
-    x = model.x(case.trajectory.q, case.initial_design)
+    x = model.x(case.trajectory.q[:: len(case.trajectory.q) // SAMPLES or 1], case.initial_design)
     agree(model.pencil, x, min(4, len(model.pencil.elastic) - 2))
 
 
