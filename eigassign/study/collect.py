@@ -150,9 +150,20 @@ def _answer(
         "mass": MassRow(
             *(mass(scene.initial), mass(answer.y), *asked, name), handy_unit(scene.file.mass_unit)
         ),
+        "orders": tuple(dict.fromkeys(_orders(scene.file))),
         "drives": _drives(scene, answer.y),
         "statics": tuple(_statics(scene, answer.y)),
     }
+
+
+def _orders(file: CaseFile) -> Iterator[tuple[float, float]]:
+    """The multiples that targets name, and of what in Hz; once of what they write in rpm."""
+    for target in file.targets:
+        times = getattr(getattr(target, "keep_out", None), "harmonic", None)
+        values: list[Any] = []
+        for _, curve in target.frequencies:
+            values += getattr(curve, "frequency", (curve,))
+        yield from ((times or 1.0, hz) for hz in values if times or SI("Hz", hz).answered == "rpm")
 
 
 def _checked(target: TargetStudy, found: Sequence[ClearanceRow]) -> TargetStudy:

@@ -1028,6 +1028,7 @@ class RunResults(Origin):
     q: Unwritten[Floats]  # (n_t, n_q), of several trajectories one after the other
     poses: Unwritten[DrawnPoses]
     reduced: Unwritten[bool] = False  # links are
+    orders: Unwritten[tuple[tuple[float, float], ...]] = ()  # multiples, and of what, Hz
     given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
     spectrum: Unwritten[tuple[ModeRow, ...]] = ()  # up to the mode above the highest asked for
     # by trajectory: instants between the samples too, and the modes there, where that is cheap

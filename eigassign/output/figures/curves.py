@@ -37,6 +37,7 @@ TARGET = Look(graph.BLACK, 1.6, "dotted")
 OPTIMAL = Look(graph.SKY, 3.2)
 LEVEL = Look(graph.BLACK, 0.8)
 EDGE = Look(graph.VERMILLION, 1.0)
+_MEETS = Look(graph.VERMILLION, 4.0, marker="o")
 _BEFORE, _AFTER = Look(graph.BLACK, 1.3, "dashed"), Look(graph.BLACK, 1.8)
 BEFORE_AND_AFTER = (("initial design", _BEFORE), ("optimal design", _AFTER))
 _MODES = tuple(one for one in graph.SERIES if one != graph.VERMILLION)  # what is forbidden
@@ -262,6 +263,41 @@ def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
         off = 100.0 * (hz / wanted - 1.0)
         hover = f"{name}, initial design" * (not end)
         yield Curve(off, replace(look, colour=colour), x=x, end=end, hover=hover)
+
+
+def campbell(results: RunResults) -> FigurePlan:
+    """Where the modes lie along the trajectory, over speed, with the orders that targets name.
+
+    Order h excites h n/60 Hz at n rpm; it meets a mode at speeds between 60/h times its ends.
+    """
+    speeds = sorted({60.0 * hz for _, hz in results.orders})
+    rpm, marks = np.array([0.0, 1.3 * speeds[-1]]), list[Mark]()
+    orders = {f"order {h:g}": h / 60.0 for h, _ in sorted(results.orders)}
+    top = 1.1 * rpm[1] * max(orders.values())
+    for row in results.spectrum:
+        low, high = float(row.optimal_hz.min()), float(row.optimal_hz.max())
+        if low < top:
+            name, look = f"mode {row.mode}", Look(mode_colour(row.mode))
+            marks.append(Shade(np.full(2, low), np.full(2, high), look.colour, opacity=0.3, x=rpm))
+            marks += [Curve(np.full(2, hz), look, name * (hz == low), rpm) for hz in (low, high)]
+            for order, per_rpm in orders.items():
+                ends, words = np.array([low, high]).clip(0.0, per_rpm * rpm[1]), f"{order}, {name}"
+                if ends[0] == low:
+                    marks.append(Curve(ends, _MEETS, x=ends / per_rpm, hover=words))
+    marks += [Curve(h * rpm, LEVEL, x=rpm, end=order) for order, h in orders.items()]
+    marks += [Rule(n, TARGET, f"{n:.4g} rpm", upright=True) for n in speeds]
+    heading = f"Orders of the speed{where(results)}"
+    key = (("an order meets a mode", _MEETS),)
+    panel = Panel("frequency [Hz]", tuple(marks), 2.9, within=(0.0, top), key=key)
+    return FigurePlan(
+        f"orders{suffix(results)}",
+        heading,
+        f"The answer's modes along {results.along}, from lowest to highest, and what orders of a "
+        "speed excite.",
+        "Frequencies over speed, with lines of orders.",
+        Graph(heading, "speed [rpm]", np.zeros(0), (panel,), (0.0, float(rpm[1]))),
+        "requirements",
+    )
 
 
 def mode_colour(mode: int) -> str:

@@ -105,6 +105,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     for one in each:
         if one.spectrum and one.time_s.size:
             yield curves.overview(one, one.spectrum)
+    yield from (curves.campbell(one) for one in each if one.orders and one.spectrum)
     if any(results.poses.lines):
         yield mechanism.poses(results.case.title, results.poses)
     # else 0.15 s that nobody asked for
