@@ -83,7 +83,7 @@ def _cells(run: Found) -> Iterator[tuple[str, str, str]]:
     amounts = {"mass [kg]": run["mass"] and run["mass"]["optimal"], "price": run["price"]}
     yield from (("Runs", k, number(one)) for k, one in amounts.items() if one is not None)
     for name, row in run["design"].items():
-        unit, size = row["read_in"]
+        unit, size = row.get("read_in", (row["unit"], 1.0))  # 0.3 does not write it
         words = f"{name} [{unit}]" if unit else name
         yield "Design", words, row["choice"] or number(row["optimal"] / size)
     for row in (*run["targets"], *found["limits"]):
