@@ -12,22 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.build import (
-    build_pencil,
-    local_links,
-    refined,
-    with_reduction,
-)
+from eigassign.mechanism.assembly.build import build_pencil, local_links, refined, with_reduction
 from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
-from eigassign.mechanism.assembly.mode_shapes import (
-    NodeShape,
-    StrandShape,
-    TotalMass,
-    shapes,
-)
+from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, TotalMass, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.links import LinkMesh
 from eigassign.mechanism.forces import DriveForces, drive_forces

@@ -18,11 +18,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.checks import Accuracy, MotionStudy, study_motion
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
 from eigassign.study.design.answer import solver_row
-from eigassign.study.design.judgement import (
-    far_off,
-    judged_modes,
-    mode_rows,
-)
+from eigassign.study.design.judgement import far_off, judged_modes, mode_rows
 from eigassign.study.design.lists import cost, design_rows
 from eigassign.study.given import given
 from eigassign.study.pictures import draw_poses, rest_pose

@@ -21,18 +21,9 @@ from numpy.typing import NDArray
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.congruence import (
-    LocalLink,
-    motion_matrix,
-    motion_scalars,
-)
+from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.elements.beam import Shear, fields
-from eigassign.mechanism.elements.links import (
-    LinkMesh,
-    Strand,
-    axes,
-    element_motion,
-)
+from eigassign.mechanism.elements.links import LinkMesh, Strand, axes, element_motion
 from eigassign.mechanism.kinematics.forward import LinkFrames, Placement
 from eigassign.mechanism.kinematics.joints import Objects
 from eigassign.mechanism.kinematics.loop_closure import reference

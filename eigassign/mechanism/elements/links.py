@@ -24,12 +24,7 @@ from eigassign.mechanism.elements.beam import (
     element_stiffness,
     shear,
 )
-from eigassign.mechanism.elements.sections import (
-    Profile,
-    beam_profiles,
-    beam_values,
-    each_element,
-)
+from eigassign.mechanism.elements.sections import Profile, beam_profiles, beam_values, each_element
 from eigassign.mechanism.kinematics.joints import (
     CROSS,
     DOFS,

@@ -19,11 +19,7 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.elements.craig_bampton import (
-    coefficients,
-    held_factor,
-    is_semidefinite,
-)
+from eigassign.mechanism.elements.craig_bampton import coefficients, held_factor, is_semidefinite
 from eigassign.mechanism.elements.links import (
     Entries,
     LinkMesh,

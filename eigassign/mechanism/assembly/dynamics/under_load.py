@@ -50,13 +50,7 @@ from eigassign.mechanism.assembly.loads.second_order import (
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, first_moment
 from eigassign.mechanism.assembly.node_motion import combined
 from eigassign.mechanism.assembly.pencil import AffineEntries
-from eigassign.mechanism.elements.beam import (
-    Shear,
-    element_mass,
-    element_stiffness,
-    fields,
-    shear,
-)
+from eigassign.mechanism.elements.beam import Shear, element_mass, element_stiffness, fields, shear
 from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.elements.links import Entries, Strand
 from eigassign.mechanism.elements.sections import SHARES, STATIONS, BeamValues, Profile

@@ -52,12 +52,7 @@ from scipy import sparse
 from eigassign.case.schema.mechanism import RIDING
 from eigassign.mechanism.assembly.congruence import add_stressed
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
-from eigassign.mechanism.assembly.node_motion import (
-    MotionRow,
-    MotionRows,
-    apply,
-    combined,
-)
+from eigassign.mechanism.assembly.node_motion import MotionRow, MotionRows, apply, combined
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import (
     DEFLECTION,

@@ -45,18 +45,8 @@ from eigassign.mechanism.kinematics.joints import (
     some,
 )
 from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
-from eigassign.mechanism.kinematics.parameters import (
-    ModelParameters,
-    link_type,
-    node_position,
-)
-from eigassign.mechanism.kinematics.topology import (
-    GROUND,
-    JointEdge,
-    NodeName,
-    Topology,
-    split,
-)
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
+from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.series.expression import Scalar
 
 ABSENT = np.full(6, -1)

@@ -22,11 +22,7 @@ from eigassign.mechanism.assembly.congruence import (
     pulled,
     scattered,
 )
-from eigassign.mechanism.assembly.loads.second_order import (
-    add_second_order,
-    on_nodes,
-    stress_terms,
-)
+from eigassign.mechanism.assembly.loads.second_order import add_second_order, on_nodes, stress_terms
 from eigassign.mechanism.assembly.loads.statics import (
     Loaded,
     Loads,
@@ -37,14 +33,7 @@ from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.links import Entries, LinkMesh, Strand, Term, summed
-from eigassign.mechanism.kinematics.joints import (
-    DOFS,
-    Floats,
-    Objects,
-    cross,
-    multiply,
-    scaled,
-)
+from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, cross, multiply, scaled
 from eigassign.mechanism.kinematics.loop_closure import passive_motion
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.topology import NodeName
