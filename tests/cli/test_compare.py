@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import yaml
 
 from eigassign.cli import main
 from eigassign.output import run_folder
@@ -79,6 +80,24 @@ def test_the_page_has_every_run_and_makes_no_request(capsys: pytest.CaptureFixtu
     assert {"mode 1 at 15 Hz", "mode 1 at 14 Hz"} <= {d.get("name") for d in plot["data"]}
     assert "part of the duration" in json.dumps(plot["layout"])  # 1 s and 2 s
     assert "default-src 'none'" in page
+
+
+def test_along_several_trajectories_each_has_its_own_curve(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    case = yaml.safe_load(Path("one.yaml").read_text())
+    own = case["trajectory"]
+    case["trajectory"] = [{**own, "name": "there"}, {**own, "name": "back", "duration": "0.5 s"}]
+    case["targets"] = [
+        {"mode": 1, "frequency": "15 Hz", "trajectory": k} for k in ("there", "back")
+    ]
+    Path("both.yaml").write_text(json.dumps(case))
+    assert main(["optimize", "both.yaml", *LITTLE]) == 0
+    compared("both.yaml", "one.yaml", capsys=capsys)
+    page = Path("side/compare.html").read_text()
+    plot = json.loads(page.partition('id="figures">')[2].partition("</script>")[0])["compared"]
+    drawn = [d["x"][-1] for d in plot["data"] if d.get("name") == "mode 1, both.yaml"]
+    assert sorted(drawn) == [0.5, 1.0]
 
 
 def test_of_equal_durations_the_time_is_shown(capsys: pytest.CaptureFixture[str]) -> None:

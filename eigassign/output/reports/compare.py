@@ -72,7 +72,8 @@ def comparison(runs: Mapping[str, Found]) -> tuple[tuple[Table, ...], bytes]:
 def _cells(run: Found) -> Iterator[tuple[str, str, str]]:
     """Table, row and cell of what was found, of the design, and of targets and limits with room."""
     error, violation, found = run["error"], run["violation"], run["assignment"]
-    yield "Runs", "verdict", verdict_word(found["verdict"])
+    unfinished = "" if found["finished"] else ", unfinished"
+    yield "Runs", "verdict", verdict_word(found["verdict"]) + unfinished
     for name, row, key in (
         ("worst error before", error and error["initial"], "max_relative"),
         ("worst error", error and error["exact"], "max_relative"),
@@ -121,7 +122,9 @@ def _frequencies(runs: Mapping[str, Found]) -> FigurePlan:
                 own = {mode: curves["exact_hz"]}
             for mode, hz in own.items():
                 words = f"{mode}, {name}"
-                marks[words] = Curve(cut(hz), look, x=x, end=mode, hover=words)
+                marks[f"{words}, {row.get('trajectory')}"] = Curve(
+                    cut(hz), look, x=x, end=mode, hover=words
+                )
     panel = Panel("frequency [Hz]", (*marks.values(),), 4.6, key=(*looks.items(),))
     title, axis = "Frequencies of the answers", "time [s]" if alike else "part of the duration"
     caption = "Exact, along the trajectory: a colour and dashes for each run, and what was asked."
