@@ -178,6 +178,8 @@ def _is_damaged(place: Path) -> bool:
 
 def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
     error, violation, found = results.error, results.violation, results.assignment
+    units = {**case.file.variant_units, **{row.name: row.unit for row in results.design}}
+    units |= {_peak(row): row.unit for row in results.drives}
     return {
         "status": _status(results),
         "message": results.shortcoming or "",
@@ -193,11 +195,8 @@ def _found(case: BuiltCase, results: RunResults) -> dict[str, Any]:
         "room": min((t.room for t in results.targets if t.room is not None), default=None),
         "design": tuple((row.name, row.optimal) for row in results.design),
         "drives": tuple((_peak(row), row.optimal.peak) for row in results.drives),
-        "units": {
-            **case.file.variant_units,
-            **{row.name: row.unit for row in results.design},
-            **{_peak(row): row.unit for row in results.drives},
-        },
+        "units": units,
+        "read_in": {k: own for k, u in units.items() if (own := getattr(u, "answered", ""))},
         "frequencies": frequency_ranges(results, case.file.variant),
     }
 

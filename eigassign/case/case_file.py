@@ -13,6 +13,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -83,7 +84,7 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
-from eigassign.case.units import SI
+from eigassign.case.units import SI, Given
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
 
@@ -235,13 +236,14 @@ class CaseFile:
     def coordinate_units(self) -> tuple[str, ...]:
         """SI unit of each coordinate, in the order of q: rad, or m where its joint slides.
 
-        Answered as poses are written, of the trajectory first.
+        Answered as poses are written, of the trajectory first; a bare angle is in rad.
         """
         joints = self.mechanism.joints
         written = zip(*(row for _, row in coordinate_lists(self)), strict=True)
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
         units = ("m" if freedom == "translation" else "rad" for freedom in moved)
-        return tuple(self._unit(u, *next(written, ())) for u in units)
+        both = ((unit, next(written, ())) for unit in units)
+        return tuple(self._unit(u, *row, "rad" * (u == "rad" and any(row))) for u, row in both)
 
     def _unit(self, unit: str, *given: object) -> SI:
         """SI ``unit`` of what is written as ``given``; the file may have degrees elsewhere."""
@@ -327,7 +329,8 @@ class CaseFile:
             known = known_property(self, key.removeprefix("mechanism.")) or own
             bound = last in ("min", "max") and owners[:1] == ["design"]
             found[key] = known or (designed.get(owners[-1]) if bound else None) or Quantity()
-        return dict(zip(found, _units(found.values()), strict=True))
+        values = (Given(math.nan, str(value)) for value in self.variant.values())
+        return dict(zip(found, map(SI, _units(found.values()), values), strict=True))
 
     @property
     def box(self) -> tuple[tuple[float, float], ...]:
@@ -502,20 +505,12 @@ def checked(
         marks=source.marks,
         files=_digests(named, path.parent),
         variant=values,
-        in_degrees=_in_degrees(source, written.data),
+        in_degrees=_DEGREES.search(written.data) is not None,
     )
     if impossible := [source.problem(*each) for each in bounds_hold_nothing_impossible(case)]:
         bare = [source.problem(*each) for each in bare_lengths_are_of_machines(document)]
         raise CaseError(tuple((bare or impossible)[:MOST_PROBLEMS]))
     return case
-
-
-def _in_degrees(source: Source, data: bytes) -> bool:
-    """True of a case that writes angles so: its point of expansion, or any other."""
-    expansion = source.tree.get("expansion")
-    q = expansion.get("q") if isinstance(expansion, Mapping) else None
-    bare = isinstance(q, tuple) and any(not isinstance(each, str) and each for each in q)
-    return not bare and _DEGREES.search(data) is not None
 
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:

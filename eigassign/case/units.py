@@ -157,7 +157,9 @@ class SI(str):
 
 def _unit_of(given: object) -> str:
     if isinstance(given, Given):
-        return _split(given.text, None)[1] if isinstance(given.text, str) else ""
+        text = str(given.text).strip()
+        match = NUMBER.match(text)
+        return text[match.end() :].strip() if match else ""
     return getattr(given, "answered", given if isinstance(given, str) else "")
 
 

@@ -143,4 +143,4 @@ def test_a_slip_that_shows_in_the_modes_is_asked_about(
 def test_a_run_tells_of_it_too(tmp_path: Path) -> None:
     case = written(tmp_path, shipped(("190 Hz", "19 kHz")))
     found = optimize(case, Options(out=tmp_path / "out", study="none")).results.warnings
-    assert any("mode 1 at 19000 Hz: the initial design has" in str(w) for w in found)
+    assert any("mode 1 at 19 kHz: the initial design has" in str(w) for w in found)

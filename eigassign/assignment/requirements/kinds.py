@@ -33,6 +33,7 @@ from eigassign.case.schema.targets import (
     HighestTarget,
     KeepOutTarget,
 )
+from eigassign.case.units import SI, handy_unit, written
 from eigassign.errors import UsageError
 
 
@@ -248,27 +249,28 @@ def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
     endless = np.array(np.inf)
     match target:
         case FrequencyTarget():
-            return f"at {_in_hz(target.frequency)}", hz[0], hz[0]
+            return f"at {_said(target.frequency)}", hz[0], hz[0]
         case AtLeastTarget():
-            return f"at least {_in_hz(target.at_least)}", hz[0], endless
+            return f"at least {_said(target.at_least)}", hz[0], endless
         case AtMostTarget():
-            return f"at most {_in_hz(target.at_most)}", -endless, hz[0]
+            return f"at most {_said(target.at_most)}", -endless, hz[0]
         case GapTarget():
-            return f"at least {target.gap.at_least:g} Hz apart", hz[0], endless
+            return f"at least {_said(target.gap.at_least)} apart", hz[0], endless
         case KeepOutTarget(keep_out=Harmonic() as band):
             times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
-            words = f"clear of {times}{_in_hz(band.of)} ± {100 * band.margin:g} %"
+            words = f"clear of {times}{_said(band.of)} ± {100 * band.margin:g} %"
             middle = band.harmonic * hz[0]
             return words, middle * (1.0 - band.margin), middle * (1.0 + band.margin)
-        case KeepOutTarget():
-            return "clear of {:g} … {:g} Hz".format(*target.keep_out), hz[0], hz[1]
+        case KeepOutTarget(keep_out=(float(low), float(high))):
+            unit, size = handy_unit(SI("Hz", low, high))
+            return f"clear of {low / size:g} … {high / size:g} {unit}", hz[0], hz[1]
         case HighestTarget():
             return "as high as can be", np.array(0.0), endless
     raise UsageError(f"{target.kind}: its words and edges stand in no case of `asked_of`")
 
 
-def _in_hz(curve: float | FrequencyProfile) -> str:
-    return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"
+def _said(curve: float | FrequencyProfile) -> str:
+    return written(curve, "Hz") if isinstance(curve, float) else "its profile"
 
 
 def terms_of(target: AnyTarget, modes: tuple[int, ...]) -> Terms:

@@ -300,8 +300,8 @@ class KeepOutTarget(SomeModes):
     @model_validator(mode="after")
     def _is_a_band(self) -> Self:
         if isinstance(self.keep_out, tuple) and self.keep_out[0] >= self.keep_out[1]:
-            low, high = self.keep_out
-            raise wrong(f"the band must go upwards, got [{low:g}, {high:g}] Hz", "keep_out")
+            both = ", ".join(written(edge, "Hz") for edge in self.keep_out)
+            raise wrong(f"the band must go upwards, got [{both}]", "keep_out")
         return self
 
 

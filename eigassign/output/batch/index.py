@@ -96,7 +96,7 @@ def _swept(rows: Sequence[CaseOutcome], keys: Sequence[str]) -> Iterator[Column]
             numbers, size = [pair and float(pair[0]) for pair in pairs], 1.0
         else:
             numbers = [None if value is None else quantity(value) for value in written]
-            unit = next((row.units[key] for row in rows if key in row.units), "")
+            unit = next((row.unit(key) for row in rows if key in row.units), "")
             unit, size = handy_unit(unit, *(n for n in numbers if n is not None))
         for digits in range(4, 18):
             cells = _rounded(numbers, size, digits)
@@ -118,7 +118,7 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
     counts = Counter(name for design in designs for name in design)
     own = [name for name, count in counts.items() if 2 * count >= sum(map(bool, designs))]
     for name in own:
-        unit = next((row.units[name] for row in rows if name in row.units), "")
+        unit = next((row.unit(name) for row in rows if name in row.units), "")
         yield _numbers(name, "number", [design.get(name) for design in designs], unit)
     yield ("design", "", "text"), [_told(row, own) for row in rows]
     drives = [dict(row.drives) for row in rows]
@@ -140,7 +140,7 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
 def _told(row: CaseOutcome, but: Sequence[str]) -> str:
     """The parameters of a design in words: ``m1 229 g, m2 0 kg``."""
     rest = ((name, amount) for name, amount in row.design if name not in but)
-    told = (f"{name} {handy(amount, row.units.get(name, ''))}" for name, amount in rest)
+    told = (f"{name} {handy(amount, row.unit(name))}" for name, amount in rest)
     return ", ".join(text.replace(" ", "\N{NO-BREAK SPACE}") for text in told)
 
 

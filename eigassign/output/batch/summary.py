@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from eigassign._version import __version__
 from eigassign.case.schema.document import typed
-from eigassign.case.units import QuantityError, read_quantity
+from eigassign.case.units import SI, QuantityError, handy_unit, read_quantity
 from eigassign.facts import Fact, Seconds, Share, capital, verdict_word
 from eigassign.files import name_of, printable
 from eigassign.output.documents import results_document
@@ -63,6 +63,13 @@ class CaseOutcome:
     units: Annotated[Mapping[str, str], Fact("SI, of values and design")] = field(
         default_factory=dict
     )
+    read_in: Annotated[Mapping[str, str], Fact("units of the case file, of some of these")] = field(
+        default_factory=dict
+    )
+
+    def unit(self, name: str) -> str:
+        """SI unit of a value or parameter, answered in that of the case file."""
+        return SI(self.units.get(name, ""), self.read_in.get(name, ""))
 
     @property
     def why(self) -> Annotated[str, Fact(heading="message")]:
@@ -149,11 +156,11 @@ def summary_json(rows: Sequence[CaseOutcome]) -> str:
 
 
 def summary_csv(rows: Sequence[CaseOutcome]) -> str:
-    """summary.csv: a column for every number, in the SI unit that its header names.
+    """summary.csv: a column for every number, in the unit of the case file, else SI.
 
     A key that has words beside numbers has a column of each.
     """
-    units = {name: unit for row in rows for name, unit in row.units.items()}
+    units = {name: handy_unit(row.unit(name)) for row in rows for name in row.units}
     values, ranges = ([*map(cells, rows)] for cells in (_values, _ranges))
     designs, drives = ([dict(getattr(row, of)) for row in rows] for of in ("design", "drives"))
     parts: list[tuple[str, Sequence[Mapping[str, Cell]]]] = [("", values)]
@@ -162,9 +169,12 @@ def summary_csv(rows: Sequence[CaseOutcome]) -> str:
     for prefix, every in parts:
         names = dict.fromkeys(name for row in every for name in row)
         for name in names:
-            bare, unit = name.removesuffix(" (text)"), units.get(name) if prefix[:1] != "f" else ""
+            bare, (unit, size) = name.removesuffix(" (text)"), units.get(name, ("", 1.0))
             head = prefix + (name if bare in names else bare)
-            columns[f"{head} [{unit}]" if unit else head] = [row.get(name) for row in every]
+            columns[f"{head} [{unit}]" if unit else head] = [
+                value / size if isinstance(value, float) else value
+                for value in (row.get(name) for row in every)
+            ]
         if not prefix:
             columns |= {name: [getattr(row, name) for row in rows] for name in _AHEAD}
     columns |= {name: [getattr(row, name) for row in rows] for name in _LAST}
