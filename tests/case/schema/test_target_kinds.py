@@ -87,7 +87,7 @@ def test_the_first_harmonic_is_called_by_its_frequency() -> None:
 def test_requirements_are_called_by_what_they_ask_for() -> None:
     assert [each.label for each in asked(*KINDS.values())] == [
         "mode 1 at 0.19 kHz",
-        "mode 3 at 190 Hz",
+        "mode 3 at 0.19 kHz",
         "mode 2 at least 320 Hz from 0.2 to 0.5 s",
         "mode 1 at least 20 Hz",
         "mode 2 at most its profile",
