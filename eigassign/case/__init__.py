@@ -23,6 +23,6 @@ __all__, __getattr__, __dir__ = face(
         "schema.parts": "Quantity",
         "schema.study": "Measurement MeasurementFile",
         "schema.trajectory": "FileTrajectory PointTrajectory SampledTrajectory TipTrajectory",
-        "units": "DIMENSIONS QuantityError read_quantity",
+        "units": "DIMENSIONS SI Dimension Given QuantityError handy_unit read_quantity",
     },
 )

@@ -1,10 +1,19 @@
 """Quantities: what each unit is worth, and what is refused."""
 
 import math
+import random
 
 import pytest
 
-from eigassign.case import DIMENSIONS, QuantityError, read_quantity
+from eigassign.case import (
+    DIMENSIONS,
+    SI,
+    Dimension,
+    Given,
+    QuantityError,
+    handy_unit,
+    read_quantity,
+)
 
 
 @pytest.mark.parametrize(
@@ -157,3 +166,25 @@ def test_every_prefix_is_worth_what_its_letter_says(unit: str, prefixes: str) ->
         assert read_quantity(f"1 {prefix}{unit}", None) == float(f"1e{si}")
         with pytest.raises(QuantityError):
             read_quantity(f"1 {prefix}{unit}", DIMENSIONS["area"])
+
+
+SYMBOLS = (("g", "kg", "t"), ("um", "mm", "cm", "in", "km"), ("ms", "min", "h"), ("deg", "mrad"))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("dimension", DIMENSIONS.values(), ids=DIMENSIONS)
+def test_an_amount_in_any_unit_is_answered_in_it_and_reads_back(
+    dimension: Dimension, seed: int
+) -> None:
+    draw, value = random.Random(seed), 2.34
+    exponents = zip((*SYMBOLS, ("Hz", "rpm", "kHz")), dimension.exponents, strict=True)
+    powers = [(draw.choice(symbols), n) for symbols, n in exponents if n]
+    if dimension.exponents[4]:  # Hz has its own 1/s
+        powers = [(symbol, n) for symbol, n in powers if symbol not in SYMBOLS[2]]
+    unit = " ".join(f"{symbol}^{n}" for symbol, n in powers) or "%"
+    si = read_quantity(f"{value} {unit}", dimension)
+    name, size = handy_unit(SI(dimension.si, Given(si, f"{value} {unit}")), si)
+    assert name == unit
+    assert si / size == pytest.approx(value, rel=1e-14)
+    assert read_quantity(f"{si / size!r} {name}", dimension) == pytest.approx(si, rel=1e-14)
+    assert handy_unit(SI(dimension.si, Given(si, si)), si)[0] == handy_unit(dimension.si, si)[0]

@@ -6,6 +6,7 @@ import math
 import pytest
 from small_case import TEXT, edited, unmarked
 
+from eigassign import CaseError
 from eigassign.case import parse
 
 
@@ -135,3 +136,17 @@ def test_any_large_slip_of_the_exponent_of_a_round_bar_is_seen_at_any_size(
 def test_a_link_of_the_misprinted_section_is_seen_to_be_deeper_than_long() -> None:
     found = warnings_of(edited("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4"))
     assert any("at most 0.2 times the depth of section 'bar'" in message for *_, message in found)
+
+
+def test_a_missing_unit_is_blamed_before_the_bound_that_it_breaks() -> None:
+    text = edited("outer_diameter: 40 mm, thickness: 2 mm", "outer_diameter: 40, thickness: 3")
+    text = text.replace("sections.rod.diameter, min: 20", "sections.pipe.outer_diameter, min: 5")
+    with pytest.raises(CaseError) as caught:
+        parse(text.encode(), "case.yaml")
+    assert [(p.path, p.message) for p in caught.value.problems] == [
+        (
+            f"mechanism.sections.pipe.{key}",
+            f"{key} {value} is {value} m without a unit; did you mean {value} mm?",
+        )
+        for key, value in (("outer_diameter", 40), ("thickness", 3))
+    ]
