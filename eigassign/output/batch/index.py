@@ -124,7 +124,7 @@ def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
     drives = [dict(row.drives) for row in rows]
     for name in dict.fromkeys(name for each in drives for name in each):
         peaks = [each.get(name) for each in drives]
-        unit = next(row.units[name] for row in rows if name in row.units)
+        unit = next(row.unit(name) for row in rows if name in row.units)
         known = [peak for peak in peaks if peak is not None]
         if max(known) - min(known) > SAME * max(known):  # what is swept changes it
             yield _numbers(name, "number", peaks, unit)
