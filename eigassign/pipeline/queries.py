@@ -13,11 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
-from eigassign.assignment.requirements.sampling import (
-    design_limits,
-    requirements_of,
-    with_instants,
-)
+from eigassign.assignment.requirements.sampling import design_limits, requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, handy, is_bare, shown_point
@@ -33,13 +29,7 @@ from eigassign.output.reports import page as report
 from eigassign.pipeline.stages import new_run_folder
 from eigassign.study import pictures as drawing
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.checks import (
-    GIVEN,
-    judged_mesh,
-    mesh_lines,
-    study_weight,
-    truncation_lines,
-)
+from eigassign.study.checks import GIVEN, judged_mesh, mesh_lines, study_weight, truncation_lines
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off
 from eigassign.study.meaning import levers

@@ -16,13 +16,7 @@ from scipy.linalg import hadamard
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import shown_point
-from eigassign.errors import (
-    CaseError,
-    EigassignError,
-    MechanismError,
-    TrajectoryError,
-    UsageError,
-)
+from eigassign.errors import CaseError, EigassignError, MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories

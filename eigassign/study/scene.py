@@ -56,11 +56,7 @@ from eigassign.study.planning import (
     scattered,
     unseen,
 )
-from eigassign.study.results import (
-    Comparison,
-    ModeStudy,
-    ValidationRow,
-)
+from eigassign.study.results import Comparison, ModeStudy, ValidationRow
 
 Floats = NDArray[np.float64]
 OTHERS = 3  # modes shown above the highest assigned one

@@ -34,10 +34,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.program import Floats, LinearConstraint, frozen
 from eigassign.brief import Brief
-from eigassign.case.schema.targets import (
-    AnyTarget,
-    FollowedMode,
-)
+from eigassign.case.schema.targets import AnyTarget, FollowedMode
 from eigassign.errors import UsageError
 from eigassign.facts import Fact, Unwritten, told
 

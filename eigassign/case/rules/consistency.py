@@ -26,12 +26,7 @@ from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.mechanism import Mechanism, RevoluteJoint
 from eigassign.case.schema.study import Highest, HighestMode
-from eigassign.case.schema.targets import (
-    FrequencyTarget,
-    GapTarget,
-    KeepOutTarget,
-    SagTarget,
-)
+from eigassign.case.schema.targets import FrequencyTarget, GapTarget, KeepOutTarget, SagTarget
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
     TipTrajectory,

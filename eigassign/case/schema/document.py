@@ -13,14 +13,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import (
-    COMMA,
-    Finding,
-    Tree,
-    shown,
-    suggestion,
-    unspaced,
-)
+from eigassign.case.reader import COMMA, Finding, Tree, shown, suggestion, unspaced
 from eigassign.case.schema.design import RESERVED, Design, is_entry
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import TAG, FrozenDict, Named, Part, must

@@ -9,14 +9,7 @@ import numpy as np
 from eigassign.facts import capital, percent
 from eigassign.output.figures import curves, graph, mechanism
 from eigassign.output.figures.curves import OPTIMAL, TARGET, suffix
-from eigassign.output.figures.graph import (
-    Curve,
-    FigurePlan,
-    Graph,
-    Look,
-    Panel,
-    Shade,
-)
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Shade
 from eigassign.study.results import (
     WEIGHED,
     Comparison,

@@ -12,15 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.output.figures import graph, mechanism, scene
-from eigassign.output.figures.graph import (
-    Curve,
-    Graph,
-    Look,
-    Panel,
-    Rule,
-    Shade,
-    short,
-)
+from eigassign.output.figures.graph import Curve, Graph, Look, Panel, Rule, Shade, short
 from eigassign.output.figures.scene import Part, Shape
 from eigassign.study.results import Motion
 

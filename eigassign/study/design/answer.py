@@ -16,12 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
-from eigassign.assignment.one_shot import (
-    Assignment,
-    LinearModel,
-    hz_from_lam,
-    solve_assignment,
-)
+from eigassign.assignment.one_shot import Assignment, LinearModel, hz_from_lam, solve_assignment
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.brief import counted
 from eigassign.case.case_file import CaseFile

@@ -22,12 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_point import first_order
-from eigassign.assignment.exact.design_problem import (
-    MET,
-    ON,
-    Appraisal,
-    DesignProblem,
-)
+from eigassign.assignment.exact.design_problem import MET, ON, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import NOTHING, End, minimise
 from eigassign.assignment.program import can_be_kept, smallest

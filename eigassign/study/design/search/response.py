@@ -39,12 +39,7 @@ from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.study.design.followed import (
-    Follower,
-    follow_all,
-    followers,
-    with_followed,
-)
+from eigassign.study.design.followed import Follower, follow_all, followers, with_followed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
