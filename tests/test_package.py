@@ -46,7 +46,7 @@ def test_what_people_look_at_is_shown_in_a_few_lines(case: ea.Case, result: Resu
         *case.trajectories,
         expansion,
     ]
-    shown += [expansion.inverse, expansion.space, ea.reduce(model, q[0], y), model.shapes(q[0], y)]
+    shown += [expansion.space, ea.reduce(model, q[0], y), model.shapes(q[0], y)]
     shown += [result, result.results, result.assignment]
     shown += [*result.results.targets, *result.results.studies, result.results.poses]
     assert [each for each in shown if len(repr(each)) > LONGEST or "\n" in repr(each)] == []

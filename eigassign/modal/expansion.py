@@ -36,7 +36,7 @@ from eigassign.modal.taylor.recursion import (
     vector_set,
 )
 from eigassign.process import one_thread
-from eigassign.series.algebra import Polynomials, monomials, polynomials, reciprocal
+from eigassign.series.algebra import Polynomials, monomials, polynomials
 from eigassign.series.multi_index import LowerSet
 
 Floats = NDArray[np.float64]
@@ -60,9 +60,8 @@ class Expansion:
 
     ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s², with ∂λ/∂x
     ``slopes(q, y)``, at y0 the l_0 and l of eq. (9); ``indices`` γ (N, n_q + n_y),
-    ``coefficients`` λ_γ (n_modes, N); ``last_degree_share(q, y)`` is a guide to the error;
-    ``inverse`` the same with the series of 1/λ. Neighbouring modes are expanded together, as the
-    matrices of ``clusters``.
+    ``coefficients`` λ_γ (n_modes, N); ``last_degree_share(q, y)`` is a guide to the error.
+    Neighbouring modes are expanded together, as the matrices of ``clusters``.
     """
 
     modes: tuple[int, ...]
@@ -74,13 +73,11 @@ class Expansion:
     n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
     vector_space: LowerSet
     notes: tuple[str, ...]
-    inverted: bool = False  # the coefficients are those of 1/λ
 
     def __repr__(self) -> str:
         at = ", ".join(f"{value:.6g}" for value in self.x0)
-        of = "1/λ" if self.inverted else "λ"
         return cut(
-            f"<Expansion of {of} of {of_modes(self.modes)}: order {self.order}, {len(self.space)} "
+            f"<Expansion of λ of {of_modes(self.modes)}: order {self.order}, {len(self.space)} "
             f"coefficients in {counted(self.space.n_variables, 'variable')}, about (q, y) = ({at})>"
         )
 
@@ -88,14 +85,12 @@ class Expansion:
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
         w = self.local(q, y)
-        values = np.hstack(
+        return np.hstack(
             [
                 _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
                 for c, made in zip(self.clusters, self._prepared, strict=True)
             ]
         )
-        with np.errstate(divide="ignore"):
-            return 1.0 / values if self.inverted else values
 
     def local(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """The local variables w (n_samples, n_w)."""
@@ -125,34 +120,13 @@ class Expansion:
             term = np.tensordot(powers, c.coefficients[:, :, last], axes=(1, 2))
             count = len(set(c.modes) & set(self.modes))
             sizes.append(np.repeat(np.linalg.norm(term, axis=(1, 2))[:, None], count, axis=1))
-        lam = self.eigenvalues(q, y)
-        return np.hstack(sizes) / (2.0 * np.abs(1.0 / lam if self.inverted else lam))
-
-    @cached_property
-    def inverse(self) -> Expansion:
-        """The series of 1/λ; UsageError for clusters: their eigenvalues have no series each.
-
-        Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is
-        linear in m, while λ's own series ends at m = −b. The reciprocal of a truncated series is
-        exact order by order.
-        """
-        together = [c.modes for c in self.clusters if len(c.modes) > 1]
-        if together:
-            raise UsageError(
-                f"modes {together[0]} are expanded as a cluster: 1/λ has no series each"
-            )
-        turned = tuple(
-            replace(c, coefficients=_frozen(reciprocal(self.space, c.coefficients[0]))[None])
-            for c in self.clusters
-        )
-        return replace(self, clusters=turned, inverted=not self.inverted)
+        return np.hstack(sizes) / (2.0 * np.abs(self.eigenvalues(q, y)))
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) over units of x."""
         lam, powers = self.eigenvalues(q, y), monomials(self.space, self.local(q, y))
         parts = [_slopes(c, self.space, powers, self.modes) for c in self.clusters]
-        slopes = np.concatenate(parts, axis=1) @ self.directions
-        return lam, -np.square(lam)[..., None] * slopes if self.inverted else slopes
+        return lam, np.concatenate(parts, axis=1) @ self.directions
 
     @property
     def x0(self) -> Floats:
