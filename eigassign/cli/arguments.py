@@ -72,7 +72,6 @@ def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tu
 
 
 PATH = click.Path(path_type=Path)
-POSITIVE = Number(0.0, min_open=True)
 COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)

@@ -163,7 +163,7 @@ def headline(results: RunResults) -> str | None:
     named = None if violation is None else violation.exact_limit
     if row is not None and named is not None and named in row.reason:
         violation = None
-    if violation is not None and (violation.initial or violation.exact or not goals):
+    if violation is not None and (violation.initial or violation.exact):
         exactly = "" if goals else ", solved exactly"
         said.append(f"Worst violation of a limit: {violation.words}{exactly}.")
     near = sorted((one.room, one.closest) for one in results.targets if one.room is not None)

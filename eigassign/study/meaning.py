@@ -141,10 +141,24 @@ def _words(scene: Scene, wanted: Requirement, k: int, reached: float | None, how
     curve = wanted.curve_name if len(wanted.terms) == 1 else f"the {wanted.axis}"
     where = f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}"
     said = f"{where}: {asked:.4g} Hz was asked, "
+    if clash := ", ".join(_contradicting(scene, wanted, k)):
+        said += f"which {clash} contradicts, "
     if reached is None:
         return f"{said}{curve} is {how}"
     most = "highest" if reached < asked else "lowest"
     return f"{said}the {most} that {curve} reaches there is {reached:.4g} Hz ({how})"
+
+
+def _contradicting(scene: Scene, wanted: Requirement, k: int) -> Iterator[str]:
+    """The limits and bands of the same mode that its frequency wanted at sample k would miss."""
+    at, hz = wanted.rows.start + k, wanted.hz[k]
+    for one in scene.wanted if wanted.is_goal else ():
+        same = wanted.mode in one.modes or not one.modes if one.bands else one.terms == wanted.terms
+        if same and not one.is_goal and _holds(one, at):
+            own = at - one.rows.start
+            beyond = max(one.lower[own] - hz, hz - one.upper[own])
+            if beyond < 0.0 if one.bands else beyond > 0.0:
+                yield one.label
 
 
 def _searched(
@@ -155,8 +169,9 @@ def _searched(
     errors: Floats,
     allowed: float,
 ) -> Iterator[str]:
-    """The first of the samples missed most, above and below, at which no design is near enough."""
+    """The sample missed most of those above and below, at which no design is near enough."""
     missed = [int(errors.argmax()), *([int(errors.argmin())] if wanted.is_goal else [])]
+    missed.sort(key=lambda k: -abs(errors[k]))
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
         nearest = _nearest(scene, wanted, others, k, y, allowed)
         if nearest is not None and abs(nearest / wanted.hz[k] - 1.0) > allowed:

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from commands import ARM
 from wrong_inputs import GOOD
 
 from eigassign.batch import cases_in, folder_names
@@ -13,6 +14,9 @@ from eigassign.cli import main
 
 STRICT = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
+SWEEP = """
+sweep: {parameters: {trajectory.duration: [0.6 s, 2 s], coordinates.q2.drive.stiffness: [6e3, 8e3]}}
+"""
 INFEASIBLE = GOOD.replace("max: 1}", BOUND)
 
 
@@ -69,46 +73,15 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "2", "1")
 
 
-ARM = """
-title: Two-link arm
-mechanism:
-  space: planar
-  materials: {al: {youngs_modulus: 70 GPa, density: 2700}}
-  sections:
-    upper_tube: {shape: tube, outer_diameter: 40 mm, thickness: 3 mm}
-    fore_tube: {shape: tube, outer_diameter: 30 mm, thickness: 2 mm}
-  links:
-    upper_arm: {length: 600 mm, material: al, section: upper_tube, elements: 2}
-    forearm: {length: 450 mm, material: al, section: fore_tube, elements: 2}
-  joints:
-    shoulder: {type: revolute, base: ground, follower: upper_arm.start}
-    elbow: {type: revolute, base: upper_arm.end, follower: forearm.start}
-  bodies:
-    elbow_motor: {at: upper_arm.end, mass: 1.5 kg, inertia: 0.002 kg m2}
-    payload: {at: forearm.end, mass: 1 kg}
-coordinates:
-  q1: {joint: shoulder, drive: {stiffness: 20 kN m/rad}}
-  q2: {joint: elbow, drive: {stiffness: 8 kN m/rad}}
-trajectory: {points: [[-10 deg, 60 deg], [20 deg, 90 deg]], duration: 1 s, samples: 11}
-design:
-  diameter: {parameter: sections.upper_tube.outer_diameter, min: 35 mm, max: 50 mm}
-  elbow_gear: {parameter: coordinates.q2.drive.stiffness, min: 5 kN m/rad, max: 15 kN m/rad}
-targets:
-  - {mode: 1, frequency: 15 Hz}
-  - {modes: all, keep_out: [24 Hz, 26 Hz]}
-sweep: {parameters: {trajectory.duration: [0.6 s, 2 s], coordinates.q2.drive.stiffness: [6e3, 8e3]}}
-"""
-
-
 def test_a_sweep_of_speed_has_columns_of_torque_and_one_of_what_is_designed_is_warned_of(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    write("arm.yaml", ARM)
+    write("arm.yaml", ARM + SWEEP)
     main(["batch", "arm.yaml", "--jobs", "1", "--reports", "none", "--out", "out"])
     err = capsys.readouterr().err
     key = "sweep.parameters.coordinates.q2.drive.stiffness: this is where the design parameter"
     assert f"warning: {key} elbow_gear begins" in err
-    assert re.search(r"^arm.yaml:28:\d+: warning", err, re.MULTILINE)
+    assert re.search(r"^arm.yaml:29:\d+: warning", err, re.MULTILINE)
     assert "trajectory.duration: this" not in err
     rows = [*summary("out").values()]
     torque = [float(row["drives/peak torque of q2 [N m]"]) for row in rows]
