@@ -157,9 +157,8 @@ class SI(str):
 
 def _unit_of(given: object) -> str:
     if isinstance(given, Given):
-        text = str(given.text).strip()
-        match = NUMBER.match(text)
-        return text[match.end() :].strip() if match else ""
+        text = " ".join(str(given.text).split())
+        return text[match.end() :].lstrip() if (match := NUMBER.match(text)) else ""
     return getattr(given, "answered", given if isinstance(given, str) else "")
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import is_bare
+from eigassign.case.units import handy, is_bare
 from eigassign.facts import (
     OF_ROW,
     Fact,
@@ -244,7 +244,7 @@ def _required(results: RunResults) -> Table:
             rows.append((target.label, *said, _room(target)))
     for row in () if results.assignment is None else results.assignment.limits:
         amounts = {"initial": row.initial, "exact": row.optimal}
-        cells = (row.said(amounts[k]) if k in amounts else "" for k in kinds)
+        cells = (handy(amounts[k], row.unit, 4) if k in amounts else "" for k in kinds)
         rows.append((row.words, *cells, _room(row)))
     caption = "Violations, and the room that is left, relative to the limit."
     return Table("Limits and bands", ("limit", *kinds, "room"), tuple(rows), caption)

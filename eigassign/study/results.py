@@ -37,6 +37,8 @@ from eigassign.facts import (
     Unwritten,
     Violation,
     about,
+    fact,
+    hints,
     number,
     percent,
     positive_percent,
@@ -163,8 +165,21 @@ class ValidationRow:
 _READ_IN = Fact("unit, and its size in SI", "unit", digits=itemgetter(0), name="read_in")
 
 
+class InOneUnit:
+    """Base of rows with amounts in their ``unit``, SI."""
+
+    unit: str
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], _READ_IN]:
+        """The unit that people read them in, and the size of that in SI."""
+        kind: Any = type(self)
+        amounts = (getattr(self, k) for k in hints(kind) if fact(kind, k).unit == OF_ROW)
+        return handy_unit(self.unit, *(each for each in amounts if isinstance(each, float)))
+
+
 @dataclass(frozen=True)
-class DesignRow:
+class DesignRow(InOneUnit):
     """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
 
     name: Key
@@ -178,11 +193,6 @@ class DesignRow:
     price: Annotated[float | None, Fact("of one SI unit")] = None
     choice_price: Annotated[float | None, Fact("of the choice, by its first property")] = None
     lies_on: Unwritten[str] = ""  # which of its bounds
-
-    @property
-    def handy(self) -> Annotated[tuple[str, float], _READ_IN]:
-        """The unit that people read it in, and the size of that in SI."""
-        return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 
     def place(self, value: float) -> float:
         """Where a value is between its bounds, in % of the way from lower to upper."""
@@ -235,7 +245,7 @@ class DriveLoad:
 
 
 @dataclass(frozen=True, repr=False)
-class StaticRow(Brief):
+class StaticRow(InOneUnit, Brief):
     """A stiffness, compliance or sag that a target limits, before and after; (n_t,) curves.
 
     Where the target does not hold, and where nothing gives way, a curve has no number.
@@ -246,11 +256,6 @@ class StaticRow(Brief):
     limit: Annotated[InUnit | None, Fact("of the magnitude")]
     initial_curve: Annotated[Floats, Fact("before", unit=OF_ROW, may_lack=True)]
     optimal_curve: Annotated[Floats, Fact("with the answer", unit=OF_ROW, may_lack=True)]
-
-    @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
-        """The unit that people read it in, and the size of that in SI."""
-        return handy_unit(self.unit, self.limit or 0.0)
 
     @property
     def quantity(self) -> str:
@@ -271,7 +276,7 @@ class DriveRow(StaticRow):
     optimal: DriveLoad
 
     @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+    def handy(self) -> Annotated[tuple[str, float], _READ_IN]:
         """The unit that people read it in, and the size of that in SI."""
         return handy_unit(self.unit, self.initial.peak, self.optimal.peak)
 
@@ -492,12 +497,6 @@ class LimitRow:
         ways = (sign * (self.optimal - edge) / abs(edge) for sign, edge in sides if edge)
         return min(ways, default=None)
 
-    def said(self, amount: float) -> str:
-        """An amount with the unit that the limit is said in: masses are in kg."""
-        edges = [edge for edge in (self.lower, self.upper) if edge is not None]
-        unit, size = handy_unit(self.unit, *edges)
-        return f"{number(amount / size)} {unit}".rstrip()
-
 
 @dataclass(frozen=True)
 class ViolationRow:
@@ -596,7 +595,7 @@ class AimRow:
 
 
 @dataclass(frozen=True)
-class RobustTarget:
+class RobustTarget(InOneUnit):
     """What the deviations do to one thing that is asked: errors, or relative violations.
 
     ``nominal`` and ``robust`` are what is asked for, in ``unit``, at the sample that is worst, of
@@ -614,11 +613,6 @@ class RobustTarget:
     ]
     worst: Annotated[Share, Fact("found by a search", "deviated", digits=positive_percent)]
     drawn: Annotated[Share, Fact("of random deviations", "at random")]
-
-    @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
-        """The unit that people read both in, and the size of that in SI."""
-        return handy_unit(self.unit, self.nominal, self.robust)
 
     @property
     def most(self) -> float:

@@ -171,11 +171,7 @@ def distinct(text: str) -> AfterValidator:
 
 
 class Written(Given):
-    """A number in SI whose dimension another key decides.
-
-    It is NaN where it cannot be read, or is beyond a limit. Rules say what is wrong
-    with it.
-    """
+    """One whose dimension another key decides; NaN where it cannot be read: rules say why."""
 
     __slots__ = ()
 

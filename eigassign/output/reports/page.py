@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.units import handy
 from eigassign.facts import about, capital, number, percent, positive_percent
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
@@ -174,7 +175,7 @@ def _finding(target: TargetStudy, accepted: float, thin: bool) -> Finding:
 
 def _kept(limit: LimitRow) -> Finding:
     """A limit of a quantity that a design breaks, or of statics, with its amounts."""
-    before, after = limit.said(limit.initial), limit.said(limit.optimal)
+    before, after = (handy(each, limit.unit, 4) for each in (limit.initial, limit.optimal))
     tone = "good" if limit.satisfied else "bad"
     return Finding(capital(limit.words), before, f"is {after}", tone)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import Annotated
 
 import numpy as np
@@ -24,14 +23,14 @@ from eigassign.assignment.exact.identification import (
 )
 from eigassign.assignment.exact.sequential import PAYS, unseen
 from eigassign.case.case_file import CaseFile
-from eigassign.case.units import handy, handy_unit
+from eigassign.case.units import handy
 from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds
 from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
 from eigassign.study.design.search.response import spread_designs
-from eigassign.study.results import CaseRow, Origin
+from eigassign.study.results import CaseRow, InOneUnit, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
@@ -49,7 +48,7 @@ Outlier = Annotated[
 
 
 @dataclass(frozen=True)
-class UpdatedParameter:
+class UpdatedParameter(InOneUnit):
     """One parameter before and after, in SI units; its interval holds it with 95 %."""
 
     name: Key
@@ -65,11 +64,6 @@ class UpdatedParameter:
     lower: InUnit
     upper: InUnit
     held: Annotated[str, Fact("the bound that holds it, lower or upper; or empty")]
-
-    @property
-    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
-        """The unit that people read it in, and the size of that in SI."""
-        return handy_unit(self.unit, self.lower, self.upper, self.value, self.initial)
 
     @property
     def remark(self) -> str:
@@ -296,9 +290,7 @@ def collect_update(
         ),
         unidentified=directions,
         minima=tuple(
-            ExplainingMinimum(
-                values, ", ".join(map(": ".join, _amounts(problem, values).items())), one.objective
-            )
+            ExplainingMinimum(values, _listed(problem, values), one.objective)
             for one in found.minima
             for values in [dict(zip(problem.model.y_names, one.y.tolist(), strict=True))]
         ),
@@ -351,20 +343,20 @@ def _direction(change: Floats, y: Floats, problem: UpdateProblem) -> Unidentifie
     taking = [int(k) for k in np.flatnonzero(share > 1e-2 * share.max())]
     names = problem.model.y_names
     by_name = {names[k]: float(change[k]) for k in taking}
-    units, amounts = {problem.case.file.design_units[k] for k in taking}, _amounts(problem, by_name)
+    units, amounts = {problem.case.file.design_units[k] for k in taking}, _listed(problem, by_name)
     relative = change[taking] / y[taking] if np.all(y[taking] != 0.0) else None
     words = _in_words(amounts, by_name, relative, len(units) == 1)
-    return UnidentifiedDirection(by_name, ", ".join(map(": ".join, amounts.items())), words)
+    return UnidentifiedDirection(by_name, amounts, words)
 
 
-def _amounts(problem: UpdateProblem, values: Mapping[str, float]) -> dict[str, str]:
-    """SI values of parameters by their names, as people read them."""
+def _listed(problem: UpdateProblem, values: Mapping[str, float]) -> str:
+    """``a: 0.2287 m, b: 2 kg`` of SI values by the names of parameters."""
     units = dict(zip(problem.model.y_names, problem.case.file.design_units, strict=True))
-    return {name: handy(value, units[name], 4) for name, value in values.items()}
+    return ", ".join(f"{name}: {handy(value, units[name], 4)}" for name, value in values.items())
 
 
 def _in_words(
-    amounts: Mapping[str, str], change: Mapping[str, float], relative: Floats | None, one_unit: bool
+    amounts: str, change: Mapping[str, float], relative: Floats | None, one_unit: bool
 ) -> str:
     """ "E can change unnoticed"; "m1 and m2 only as m1 + 0.5 m2"; or how they change, in per cent.
 
@@ -383,9 +375,8 @@ def _in_words(
         size = f"{abs(factor):.3g} " if abs(abs(factor) - 1.0) > 5e-4 else ""
         return f"{a} and {b} are determined only together, as {a} {sign} {size}{b}"
     if relative is None:
-        sizes = [*amounts.values()]
-    else:
-        sizes = [f"{v:.3g} %" for v in 10.0 * relative / np.abs(relative).max()]
+        return f"{together}: {amounts}"
+    sizes = [f"{v:.3g} %" for v in 10.0 * relative / np.abs(relative).max()]
     each = (f"{name} by {s.replace('-', '−')}" for name, s in zip(change, sizes, strict=True))
     return f"{together}: {', '.join(each)}"
 
