@@ -309,11 +309,6 @@ class TipChain:
         return self.joints if self.tables is None else tuple(self.tables.case.coordinates)
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """rad or m of each coordinate."""
-        return tuple("m" if kind == "slide" else "rad" for kind in self.kinds[: self.n_q])
-
-    @property
     def y_names(self) -> tuple[str, ...]:
         """The names of the design parameters (n_y,)."""
         return () if self.tables is None else self.tables.parameters.design

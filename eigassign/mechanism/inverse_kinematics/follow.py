@@ -54,19 +54,23 @@ from eigassign.mechanism.inverse_kinematics.solver import (
 from eigassign.mechanism.kinematics.loop_closure import as_assembly, wrapped, written
 
 
+def _words(ik: TipProblem, u: Floats) -> list[str]:
+    """The coordinates of a state (n_z,), angles within half a turn of 0."""
+    q, kinds = ik.coordinates(u[None])[0], ik.chain.kinds
+    turned = np.where(ik.chain.of_kind("turn")[: ik.n_q], wrapped(q), q)
+    return [written(x, "m" if k == "slide" else "rad") for x, k in zip(turned, kinds, strict=False)]
+
+
 def pose(ik: TipProblem, u: Floats) -> str:
     """The coordinates of a state in words."""
-    q, turning = ik.coordinates(u[None])[0], ik.chain.of_kind("turn")[: ik.n_q]
-    named = zip(ik.chain.names, np.where(turning, wrapped(q), q), ik.chain.units, strict=True)
-    return ", ".join(f"{name} = {written(value, unit)}" for name, value, unit in named)
+    return ", ".join(f"{n} = {x}" for n, x in zip(ik.chain.names, _words(ik, u), strict=True))
 
 
 def _assembly(ik: TipProblem, u: Floats) -> str:
     """The key `assembly` that puts the loops together as they are in a state."""
-    q, p = np.split(u * ik.scale, [ik.n_q])
-    tables = ik.chain.tables
-    key = tables and as_assembly(tables.case, tables.motion.tree, q, p)
-    return f"mechanism.assembly: {key or pose(ik, u)}"
+    tables, (q, p) = ik.chain.tables, np.split(u * ik.scale, [ik.n_q])
+    key = as_assembly(tables.case, tables.motion.tree, q, p) if tables else pose(ik, u)
+    return f"mechanism.assembly: {key}"
 
 
 def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
@@ -145,9 +149,9 @@ def follow(
 
     ``branch`` keeps the relative angle of a joint in [low, high] modulo 2π (rad), or its place (m).
     The first sample is the solution nearest to ``start`` (angles modulo 2π, and within π of it);
-    without one, nearest to where the loops were put together, else bent least, with angles in
-    [0, 2π). The tip is on its path to RESIDUAL times L in m (see `solver`), and RESIDUAL in rad;
-    loops stay in the assembly of the model.
+    without one, nearest to where the loops were put together, else bent least, the path on the turn
+    nearest to its branch, else to 0. The tip is on its path to RESIDUAL times L in m (see
+    `solver`), and RESIDUAL in rad; loops stay in the assembly of the model.
 
     Raises TrajectoryError naming the first sample that is out of reach, outside the branch, or
     behind a stretched, folded or dead configuration; MechanismError if branch or start make no
@@ -179,45 +183,29 @@ def follow(
         )
         raise TrajectoryError(WAYPOINTS, message, 0)
     furthest = max(failures, key=lambda failure: failure.sample)
-    _require_waypoints(ik, course, furthest.sample)
+    if furthest.sample and ".branch." not in furthest.path:
+        knots, (before, there) = course.path.knots, course.s[[furthest.sample - 1, furthest.sample]]
+        first, last = np.searchsorted(knots, before, side="right"), np.searchsorted(knots, there)
+        for s in knots[first : last + 1]:
+            try:  # 1e-6: loops come no nearer to a dead point, see `_blocked`
+                first_solutions(ik, course._replace(s=s[None]), 1e-6)
+            except TrajectoryError as error:
+                raise TrajectoryError(error.path, error.message, furthest.sample) from None
     raise furthest
 
 
 def _turns(ik: TipProblem, u: Floats) -> Floats:
-    """The whole turns (n_z,) in rad between the middle of a path (n, n_z) and what is nearest to it
-    in the branch, or to 0; none where there is a start.
+    """The whole turns (n_z,) in rad that bring the middle of a path (n, n_z) nearest to its branch,
+    else the joint coordinates to 0; none where there is a start.
     """
-    turns, (matrix, offset) = np.zeros(u.shape[1]), ik.chain.relative_map
-    if ik.start is not None:
-        return turns
-    q, rows = ik.coordinates(u), list(ik.rows)
-    turning, middle = ik.chain.of_kind("turn")[: ik.n_q], 0.5 * (q.min(axis=0) + q.max(axis=0))
-
-    def whole(angle: Floats) -> Floats:  # half a turn, but for round-off, stays
-        return np.asarray(2.0 * np.pi * np.ceil((angle - np.pi - 1e-9) / (2.0 * np.pi)))
-
-    back = np.where(turning, whole(middle), 0.0)
-    wanted = np.zeros(ik.n_q)
-    own = (matrix @ (middle - back) + offset)[rows] - (ik.low + 0.5 * ik.width)
-    wanted[rows] = np.where(turning[rows], whole(own), 0.0)
-    turns[: ik.n_q] = back + np.linalg.solve(matrix, wanted)
+    turns, q = np.zeros(u.shape[1]), ik.joint_coordinates(u)
+    if ik.start is None:
+        off = 0.5 * (q.min(axis=0) + q.max(axis=0))
+        off[list(ik.rows)] -= ik.low + 0.5 * ik.width
+        whole = np.ceil(off / (2.0 * np.pi) - 0.5 - 1e-9)  # half a turn, but for round-off, stays
+        whole *= ik.chain.of_kind("turn")[: ik.n_q]
+        turns[: ik.n_q] = 2.0 * np.pi * np.linalg.solve(ik.chain.relative_map[0], whole).round()
     return turns
-
-
-def _require_waypoints(ik: TipProblem, course: Course, sample: int) -> None:
-    """Raises TrajectoryError for the first waypoint out of reach, about what stops a ``sample``."""
-    there = course._replace(s=course.path.knots)
-    # loops come no nearer to a dead point, see `_blocked`
-    tolerance = (RESIDUAL if ik.chain.assembly is None else 1e-6) * ik.lever
-    for i, s in enumerate(there.s):
-        u = ik.seeds
-        for iterations in (28, 100):  # as at the first sample
-            u, miss = levenberg(ik, u, course.target(s[None]), iterations)
-            if miss.min() <= tolerance:
-                break
-        else:
-            error = out_of_reach(ik, there, i, u[np.argmin(miss)])
-            raise TrajectoryError(error.path, error.message, sample)
 
 
 def at_parameters(followed: Followed, course: Course) -> Floats:
@@ -323,12 +311,9 @@ def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
     if ik.chain.assembly is not None:
         said = "the solution nearest to mechanism.assembly is taken at the first sample"
         return (f"{said}: name a branch or a start for another",)
-    ways = [_branch(ik, candidates, k) for k in range(min(len(candidates), 8))]
-    others = " | ".join([*ways[1:], "…"][: len(ways) - 1 + (len(candidates) > 8)])
-    return (
-        f"the first sample can be reached in {len(candidates)} ways; taken is branch: {ways[0]}, "
-        f"others are {others}",
-    )
+    taken, *others = (_branch(ik, candidates, k) for k in range(len(candidates[:8])))
+    said = f"the first sample can be reached in {len(candidates)} ways; taken is branch: {taken}"
+    return (f"{said}, others are {' | '.join(others)}",)
 
 
 def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
@@ -342,25 +327,24 @@ def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
         if inside[k] and inside.sum() == 1 and len({j for j, _ in few}) == len(few):
             named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in sorted(few))
             return f"{{{', '.join(named)}}}"
-    q = zip(ik.coordinates(candidates[k][None])[0], ik.chain.units, strict=True)
-    return f"start: [{', '.join(written(value, unit) for value, unit in q)}]"
+    return f"start: [{', '.join(_words(ik, candidates[k]))}]"
 
 
 # --- the first sample
 
 
-def first_solutions(ik: TipProblem, course: Course) -> list[Floats]:
+def first_solutions(ik: TipProblem, course: Course, tolerance: float = RESIDUAL) -> list[Floats]:
     """Solutions u (n_q + n_p,) of the first sample within the branch, whatever the assembly.
 
     The nearest to the start comes first, else the least bent. Raises TrajectoryError where there
-    is none.
+    is none to a ``tolerance`` of L in m.
     """
     target = course.target(course.s[:1])
     u = ik.seeds
     # 28 find all eight ways of a six-axis arm; the last for targets at the end of the reach
     for iterations in (28, 100):
         u, miss = levenberg(ik, u, target, iterations)
-        reached = miss <= RESIDUAL * ik.lever
+        reached = miss <= tolerance * ik.lever
         wanted = reached & ik.inside(u).all(axis=1)
         if wanted.any():
             return _distinct(ik, u[wanted])

@@ -247,9 +247,10 @@ class _Branches:
             path, message = "coordinates", self._open()
         elif held := self._held(ways[0]):
             path = "design" if held in self.parameters.varied else "coordinates"
-            message = f"{held} cannot change at {self._at}: the loops hold it, as a structure or "
-            message += "at a dead point. Give a joint another freedom, or lock the coordinate"
-            message += self._elsewhere()
+            message = (
+                f"{held} cannot change at {self._at}: the loops hold it, as a structure or at a "
+                f"dead point. Give a joint another freedom, or lock it{self._elsewhere()}"
+            )
         elif len(ways) > 1 and (not len(found) or self._apart(ways[0], found[0]) > SAME):
             message = "the guess leads to no closed pose near it: " * (guess is not None)
             message += f"the loops close in {len(ways)} ways at {self._at}: {self._ways(ways)}"
@@ -299,10 +300,18 @@ class _Branches:
         Rx(α) Ry(β) Rz(γ) = Rx(α + π) Ry(π − β) Rz(γ + π): of balls |β| ≤ π/2.
         """
         p, several = self._descended(starts), len(starts) > 1
+        joints, names = self.case.mechanism.joints, [f.joint for f in self.tree.passive]
+        balls = [
+            k
+            for k, f in enumerate(self.tree.passive)
+            if joints[f.joint].type == "spherical"
+            and f.component == 0
+            and names.count(f.joint) == 3
+        ]
         distinct: list[Floats] = []
         for candidate in p[self._missed(p) < ACCEPT]:
             turned = wrapped(candidate)
-            for k in self._balls if several else ():
+            for k in balls if several else ():
                 if abs(turned[k + 1]) > np.pi / 2:
                     alpha, beta, gamma = turned[k : k + 3]
                     turned[k : k + 3] = wrapped(np.array([alpha, -beta, gamma]) + np.pi)
@@ -310,18 +319,6 @@ class _Branches:
             if all(np.abs(self._gaps(near - d)).max() > SAME for d in distinct):
                 distinct.append(near)
         return np.array(distinct).reshape(-1, self.function.size)
-
-    @property
-    def _balls(self) -> list[int]:
-        """The first angle of each spherical joint whose three angles are all passive."""
-        joints, names = self.case.mechanism.joints, [f.joint for f in self.tree.passive]
-        return [
-            k
-            for k, f in enumerate(self.tree.passive)
-            if joints[f.joint].type == "spherical"
-            and f.component == 0
-            and names.count(f.joint) == 3
-        ]
 
     def _is_determined(self, p0: Floats) -> bool:
         return int(np.linalg.matrix_rank(self._equations(p0[None])[2][0], RANK)) == len(p0)
@@ -381,8 +378,7 @@ class _Branches:
 
         Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
         """
-        message = f"the loops cannot be closed at {self._at}"
-        n = self.function.n_equations
+        message, n = f"the loops cannot be closed at {self._at}", self.function.n_equations
         met = int(np.linalg.matrix_rank(self._equations(self._starts)[2], RANK).max())
         p = self._descended(self._starts)
         nearest = p[[int(np.nanargmin(self._missed(p)))]]
