@@ -150,6 +150,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "link-lengths": figure("optimize", "arm_lengths", "mechanism", *LIGHT),
     "under-load": under_weight,
     "updating": figure("update", "arm_update", "parameters", "--report", "none"),
+    "parallelogram": figure("check", "palletiser", "mechanism", "--draw"),
     "ci": figure("expand", "two_link", "approximation_mode_1_time", "--report", "none"),
     "cluster": sweep,
 }
