@@ -16,7 +16,7 @@ from typing import Annotated, Any, Self, TypeAlias
 from pydantic import AfterValidator, Field, field_validator, model_validator
 from pydantic_core import core_schema
 
-from eigassign.case.reader import listed
+from eigassign.case.reader import listed, suggestion
 from eigassign.case.schema.parts import (
     ByReference,
     Frozen,
@@ -361,10 +361,10 @@ class Design(Part):
 
     @field_validator("entries", mode="before")
     @classmethod
-    def _has_no_misspelt_constraints(cls, entries: Any) -> Any:
+    def _has_no_misspelt_limits(cls, entries: Any) -> Any:
         for name, body in entries.items() if isinstance(entries, Mapping) else ():
-            if name.lower().startswith("constraint") and not is_entry(body):
-                raise wrong("did you mean the reserved key 'constraints'?", name)
+            if (near := suggestion(name.lower(), RESERVED)) and not is_entry(body):
+                raise wrong(f"no entry, which has a parameter{near}", name)
         return entries
 
     @cached_property

@@ -30,6 +30,7 @@ from scipy.linalg import block_diag, solve_banded
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import ADVANCING, FREEDOMS
+from eigassign.case.units import SI
 from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
@@ -307,6 +308,13 @@ class TipChain:
     def names(self) -> tuple[str, ...]:
         """The names of the coordinates, of their joints where no case is known."""
         return self.joints if self.tables is None else tuple(self.tables.case.coordinates)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The SI units of the coordinates, and what they are answered in."""
+        if self.tables is not None:
+            return self.tables.case.coordinate_units
+        return tuple("m" if k == "slide" else SI("rad", "deg") for k in self.kinds[: self.n_q])
 
     @property
     def y_names(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eigassign.case.units import handy, shown_point
 from eigassign.errors import MechanismError, SingularityError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import (
     WAYPOINTS,
@@ -51,19 +52,13 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     singular,
     trace,
 )
-from eigassign.mechanism.kinematics.loop_closure import as_assembly, wrapped, written
-
-
-def _words(ik: TipProblem, u: Floats) -> list[str]:
-    """The coordinates of a state (n_z,), angles within half a turn of 0."""
-    q, kinds = ik.coordinates(u[None])[0], ik.chain.kinds
-    turned = np.where(ik.chain.of_kind("turn")[: ik.n_q], wrapped(q), q)
-    return [written(x, "m" if k == "slide" else "rad") for x, k in zip(turned, kinds, strict=False)]
+from eigassign.mechanism.kinematics.loop_closure import as_assembly, wrapped
 
 
 def pose(ik: TipProblem, u: Floats) -> str:
-    """The coordinates of a state in words."""
-    return ", ".join(f"{n} = {x}" for n, x in zip(ik.chain.names, _words(ik, u), strict=True))
+    """The coordinates of a state in words, angles within half a turn of 0."""
+    q, turning = ik.coordinates(u[None])[0], ik.chain.of_kind("turn")[: ik.n_q]
+    return shown_point(ik.chain.names, np.where(turning, wrapped(q), q), ik.chain.units)
 
 
 def _assembly(ik: TipProblem, u: Floats) -> str:
@@ -327,7 +322,8 @@ def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
         if inside[k] and inside.sum() == 1 and len({j for j, _ in few}) == len(few):
             named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in sorted(few))
             return f"{{{', '.join(named)}}}"
-    return f"start: [{', '.join(_words(ik, candidates[k]))}]"
+    q = zip(ik.coordinates(candidates[k][None])[0], ik.chain.units, strict=True)
+    return f"start: [{', '.join(handy(value, unit, 6) for value, unit in q)}]"
 
 
 # --- the first sample

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import FREEDOMS
+from eigassign.case.units import SI, handy, shown_point
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, multiply
@@ -406,8 +407,8 @@ class _Branches:
     @property
     def _at(self) -> str:
         units = [*self.case.coordinate_units, *[""] * len(self.parameters.varied)]
-        values = zip(self.function.names, self.used, self.a0, strict=True)
-        return ", ".join(f"{n} = {written(a, units[v])}" for n, v, a in values) or "its only pose"
+        values = self.function.names, self.a0, [units[v] for v in self.used]
+        return shown_point(*values) if self.used else "its only pose"
 
     def _ways(self, ways: Sequence[Floats]) -> str:
         """Branches as guesses, eight at most, and the first with all that is to be written."""
@@ -467,31 +468,26 @@ def wrapped(angles: Floats) -> Floats:
     return np.asarray(np.mod(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 
+_PASTED = {"rad": SI("rad", "deg"), "m": SI("m", "m")}  # units of an assembly that is proposed
+
+
 def _unit(case: CaseFile, freedom: Freedom) -> str:
     """rad of a freedom that turns, m of one that slides."""
     known = FREEDOMS[case.mechanism.joints[freedom.joint].type]
     return "m" if known[freedom.component] == "translation" else "rad"
 
 
-def written(value: float, unit: str, digits: int = 6) -> str:
-    """A number as people read and write it: angles in degrees, and round-off as 0."""
-    size = np.degrees(value) if unit == "rad" else value
-    size = 0.0 if abs(size) < 1e-9 else size
-    return f"{size:.{digits}g} {'deg' if unit == 'rad' else unit}".rstrip()
-
-
 def as_assembly(case: CaseFile, tree: Topology, q: Floats, p: Floats) -> str:
     """The key `assembly` for passive freedoms p at coordinates q, as a case would have it."""
     named = zip(case.coordinates, q, case.coordinate_units, strict=True)
-    at = ", ".join(f"{name}: {written(value, unit)}" for name, value, unit in named)
+    at = ", ".join(f"{name}: {handy(value, _PASTED[unit], 6)}" for name, value, unit in named)
     return f"{{at: {{{at}}}, guess: {_as_guess(case, tree, p)}}}"
 
 
 def _as_guess(case: CaseFile, tree: Topology, p: Floats) -> str:
     """One solution as the guess that leads to it: a list for a joint with several freedoms."""
     values: dict[str, list[str]] = {}
-    for freedom, value in zip(tree.passive, p, strict=True):
-        text = written(value, _unit(case, freedom), 4)
-        values.setdefault(freedom.joint, []).append(text)
+    for freedom, value in zip(tree.passive, p.round(9) + 0.0, strict=True):
+        values.setdefault(freedom.joint, []).append(handy(value, _PASTED[_unit(case, freedom)], 4))
     several = {j: v[0] if len(v) == 1 else f"[{', '.join(v)}]" for j, v in values.items()}
     return "{" + ", ".join(f"{joint}: {value}" for joint, value in several.items()) + "}"

@@ -41,7 +41,7 @@ def test_a_decimal_comma_between_braces_is_recognised(tmp_path: Path) -> None:
 
 def test_misspelt_constraints_are_recognised(tmp_path: Path) -> None:
     found = messages("  constraints:", "  constraint:", tmp_path)
-    assert "did you mean the reserved key 'constraints'?" in found
+    assert "no entry, which has a parameter; did you mean 'constraints'?" in found
 
 
 def test_bodies_that_no_file_has_are_unknown(tmp_path: Path) -> None:
