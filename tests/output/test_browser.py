@@ -151,10 +151,12 @@ def pages(reports, batch, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     }.items():
         main([*map(str, command), "--quiet", "--out", str(folder / name)])
         found[name] = folder / name / "report.html"
-    return found
+    both = [str(page.parent) for page in (reports["two_link"], found["light"])]
+    main(["compare", *both, "--quiet", "--out", str(folder / "compare")])
+    return found | {"compare": folder / "compare" / "compare.html"}
 
 
-@pytest.mark.parametrize("kind", ["run", "batch", "update", "chart", "light"])
+@pytest.mark.parametrize("kind", ["run", "batch", "update", "chart", "light", "compare"])
 def test_no_page_can_send_anything(browser, pages, listener, kind):
     url, heard = listener
     at(browser, pages[kind], 1200)
