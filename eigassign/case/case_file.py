@@ -242,7 +242,9 @@ class CaseFile:
         written = zip(*(row for _, row in coordinate_lists(self)), strict=True)
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
         units = ("m" if freedom == "translation" else "rad" for freedom in moved)
-        both = ((unit, next(written, ())) for unit in units)
+        at = {} if self.mechanism.assembly is None else self.mechanism.assembly.at
+        rows = ((*next(written, ()), at.get(name, 0.0)) for name in self.coordinates)
+        both = zip(units, rows, strict=True)
         return tuple(self._unit(u, *row, "rad" * (u == "rad" and any(row))) for u, row in both)
 
     def _unit(self, unit: str, *given: object) -> SI:

@@ -259,7 +259,8 @@ def next_step(case: CaseFile) -> str:
     needs = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
     pose = ""
     if case.trajectory is None and case.expansion.q == "auto" and case.coordinates:
-        pose = f' --q "{", ".join(f"{value:g}" for value in resting_pose(case))}"'
+        pairs = zip(resting_pose(case), case.coordinate_units, strict=True)
+        pose = f' --q "{", ".join(handy(*pair) for pair in pairs)}"'
     more = "eigassign docs case-file"
     return f"eigassign modes {name}{pose} --draw (to optimize it needs {needs}: {more})"
 

@@ -58,6 +58,7 @@ class ImplicitFunction:
     p0: Floats
     names: tuple[str, ...]
     title: str
+    shown: Callable[[Floats], str] | None = None  # arguments in words; plain numbers without
 
     @cached_property
     def found(self) -> dict[bytes, Floats]:
@@ -187,6 +188,8 @@ class ImplicitFunction:
         return self.samples(a)
 
     def _named(self, a: Floats) -> str:
+        if self.shown is not None:
+            return self.shown(a)
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
 
 

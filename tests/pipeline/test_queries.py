@@ -48,7 +48,7 @@ def test_check_states_the_next_step(tmp_path: Path) -> None:
     text = (SHIPPED.parent / "arm_6r.yaml").read_text().partition("trajectory:")[0]
     answer = check(written(tmp_path, text))
     assert "needs trajectory, design and targets" in answer.next
-    assert '--q "0, 0, 0, 0, 0, 0" --draw' in answer.next
+    assert '--q "0 deg, 0 deg, 0 deg, 0 deg, 0 deg, 0 deg" --draw' in answer.next
 
 
 def test_check_refuses_a_series_that_does_not_fit(tmp_path: Path) -> None:
@@ -144,3 +144,30 @@ def test_a_run_tells_of_it_too(tmp_path: Path) -> None:
     case = written(tmp_path, shipped(("190 Hz", "19 kHz")))
     found = optimize(case, Options(out=tmp_path / "out", study="none")).results.warnings
     assert any("mode 1 at 19 kHz: the initial design has" in str(w) for w in found)
+
+
+PARALLELOGRAM = """\
+title: para
+mechanism:
+  space: planar
+  links:
+    a: {type: rigid, length: 0.3, mass: 1, inertia: 0.01, center: [0.15, 0]}
+    b: {type: rigid, length: 1.0, mass: 1, inertia: 0.1, center: [0.5, 0]}
+    c: {type: rigid, length: 0.3, mass: 1, inertia: 0.01, center: [0.15, 0]}
+  joints:
+    A: {type: revolute, base: ground, follower: a.start}
+    B: {type: revolute, base: a.end, follower: b.start}
+    C: {type: revolute, base: b.end, follower: c.end}
+    D: {type: revolute, base: ground, follower: c.start, position: [1.0, 0]}
+  assembly: {at: {q: 90 deg}, guess: {B: -90 deg, D: 90 deg}}
+coordinates: {q: {joint: A, drive: {stiffness: 10 kN m/rad}}}
+"""
+
+
+def test_loops_stand_as_they_are_assembled_where_no_pose_is_given(tmp_path: Path) -> None:
+    """At zero this one is at a dead point; poses in words have the unit of `assembly.at`."""
+    path = tmp_path / "loop.yaml"
+    path.write_text(PARALLELOGRAM)
+    assert '--q "90 deg" --draw' in check(path).next
+    with pytest.raises(CaseError, match="at a dead point, at q = 0 deg"):
+        modes(path, [0.0])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,8 @@ def _bind_passive(
     order = {v: k for k, v in enumerate([*used, *range(n_q + n_y, n_q + n_y + n_p)])}
     renamed = np.array([order[int(v)] for v in program.input_variables], dtype=np.intp)
     names = (*_joint_names(case, coords), *parameters.varied)
+    units = (*case.coordinate_units, *[""] * len(parameters.varied))
+    known = tuple(names[v] for v in used)
     function = ImplicitFunction(
         replace(program, input_variables=renamed, n_variables=len(order)),
         n_p,
@@ -107,8 +109,9 @@ def _bind_passive(
         len(check),
         np.zeros(len(used)),
         np.zeros(n_p),
-        tuple(names[v] for v in used),
+        known,
         "the mechanism",
+        partial(shown_point, known, units=tuple(units[v] for v in used)),
     )
     branches = _Branches(case, tree, function, used, parameters, reference_coordinates(case))
     solved = replace(function, a0=branches.a0, p0=branches.chosen())
@@ -406,9 +409,8 @@ class _Branches:
 
     @property
     def _at(self) -> str:
-        units = [*self.case.coordinate_units, *[""] * len(self.parameters.varied)]
-        values = self.function.names, self.a0, [units[v] for v in self.used]
-        return shown_point(*values) if self.used else "its only pose"
+        shown = self.function.shown
+        return shown(self.a0) if shown is not None and self.used else "its only pose"
 
     def _ways(self, ways: Sequence[Floats]) -> str:
         """Branches as guesses, eight at most, and the first with all that is to be written."""

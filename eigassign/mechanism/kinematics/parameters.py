@@ -304,11 +304,13 @@ def _margins(case: CaseFile, link: str) -> tuple[float, float]:
 
 
 def resting_pose(case: CaseFile) -> Floats:
-    """q = 0 with every carriage and nut in the middle of its beam: a pose to try a model at."""
+    """As the case assembles it, else 0, with every carriage and nut in the middle of its beam."""
     joints: Any = case.mechanism.joints
     links: Any = case.mechanism.links
-    riding = [joints[c.joint] for c in case.coordinates.values()]
-    return np.array([0.5 * links[j.base].length if j.type in RIDING else 0.0 for j in riding])
+    at = {} if case.mechanism.assembly is None else case.mechanism.assembly.at
+    riding = {name: joints[c.joint] for name, c in case.coordinates.items()}
+    middle = {n: 0.5 * links[j.base].length for n, j in riding.items() if j.type in RIDING}
+    return np.array([at.get(name, middle.get(name, 0.0)) for name in riding])
 
 
 ROUND_OFF = 1e-6  # of the bounds: round-off, and the steps of difference quotients
