@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import NoReturn
 
 import click
 import pytest
@@ -77,14 +78,14 @@ def test_a_signal_ends_a_command_with_its_code(
 def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    class Odd(os.PathLike[str]):
-        def __fspath__(self) -> str:
+    class Odd(dict[str, object]):
+        def items(self) -> NoReturn:
             raise ZeroDivisionError("division by zero")
 
     @click.command()
     @click.option("--debug", is_flag=True)
     def fail(debug: bool) -> None:
-        ea.load_case(Odd())  # type: ignore[arg-type]
+        ea.load_case(Odd(title="odd"))
 
     monkeypatch.setitem(cli.commands, "fail", fail)
     assert main(["fail"]) == 4

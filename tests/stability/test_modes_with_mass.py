@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from stress import ATLAS, case
 
 from eigassign.errors import MissingMassError
-from eigassign.modal import Model, expand, lowest_modes, reduce, solve_sparse
+from eigassign.modal import Model, expand, lowest_modes, reduce, solve_large
 
 POSE = [0.3, 0.9]
 ELEMENTS = 3  # of a link: 9 unknowns, and one more where its root turns
@@ -42,7 +42,7 @@ def batch(model: Model, count: int) -> np.ndarray:
 
 def sparse(model: Model, count: int) -> np.ndarray:
     theta = model.pencil.theta(model.x(POSE, []))
-    found = solve_sparse(model.pencil, theta, count, False)
+    found = solve_large(model.pencil, theta, count, False)
     return np.sqrt(found.lam[0]) / (2.0 * np.pi)
 
 
