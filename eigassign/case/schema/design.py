@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator
 from pydantic_core import core_schema
 
 from eigassign.case.reader import listed, suggestion
@@ -21,6 +21,7 @@ from eigassign.case.schema.parts import (
     ByReference,
     Frozen,
     FrozenDict,
+    Mistakes,
     Named,
     OneOrList,
     Part,
@@ -140,14 +141,12 @@ class Parameter(Part):
     price: Price | None = None
     tolerance: Tolerance | None = None
 
-    @model_validator(mode="after")
-    def _has_a_range(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         for key, bound in (("min", self.min), ("max", self.max)):
             if self.values is None and bound is None:
-                raise wrong("required key is missing: give min and max, or values", key)
+                yield wrong("required key is missing: give min and max, or values", key)
             if self.values is not None and bound is not None:
-                raise wrong(f"values are given, and leave nothing to limit: leave {key} out", key)
-        return self
+                yield wrong(f"values are given, and leave nothing to limit: leave {key} out", key)
 
     @property
     def factors(self) -> Mapping[str, float]:
@@ -183,31 +182,29 @@ class Choices(Part):
     price: ByReference[Price] = FrozenDict()
     tolerance: ByReference[Tolerance] = FrozenDict()
 
-    @model_validator(mode="after")
-    def _are_alike_and_differ(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         (first, model), *others = self.choices.items()
         if not self.properties:
-            raise wrong("sets no property", "choices", first)
+            yield wrong("sets no property", "choices", first)
         if PRICE in model and self.price:
             message = "each choice has a price of its own: leave these out, or those"
-            raise wrong(message, "price")
+            yield wrong(message, "price")
         seen = {self._row(model): first}
         for name, choice in others:
             for path in choice:
                 if path not in model:
                     message = f"choice {first!r} does not set it, and all must set the same"
-                    raise wrong(message, "choices", name, path)
+                    yield wrong(message, "choices", name, path)
             if missing := [path for path in model if path not in choice]:
                 message = f"choice {first!r} sets {listed(missing)} too, and all must set the same"
-                raise wrong(message, "choices", name)
+                yield wrong(message, "choices", name)
             if same := seen.get(self._row(choice)):
-                raise wrong(f"has the same values as {same!r}", "choices", name)
+                yield wrong(f"has the same values as {same!r}", "choices", name)
             seen[self._row(choice)] = name
         for path in (*self.price, *self.tolerance):
             if path not in self.properties:
                 known, key = listed(self.properties), "price" if path in self.price else "tolerance"
-                raise wrong(f"the choices do not set it; they set {known}", key, path)
-        return self
+                yield wrong(f"the choices do not set it; they set {known}", key, path)
 
     @property
     def properties(self) -> tuple[str, ...]:
@@ -241,13 +238,11 @@ class Constraint(Part):
     min: YValue | None = None
     max: YValue | None = None
 
-    @model_validator(mode="after")
-    def _binds(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.min is None and self.max is None:
-            raise wrong("a constraint needs min, max or both")
+            yield wrong("a constraint needs min, max or both")
         if not any(self.terms.values()):
-            raise wrong("all coefficients are zero", "terms")
-        return self
+            yield wrong("all coefficients are zero", "terms")
 
 
 class MassLimits(Part):
@@ -263,11 +258,9 @@ class MassLimits(Part):
     max: Annotated[float, quantity("mass", above=0)] | None = None
     price: Annotated[float, Quantity(above=0, elsewhere=_RATE, rate=True)] | None = None
 
-    @model_validator(mode="after")
-    def _binds(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.min is None and self.max is None and self.price is None:
-            raise wrong("the mass needs min, max or both, or a price")
-        return self
+            yield wrong("the mass needs min, max or both, or a price")
 
 
 class TorqueLimit(Part):

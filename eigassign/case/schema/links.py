@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field
 
 from eigassign.case.schema.parts import (
     LENGTH,
@@ -22,6 +22,7 @@ from eigassign.case.schema.parts import (
     FrozenDict,
     Inertia,
     KindBy,
+    Mistakes,
     Named,
     NumberOr,
     OneOrList,
@@ -32,10 +33,8 @@ from eigassign.case.schema.parts import (
     ValueOr,
     Vector,
     needs_one_of,
-    one_of,
     only_in,
     quantity,
-    space_of,
     wrong,
 )
 from eigassign.case.units import slip, written
@@ -59,7 +58,7 @@ class Material(Part):
     density: Annotated[float, quantity("density", at_least=0)]
     poissons_ratio: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
     shear_modulus: Annotated[float, MODULUS] | None = None
-    _is_one_constant = one_of("poissons_ratio", "shear_modulus", needed=False)
+    one_at_most = ("poissons_ratio", "shear_modulus")
 
 
 @dataclass(frozen=True)
@@ -98,14 +97,12 @@ class SectionBase(Part):
         """Inequalities between its dimensions without which the section cannot exist."""
         return tuple(each for each in self.bounds if getattr(self, each.small) is not None)
 
-    @model_validator(mode="after")
-    def _exists(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         for limit in self.limits():
             small, large = getattr(self, limit.small), getattr(self, limit.large)
             if not limit.holds(small, large):
                 most = written(large / limit.factor, "m", large)
-                raise wrong(f"{limit}, which is {most}{slip(small, 'm')}", limit.small)
-        return self
+                yield wrong(f"{limit}, which is {most}{slip(small, 'm')}", limit.small)
 
 
 class BareSection(SectionBase):
@@ -130,20 +127,19 @@ class BareSection(SectionBase):
     polar_inertia: Annotated[float, SECOND_MOMENT] | None = None
     shear_coefficient: Annotated[float, Quantity(above=0)] | None = None
 
-    _bends_one_way = one_of("bending_inertia", "inertia_z", needed=False)
+    one_at_most = ("bending_inertia", "inertia_z")
 
-    @model_validator(mode="after")
-    def _has_the_moments_of_its_space(self, info: ValidationInfo) -> Self:
-        spatial = space_of(info) == "spatial"
+    def _mistakes(self, space: str | None) -> Mistakes:
+        yield from super()._mistakes(space)
+        spatial = space == "spatial"
         if spatial and self.bending_inertia is not None:
             message = "is for planar mechanisms: in space write inertia_z (bending in the local "
-            raise wrong(message + "x-y plane) and inertia_y (x-z)", "bending_inertia")
+            yield wrong(message + "x-y plane) and inertia_y (x-z)", "bending_inertia")
         needed = ("inertia_y", "inertia_z", "torsion_constant") if spatial else ("bending_inertia",)
-        for key in needed if spatial or (space_of(info) and not self.in_plane) else ():
+        for key in needed if spatial or (space and not self.in_plane) else ():
             if getattr(self, key) is None:
                 message = "required key is missing: second moment of area (in m4 when bare; or mm4,"
-                raise wrong(f"{message} cm4)", key)
-        return self
+                yield wrong(f"{message} cm4)", key)
 
     @property
     def in_plane(self) -> float:
@@ -186,7 +182,7 @@ class TubeSection(SectionBase):
     inner_diameter: Annotated[float, LENGTH] | None = None
     thickness: Annotated[float, LENGTH] | None = None
 
-    _has_one_wall = one_of("inner_diameter", "thickness")
+    one_of = ("inner_diameter", "thickness")
 
     depths = ("outer_diameter",)
     bounds = (  # a bore needs a wall around it, which ends at the middle, where a tube is solid
@@ -325,12 +321,10 @@ class RigidLink(Part):
     inertia: Inertia = 0.0
     center: Vector | None = None
 
-    @model_validator(mode="after")
-    def _has_one_end(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.length is not None and "end" in self.nodes:
             message = "the node 'end' is given by length already: leave one of them out"
-            raise wrong(message, "nodes", "end")
-        return self
+            yield wrong(message, "nodes", "end")
 
 
 class FrameBeam(Part):
@@ -395,16 +389,14 @@ class SuperelementNode(Part):
     position: Vector | None = None
     dofs: Annotated[tuple[Dof, ...], Field(min_length=3, max_length=6)] | None = None
 
-    @model_validator(mode="after")
-    def _is_found(self, info: ValidationInfo) -> Self:
-        rows = "u_x, u_y, θ_z" if space_of(info) == "planar" else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
+    def _mistakes(self, space: str | None) -> Mistakes:
+        rows = "u_x, u_y, θ_z" if space == "planar" else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
         n = rows.count(",") + 1
-        if self.dofs is not None and space_of(info) and len(self.dofs) != n:
-            raise wrong(f"needs {n} entries, the rows of {rows}; got {len(self.dofs)}", "dofs")
+        if self.dofs is not None and space and len(self.dofs) != n:
+            yield wrong(f"needs {n} entries, the rows of {rows}; got {len(self.dofs)}", "dofs")
         for key in ("position", "dofs"):
             if self.id is None and getattr(self, key) is None:
-                raise wrong(f"required key is missing: {key}, or id, the node's number", key)
-        return self
+                yield wrong(f"required key is missing: {key}, or id, the node's number", key)
 
 
 class SuperelementLink(Part):
@@ -436,14 +428,12 @@ class SuperelementLink(Part):
     nodes: OneOrMoreNamed[SuperelementNode]
     reduce_to: ReduceTo | None = None
 
-    @model_validator(mode="after")
-    def _has_both(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         for key in ("stiffness", "mass"):
             if self.file is None and getattr(self, key) is None:
-                raise wrong(f"required key is missing: {key}, or file, which holds both", key)
+                yield wrong(f"required key is missing: {key}, or file, which holds both", key)
             if self.file is not None and getattr(self, key) is not None:
-                raise wrong(f"stands beside file, which holds both: leave out {key}, or file", key)
-        return self
+                yield wrong(f"stands beside file, which holds both: leave out {key}, or file", key)
 
 
 class SolidNode(Part):

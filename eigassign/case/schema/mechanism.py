@@ -7,7 +7,7 @@ How it moves, `mechanism.kinematics.joints` says.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -24,6 +24,7 @@ from eigassign.case.schema.parts import (
     FrozenDict,
     Inertia,
     KindBy,
+    Mistakes,
     Named,
     OneOrList,
     OneOrMoreNamed,
@@ -133,11 +134,9 @@ class UniversalJoint(JointBase):
     type: Literal["universal"]
     axes: tuple[Direction, Direction]
 
-    @model_validator(mode="after")
-    def _axes_cross(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if parallel(*self.axes):
-            raise wrong("the two axes are parallel: a universal joint's must cross", "axes")
-        return self
+            yield wrong("the two axes are parallel: a universal joint's must cross", "axes")
 
 
 class SphericalJoint(JointBase):
@@ -267,13 +266,11 @@ class Spring(Placed):
     angle: Annotated[Angle, IN_PLANE] = 0.0
     orientation: Annotated[Orientation | None, IN_SPACE] = None
 
-    @model_validator(mode="after")
-    def _joins_two_nodes(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.between[0] == self.between[1]:
-            raise wrong("both ends are the same node", "between")
+            yield wrong("both ends are the same node", "between")
         if not {"translational", "rotational"} & self.model_fields_set:
-            raise wrong("a spring needs translational, rotational or both")
-        return self
+            yield wrong("a spring needs translational, rotational or both")
 
 
 class Assembly(Part):
@@ -323,17 +320,15 @@ class Drive(Part):
         | None
     ) = None
 
-    @model_validator(mode="after")
-    def _acts(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.inertia is not None and self.motor_inertia is not None:
             message = "is reflected through the gear to motor_inertia ratio²: give it or inertia"
-            raise wrong(f"{message}, not both", "motor_inertia")
+            yield wrong(f"{message}, not both", "motor_inertia")
         if self.ratio is not None and self.motor_inertia is None:
             message = "has no effect without motor_inertia: give the motor's inertia J_m"
-            raise wrong(f"{message}; inertia is J_m ratio² already", "ratio")
+            yield wrong(f"{message}; inertia is J_m ratio² already", "ratio")
         if self.stiffness is None and self.inertia is None and self.motor_inertia is None:
-            raise wrong("a drive needs stiffness, inertia or both; else write free or locked")
-        return self
+            yield wrong("a drive needs stiffness, inertia or both; else write free or locked")
 
 
 class Coordinate(Part):

@@ -18,8 +18,9 @@ import inspect
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeAlias, TypeVar, get_args
 
 from pydantic import (
@@ -50,6 +51,7 @@ from eigassign.case.units import (
 
 TAG = "\0"  # in what pydantic adds to the place of an error: no key of a file has it
 T = TypeVar("T")
+Mistakes: TypeAlias = Iterator[PydanticCustomError]
 L = TypeVar("L")
 P = TypeVar("P", bound="Part")
 V = TypeVar("V")
@@ -61,16 +63,34 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
     other_keys: ClassVar[tuple[str, ...]] = ()  # of another kind that may stand in its place
+    one_of: ClassVar[tuple[str, ...]] = ()  # two keys, one of which is needed
+    one_at_most: ClassVar[tuple[str, ...]] = ()  # two keys, one of which excludes the other
 
     @model_validator(mode="wrap")
     @classmethod
-    def _explained(cls, value: Any, handler: Callable[[Any], Self]) -> Self:
+    def _explained(cls, value: Any, handler: Callable[[Any], Self], info: ValidationInfo) -> Self:
         """Keys that are missing or unknown are named with what they hold, or what there is."""
         try:
-            return handler(value)
+            part = handler(value)
         except ValidationError as error:
             each = map(cls._in_words, error.errors(include_url=False))
             raise ValidationError.from_exception_data(cls.__name__, [*each]) from None
+        for mistake in chain(part._choices(), part._mistakes(space_of(info))):
+            raise mistake
+        return part
+
+    def _choices(self) -> Mistakes:
+        for keys, needed in ((self.one_of, True), (self.one_at_most, False)):
+            given = [key for key in keys if getattr(self, key) is not None]
+            either = " or ".join(keys)
+            if keys and needed and len(given) != 1:
+                yield wrong(f"give either {either}" + ", and not both" * bool(given))
+            elif len(given) > 1:
+                yield wrong(f"give {either}, not both", given[-1])
+
+    def _mistakes(self, space: str | None) -> Mistakes:
+        """What its keys do not agree on, each good by itself; the first is told."""
+        yield from ()
 
     @classmethod
     def _in_words(cls, error: Any) -> InitErrorDetails:
@@ -138,21 +158,6 @@ def must(hold: Callable[[Any], object], message: str) -> AfterValidator:
         return value
 
     return AfterValidator(checked)
-
-
-def one_of(*keys: str, needed: bool = True) -> Any:
-    """Validator of a part that has one of two ``keys``; where not ``needed`` none will do."""
-    either = " or ".join(keys)
-
-    def has_one(part: P) -> P:
-        given = [key for key in keys if getattr(part, key) is not None]
-        if needed and len(given) != 1:
-            raise wrong(f"give either {either}" + ", and not both" * bool(given))
-        if len(given) > 1:
-            raise wrong(f"give {either}, not both", given[-1])
-        return part
-
-    return model_validator(mode="after")(has_one)
 
 
 def distinct(text: str) -> AfterValidator:

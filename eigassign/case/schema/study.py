@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
@@ -18,12 +18,12 @@ from eigassign.case.schema.design import Tolerance, YValue
 from eigassign.case.schema.parts import (
     ByReference,
     File,
+    Mistakes,
     NumberOr,
     OneOrList,
     Part,
     Quantity,
     ValueOr,
-    one_of,
     quantity,
     wrong,
 )
@@ -158,7 +158,7 @@ class Measurement(Part):
     mode: Mode
     frequency: Frequency
     deviation: Tolerance
-    _has_one_pose = one_of("time", "q")
+    one_of = ("time", "q")
 
 
 class MeasurementFile(Part):
@@ -217,14 +217,12 @@ class Range(Part):
     max: Amount
     count: Annotated[int, Field(ge=2, le=100_000)]
 
-    @model_validator(mode="after")
-    def _goes_up(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         (low, unit), (high, other) = number_and_unit(self.min), number_and_unit(self.max)
         if unit != other and low and high:
-            raise wrong(f"write both ends in the same unit, got {unit!r} and {other!r}", "max")
+            yield wrong(f"write both ends in the same unit, got {unit!r} and {other!r}", "max")
         if low >= high:
-            raise wrong(f"max must be larger than min, got {shown(self.max)}", "max")
-        return self
+            yield wrong(f"max must be larger than min, got {shown(self.max)}", "max")
 
     @property
     def values(self) -> tuple[object, ...]:
@@ -262,23 +260,17 @@ class Sweep(Part):
     sample: Literal["grid", "list"] = "grid"
     file: File | None = None
 
-    _is_one_kind = one_of("parameters", "file")
+    one_of = ("parameters", "file")
 
-    @model_validator(mode="after")
-    def _lists_each_once(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         for key, body in (self.parameters or {}).items() if self.sample == "grid" else ():
             seen: set[str] = set()
             for k, value in enumerate(body if isinstance(body, tuple) else ()):
                 if (written := text_of(value)) in seen:
-                    raise wrong(f"{shown(value)} is given twice", "parameters", key, k)
+                    yield wrong(f"{shown(value)} is given twice", "parameters", key, k)
                 seen.add(written)
-        return self
-
-    @model_validator(mode="after")
-    def _lists_as_many_of_each(self) -> Self:
         bodies = (self.parameters or {}).items()
         counts = {key: len(b.values if isinstance(b, Range) else b) for key, b in bodies}
         if self.sample == "list" and len(set(counts.values())) > 1:
             told = ", ".join(f"{key} has {count}" for key, count in counts.items())
-            raise wrong(f"a list takes equally many values of each key, but {told}", "sample")
-        return self
+            yield wrong(f"a list takes equally many values of each key, but {told}", "sample")

@@ -9,13 +9,14 @@ program goes through are requirements (`assignment.requirements`): one for each 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from eigassign.case.reader import KeyPath, listed, shown, suggestion
 from eigassign.case.schema.parts import (
     Direction,
+    Mistakes,
     OneOrList,
     Part,
     Quantity,
@@ -24,7 +25,6 @@ from eigassign.case.schema.parts import (
     distinct,
     mapping,
     needs_one_of,
-    one_of,
     quantity,
     wrong,
 )
@@ -54,11 +54,9 @@ class FrequencyProfile(Part):
     time: Times
     frequency: Annotated[tuple[Frequency, ...], Field(min_length=2)]
 
-    @model_validator(mode="after")
-    def _is_a_function(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if len(self.time) != len(self.frequency):
-            raise wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
-        return self
+            yield wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
 
 
 Curve: TypeAlias = ValueOr[Frequency, FrequencyProfile]
@@ -93,13 +91,11 @@ class Pose(Part):
     time: Annotated[float, TIME] | None = None
     trajectory: str | None = None
     q: Coordinates | None = None
-    _is_one = one_of("time", "q")
+    one_of = ("time", "q")
 
-    @model_validator(mode="after")
-    def _is_where_time_runs(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.q is not None and self.trajectory is not None:
-            raise wrong("belongs to time; q stands for itself", "trajectory")
-        return self
+            yield wrong("belongs to time; q stands for itself", "trajectory")
 
 
 class FollowedMode(Part):
@@ -170,13 +166,11 @@ class AnyTarget(Part):
         """The name of its curve: "mode 2" where a frequency is wanted, "mode 2 at least"."""
         return mode if cls.is_goal else f"{mode} {cls.kind.replace('_', ' ')}"
 
-    @model_validator(mode="after")
-    def _lasts(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.during is not None and self.during[0] >= self.during[1]:
             first, last = self.during
             got = f"[{written(first, 's')}, {written(last, 's')}]"
-            raise wrong(f"the first time must be before the last, got {got}", "during")
-        return self
+            yield wrong(f"the first time must be before the last, got {got}", "during")
 
 
 class SomeModes(AnyTarget):
@@ -184,7 +178,7 @@ class SomeModes(AnyTarget):
 
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
-    _names_them_once = one_of("mode", "modes", needed=False)
+    one_at_most = ("mode", "modes")
 
 
 class ModeTarget(SomeModes):
@@ -217,13 +211,12 @@ class ModeTarget(SomeModes):
             return ((self.mode or 1,),)
         return ((1,),) if self.modes == "all" else tuple((mode,) for mode in self.modes)
 
-    @model_validator(mode="after")
-    def _names_modes(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
+        yield from super()._mistakes(space)
         if self.mode is None and self.modes is None:
-            raise wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
+            yield wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
         if self.modes == "all" and self.never_all:
-            raise wrong(self.never_all, "modes")
-        return self
+            yield wrong(self.never_all, "modes")
 
 
 class FrequencyTarget(ModeTarget):
@@ -297,12 +290,11 @@ class KeepOutTarget(SomeModes):
             raise wrong(f"expected {forms}, got {shown(value)}")
         return value
 
-    @model_validator(mode="after")
-    def _is_a_band(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
+        yield from super()._mistakes(space)
         if isinstance(self.keep_out, tuple) and self.keep_out[0] >= self.keep_out[1]:
             both = ", ".join(written(edge, "Hz") for edge in self.keep_out)
-            raise wrong(f"the band must go upwards, got [{both}]", "keep_out")
-        return self
+            yield wrong(f"the band must go upwards, got [{both}]", "keep_out")
 
 
 class Gap(Part):
@@ -316,15 +308,13 @@ class Gap(Part):
     between: tuple[ValueOr[Mode, FollowedMode], ValueOr[Mode, FollowedMode]]
     at_least: Frequency
 
-    @model_validator(mode="after")
-    def _is_between_two(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         low, high = self.between
         if low == high:
             name = low.name if isinstance(low, FollowedMode) else low
-            raise wrong(f"a gap is between two modes, got {name} twice", "between")
+            yield wrong(f"a gap is between two modes, got {name} twice", "between")
         if isinstance(low, int) and isinstance(high, int) and low > high:
-            raise wrong(f"the lower mode comes first: [{high}, {low}]", "between")
-        return self
+            yield wrong(f"the lower mode comes first: [{high}, {low}]", "between")
 
 
 class GapTarget(AnyTarget):

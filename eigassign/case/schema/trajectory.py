@@ -7,9 +7,9 @@ It holds one of them, or a list. To add a kind: write its model, put it into the
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from eigassign.case.reader import KeyPath, listed
 from eigassign.case.schema.mechanism import QValue
@@ -20,6 +20,7 @@ from eigassign.case.schema.parts import (
     ByReference,
     File,
     FrozenDict,
+    Mistakes,
     Name,
     OneOrList,
     Orientation,
@@ -29,7 +30,6 @@ from eigassign.case.schema.parts import (
     ValueOr,
     Vector,
     mapping,
-    one_of,
     quantity,
     wrong,
 )
@@ -107,17 +107,15 @@ class SampledTrajectory(AnyTrajectory):
     time: Times | None = None
     duration: Annotated[float, DURATION] | None = None
 
-    @model_validator(mode="after")
-    def _has_one_clock(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if len(self.q) == 1:
             for key in {"time", "duration"} & self.model_fields_set:
-                raise wrong("one sample is a pose at rest: leave the time out", key)
-            return self
+                yield wrong("one sample is a pose at rest: leave the time out", key)
+            return
         if (self.time is None) == (self.duration is None):
-            raise wrong("give either time or duration" + ", and not both" * (self.time is not None))
+            yield wrong("give either time or duration" + ", and not both" * (self.time is not None))
         if self.time is not None and len(self.time) != len(self.q):
-            raise wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
-        return self
+            yield wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
 
 
 class FileTrajectory(AnyTrajectory):
@@ -157,17 +155,15 @@ class PointTrajectory(Timed):
     points: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
     times: Times | None = None
     duration: Annotated[float, DURATION] | None = None
-    _has_one_clock = one_of("times", "duration")
+    one_of = ("times", "duration")
 
-    @model_validator(mode="after")
-    def _waits_for_a_time(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         if self.times is not None and len(self.times) != len(self.points):
-            raise wrong(f"{len(self.times)} times for {len(self.points)} points", "times")
+            yield wrong(f"{len(self.times)} times for {len(self.points)} points", "times")
         for k, (a, b) in enumerate(pairwise(self.points), 1):
             if a == b and self.times is None:
                 message = "the same point as the one before it: give times instead of duration"
-                raise wrong(message + " to wait there", "points", k)
-        return self
+                yield wrong(message + " to wait there", "points", k)
 
 
 class TipTrajectory(Timed):
@@ -194,18 +190,13 @@ class TipTrajectory(Timed):
     branch: ByReference[tuple[QValue, QValue]] = FrozenDict()
     start: Coordinates | None = None
 
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
+    def _mistakes(self, space: str | None) -> Mistakes:
         for k, (a, b) in enumerate(pairwise(self.waypoints), 1):
             if a == b:
-                raise wrong("the same point as the one before it", "waypoints", k)
+                yield wrong("the same point as the one before it", "waypoints", k)
         for joint, (low, high) in self.branch.items():
             if low >= high:
-                raise wrong(_UPWARDS, "branch", joint)
-        return self
-
-    @model_validator(mode="after")
-    def _turns_at_each_waypoint(self) -> Self:
+                yield wrong(_UPWARDS, "branch", joint)
         many = {"angle": self.angle} if isinstance(self.angle, tuple) else {}
         if self.orientation is not None and isinstance(self.orientation[0], tuple):
             many["orientation"] = self.orientation  # type: ignore[assignment]
@@ -214,8 +205,7 @@ class TipTrajectory(Timed):
                 message = (
                     f"{len(values)} for {len(self.waypoints)} waypoints: give one, or one per "
                 )
-                raise wrong(message + "waypoint", key)
-        return self
+                yield wrong(message + "waypoint", key)
 
 
 MOTIONS = ("tip", "file", "q", "points")  # the keys that only they have
