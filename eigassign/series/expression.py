@@ -61,6 +61,10 @@ class Recorder:
         factor, atom = x.single()
         return atom if factor == 1.0 else x._recorded().single()[1]
 
+    def function(self, atom: int) -> Scalar:
+        """One of the atoms that `parts` names, by itself."""
+        return Expression(self, 0.0, {atom: 1.0}) if atom >= 0 else 1.0
+
     def variable(self, index: int) -> Expression:
         """The independent variable number ``index``."""
         return self._atom(("variable", index))
@@ -262,9 +266,7 @@ def parts(x: Scalar) -> list[tuple[int, float]]:
 
 def atom_of(x: Scalar, atom: int) -> Scalar:
     """One of the atoms that `parts` names, by itself."""
-    return (
-        Expression(x.recorder, 0.0, {atom: 1.0}) if isinstance(x, Expression) and atom >= 0 else 1.0
-    )
+    return x.recorder.function(atom) if isinstance(x, Expression) else 1.0
 
 
 def one_atom(x: Scalar) -> Scalar:

@@ -53,7 +53,6 @@ TAG = "\0"  # in what pydantic adds to the place of an error: no key of a file h
 T = TypeVar("T")
 Mistakes: TypeAlias = Iterator[PydanticCustomError]
 L = TypeVar("L")
-P = TypeVar("P", bound="Part")
 V = TypeVar("V")
 _NOTHING = 1e-60  # of what may be negative, in any unit; round-off of places near 0 is 1e-17
 

@@ -30,7 +30,7 @@ from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
-from eigassign.series.expression import Expression, Scalar, one_atom
+from eigassign.series.expression import one_atom
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -151,7 +151,7 @@ def apart_from_rigid(
     if not len(rigid) or not len(rows):
         return K_g
     used, place = np.unique(atoms, return_inverse=True)
-    terms = [_atom(parameters, a) for a in used.tolist()]
+    terms = [parameters.recorder.function(a) for a in used.tolist()]
     table = parameters.compiled(np.array(terms, dtype=object))
     moves = np.zeros(n_dof, dtype=bool)
     moves[list(rigid)] = True
@@ -184,7 +184,7 @@ def _drawn_along(
     M_FE: dict[tuple[int, int], Floats] = {}  # by rigid motion and atom
     for i, j, atom, factor in zip(*(each.tolist() for each in M), strict=True):
         if i in place and j in place:
-            value = _atom(parameters, atom) * factor
+            value = parameters.recorder.function(atom) * factor
             M_FF[place[i], place[j]] = M_FF[place[i], place[j]] + value
         elif i in place:
             M_FE.setdefault((place[i], atom), np.zeros(n_dof))[j] += factor
@@ -193,18 +193,14 @@ def _drawn_along(
     pull: dict[int, Objects] = {}  # K_EF row by row
     for i, f, atom, factor in zip(*K_EF, strict=True):
         row = pull.setdefault(i, np.zeros(len(some), dtype=object))
-        row[some[f]] = row[some[f]] + _atom(parameters, atom) * factor
+        row[some[f]] = row[some[f]] + parameters.recorder.function(atom) * factor
     out, every = AffineEntries(), np.arange(n_dof)
     for i, row in pull.items():
         shares = [one_atom(share) for share in multiply(np.array(inverse), row[:, None])[:, 0]]
         for (f, atom), v in M_FE.items():
-            out.add_coupling(shares[f] * _atom(parameters, atom) * -1.0, v, every, [(i, 1.0)])
+            share = shares[f] * parameters.recorder.function(atom)
+            out.add_coupling(share * -1.0, v, every, [(i, 1.0)])
     return out.finish(n_dof)
-
-
-def _atom(parameters: ModelParameters, atom: int) -> Scalar:
-    """The function of an entry: an atom, or the number 1."""
-    return Expression(parameters.recorder, 0.0, {atom: 1.0}) if atom >= 0 else 1.0
 
 
 def _recombined(

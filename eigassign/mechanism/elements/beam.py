@@ -90,7 +90,7 @@ def element_stiffness(profile: Profile, h: Scalar) -> list[ElementTerm]:
         h⁻³ [ EI_1/(1+Φ) (b tᵀ + t bᵀ)/3 − (2 EI_2/5 + Φ r EI_1/(3 (1+Φ))) b bᵀ ] .
     """
     beam = profile[0]
-    terms = [ElementTerm(beam.EA / h, _pair(0)), ElementTerm(beam.GJ / h, _pair(3))]
+    terms = [ElementTerm(beam.EA / h, _along(0)), ElementTerm(beam.GJ / h, _along(3))]
     for key, plane, (phi, skew) in zip(("EI_z", "EI_y"), "zy", shear(profile, h), strict=True):
         each = [getattr(beam, key) for beam in profile]
         EI = _antisymmetric(each)
@@ -115,16 +115,16 @@ def element_mass(profile: Profile, h: Scalar) -> list[ElementTerm]:
     terms: list[ElementTerm] = []
     for degree, beam in enumerate(profile):
         if degree <= QUADRATIC:
-            terms.append(ElementTerm(beam.mass * h, _spread(0, degree)))
-            terms.append(ElementTerm(beam.polar * h, _spread(3, degree)))
+            terms.append(ElementTerm(beam.mass * h, _along(0, degree)))
+            terms.append(ElementTerm(beam.polar * h, _along(3, degree)))
         for rotary, plane, each in zip((beam.rotary_z, beam.rotary_y), "zy", bent, strict=True):
             scale = 1.0 if _is_zero(each.phi) else (each.phi + 1.0) ** -2.0
             if degree <= QUADRATIC:
-                lengths = (h, h**2.0, h**3.0)
-                terms += _polynomial(beam.mass * scale, each, bending_mass(plane, degree), lengths)
+                matrices, lengths = _mass("deflection", plane, degree), (h, h**2.0, h**3.0)
+                terms += _polynomial(beam.mass * scale, each, matrices, lengths)
             if beam.shear_z is not None:
-                lengths = (h**-1.0, 1.0, h)
-                terms += _polynomial(rotary * scale, each, rotary_mass(plane, degree), lengths)
+                matrices, lengths = _mass("rotation", plane, degree), (h**-1.0, 1.0, h)
+                terms += _polynomial(rotary * scale, each, matrices, lengths)
     return _folded(terms)
 
 
@@ -243,6 +243,11 @@ ROTATION = (
     np.array([[0.0, 0, 0], [1, -1, 0], [0, 0, 0], [0, 1, 0]]),
     np.array([[0.0, 0, 0], [0, -1, 1], [0, 0, 0], [0, 1, -1]]),
 )
+SHAPES = {  # of the mass, of the rotary inertia, and w' per ξ of what an axial force stretches
+    "deflection": DEFLECTION,
+    "rotation": ROTATION,
+    "slope": tuple(shape[:, 1:] * np.arange(1.0, shape.shape[1]) for shape in DEFLECTION),
+}
 LINEAR = np.array([[1.0, -1], [0, 1]])
 LEGENDRE = (  # P_l(2ξ − 1) in powers of ξ
     (1.0,),
@@ -264,18 +269,11 @@ def _integrals(first: Floats, second: Floats, degree: int) -> Floats:
 
 
 @cache
-def _pair(dof: int) -> Floats:
-    """[[1, −1], [−1, 1]] on one dof of both nodes."""
-    out = np.zeros((12, 12))
-    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = [[1.0, -1.0], [-1.0, 1.0]]
-    return out
-
-
-@cache
-def _spread(dof: int, degree: int) -> Floats:
-    """Consistent mass of a linear field: [[1/3, 1/6], [1/6, 1/3]] of the mean."""
-    out = np.zeros((12, 12))
-    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = _integrals(LINEAR, LINEAR, degree)
+def _along(dof: int, degree: int | None = None) -> Floats:
+    """[[1, −1], [−1, 1]] on one dof of both nodes; with P_l the mass, [[1/3, 1/6], …] of the mean."""
+    out, stretch = np.zeros((12, 12)), np.array([[1.0, -1.0], [-1.0, 1.0]])
+    small = stretch if degree is None else _integrals(LINEAR, LINEAR, degree)
+    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = small
     return out
 
 
@@ -313,25 +311,6 @@ def leaning_stiffness(plane: str) -> tuple[Floats, ...]:
     return _by_length((np.outer(b, t) + np.outer(t, b)) / 3.0, plane)[1:]
 
 
-@cache
-def bending_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
-    """m_ij of one plane: rows i for 1, Φ, Φ², Φr, Φ²r, Φ²r², columns j powers of h; with P_l."""
-    return _mass(DEFLECTION, plane, degree)
-
-
-@cache
-def rotary_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
-    """Rotary inertia ρI of one plane: powers of Φ by powers 1/h, 1, h; P_l along the element."""
-    return _mass(ROTATION, plane, degree)
-
-
-@cache
-def _slope_products(plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
-    """∫ P_l w' w'ᵀ dξ of one plane, w' per ξ: powers of Φ by powers of h."""
-    slopes = tuple(shape[:, 1:] * np.arange(1.0, shape.shape[1]) for shape in DEFLECTION)
-    return _mass(slopes, plane, degree)
-
-
 def stretched_slopes(
     force: Scalar, bent: Shear, plane: str, degree: int, h: Scalar
 ) -> list[ElementTerm]:
@@ -340,12 +319,13 @@ def stretched_slopes(
     For Φ = 0 and constant N they are N/(30 h) [[36, 3h, −36, 3h], …] (Przemieniecki, §15.2).
     """
     scale = force if _is_zero(bent.phi) else force * (bent.phi + 1.0) ** -2.0
-    return _polynomial(scale, bent, _slope_products(plane, degree), (h**-1.0, 1.0, h))
+    return _polynomial(scale, bent, _mass("slope", plane, degree), (h**-1.0, 1.0, h))
 
 
-def _mass(shapes: tuple[Floats, ...], plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
-    """The integrals of the products that go with 1, Φ, Φ², s, Φ s, s²."""
-    plain, sheared, skewed = shapes
+@cache
+def _mass(shapes: str, plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
+    """∫ P_l s sᵀ dξ of one plane, of what goes with 1, Φ, Φ², s, Φ s, s²; columns powers of h."""
+    plain, sheared, skewed = SHAPES[shapes]
     pairs = ((plain, plain), (plain, sheared), (sheared, sheared), (plain, skewed),
              (sheared, skewed), (skewed, skewed))  # fmt: skip
     rows = []

@@ -428,11 +428,9 @@ class TipTables:
     @cached_property
     def _table(self) -> CompiledArrays:
         """Place (d,), rotation (9,) or nothing, and F (n_e,)."""
-        case, tree, n_z = self.case, self.motion.tree, len(self.motion.tree.freedoms)
+        case, tree = self.case, self.motion.tree
         variables = self.parameters.rerecorded(Recorder(), len(tree.passive))
-        values = [variables.freedom(k) for k in range(n_z)]
-        still = np.zeros((n_z, 0), dtype=object)
-        moving = walk(case, variables, tree, self.motion.coordinates, values, still)
+        moving = walk(case, variables, tree, self.motion.coordinates)
         link, node = split(self.tip)
         X = node_position(case, variables, tree, (link, node))
         rotation, place = moving.placement(link).at(X)

@@ -154,11 +154,11 @@ def walk(
     parameters: ModelParameters,
     tree: Topology,
     coords: CoordinateMap,
-    values: Sequence[Scalar],
-    rates: Objects,
+    rates: Objects | None = None,
 ) -> Kinematics:
-    """Place every link for the freedoms' ``values``, moving at ċ = ``rates`` (n_freedoms, n)."""
-    way = _Placing(case, parameters, tree, values, rates)
+    """Place every link, moving at ċ = ``rates`` (n_freedoms, n); standing still without."""
+    still = np.zeros((len(tree.freedoms), 0), dtype=object)
+    way = _Placing(case, parameters, tree, still if rates is None else rates)
     for edge in tree.edges:
         way.placed[edge.follower[0]] = way.place(edge)
     loops = tuple(way.loop(edge) for edge in tree.loops)
@@ -172,11 +172,10 @@ class _Placing:
     case: CaseFile
     parameters: ModelParameters
     tree: Topology
-    values: Sequence[Scalar]
     rates: Objects
     placed: dict[str, Placement] = field(default_factory=dict)
     _twists: dict[NodeName, Objects] = field(default_factory=dict)
-    _rigid: dict[object, JointMotion] = field(default_factory=dict)
+    _joints: dict[object, JointMotion] = field(default_factory=dict)
 
     def place(self, edge: JointEdge) -> Placement:
         """The link that this joint carries."""
@@ -241,25 +240,19 @@ class _Placing:
 
     def _motion(self, edge: JointEdge) -> JointMotion:
         """R, lever and A of a joint as it is walked, mounting and position included."""
-        own, name = self.tree.of_joint(edge.joint), edge.joint
-        joint = self.case.mechanism.joints[name]
+        name, joint = edge.joint, self.case.mechanism.joints[edge.joint]
         varies = any(path.startswith(f"joints.{name}.") for path in self.parameters.by_path)
-        if own or varies or self.parameters.moved:
-            values = [self.values[k] for k in own]
-            return walked(self.case, self.parameters, name, edge.turned, values)
+        own = varies or self.parameters.moved or self.tree.of_joint(name)
         keys = ("type", "angle", "orientation", "position")
-        alike = (*(str(getattr(joint, key, None)) for key in keys), edge.turned)
-        if alike not in self._rigid:
-            self._rigid[alike] = walked(self.case, self.parameters, name, edge.turned, [])
-        return self._rigid[alike]
+        alike = (name * bool(own), *(str(getattr(joint, key, None)) for key in keys), edge.turned)
+        if alike not in self._joints:
+            known = self.parameters
+            self._joints[alike] = walked(self.case, known, self.tree, name, edge.turned)
+        return self._joints[alike]
 
 
 def walked(
-    case: CaseFile,
-    parameters: ModelParameters,
-    name: str,
-    backwards: bool,
-    values: Sequence[Scalar],
+    case: CaseFile, parameters: ModelParameters, tree: Topology, name: str, backwards: bool = False
 ) -> JointMotion:
     """Motion of a joint with its mounting and position, from base to follower or backwards.
 
@@ -267,6 +260,7 @@ def walked(
     """
     joint, path = case.mechanism.joints[name], f"joints.{name}"
     mount = mounting(parameters.angles(path, joint))
+    values = [parameters.freedom(k) for k in tree.of_joint(name)]
     motion = _mounted(joint, mount, joint_motion(joint, values))
     position = parameters.vector(f"{path}.position", joint.position)
     motion = motion._replace(translation=position + motion.translation)

@@ -41,8 +41,7 @@ def closed_kinematics(
     """
     if tree.loops:
         return _close_loops(case, parameters, tree, coords)
-    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
-    return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
+    return walk(case, parameters, tree, coords, coords.rates.astype(object))
 
 
 def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> Kinematics:
@@ -65,10 +64,9 @@ def _close_loops(
     P (n_passive, n) of ṗ = P q̇ comes from the loops' twist gaps.
     """
     bound = _bind_passive(case, parameters, tree, coords)
-    values = [bound.freedom(k) for k in range(len(tree.freedoms))]
     unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
     rates = np.concatenate([coords.rates.astype(object), unit], axis=1)
-    free = replace(walk(case, bound, tree, coords, values, rates), passive=bound.passive)
+    free = replace(walk(case, bound, tree, coords, rates), passive=bound.passive)
     n, kept = len(coords.columns), list(DOFS[case.mechanism.space])
     gaps = np.concatenate([loop.twist_gap[kept] for loop in free.loops])
     P = passive_motion(bound.recorder, gaps[:, n:], gaps[:, :n])
@@ -133,9 +131,7 @@ def _equations(
     case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Closure rows F and check rows of all loops, on passive freedoms as plain variables."""
-    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
-    still = np.zeros((len(tree.freedoms), 0), dtype=object)
-    motion = walk(case, parameters, tree, coords, values, still)
+    motion = walk(case, parameters, tree, coords)
     return closure_rows(motion, case.mechanism.space == "planar")
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.sparse import linalg
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
@@ -89,13 +88,8 @@ def solve_large_statics(pencil: Pencil, theta: Floats, f: Floats) -> Floats:
     """
     u, E = np.zeros(f.shape), pencil.elastic
     for k, data in enumerate((pencil.stiffness @ theta).T):
-        factor = _definite(principal(pencil, data, E))
+        factor = definite_factor(principal(pencil, data, E))
+        if factor is None:
+            raise MechanismError("mechanism", LIMP)
         u[k, E] = factor.solve(np.ascontiguousarray(f[k, E]))
     return u
-
-
-def _definite(K: sparse.csc_array) -> linalg.SuperLU:
-    factor = definite_factor(K)
-    if factor is None:
-        raise MechanismError("mechanism", LIMP)
-    return factor

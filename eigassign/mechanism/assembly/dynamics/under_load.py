@@ -60,7 +60,7 @@ from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays, compile_arrays
-from eigassign.series.expression import Expression, Recorder, Scalar
+from eigassign.series.expression import Recorder
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -536,7 +536,5 @@ def _collected(K: AffineEntries, n_u: int, recorder: Recorder, n_dof: int) -> Pa
     order, out = np.argsort(atoms, kind="stable"), Entries((n_dof, n_dof))
     cuts = np.flatnonzero(np.diff(atoms[order])) + 1
     for own in np.split(order, cuts) if len(order) else ():
-        atom = int(atoms[own[0]])
-        scalar: Scalar = Expression(recorder, 0.0, {atom: 1.0}) if atom >= 0 else 1.0
-        out.add(scalar, rows[own], columns[own], factors[own])
+        out.add(recorder.function(int(atoms[own[0]])), rows[own], columns[own], factors[own])
     return pattern(out)

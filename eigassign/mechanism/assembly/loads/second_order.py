@@ -398,8 +398,7 @@ def on_nodes(scene: Loaded, found: Statics, loads: Loads, name: str) -> list[tup
 def _add_joint(K: AffineEntries, scene: Loaded, edge: JointEdge, wrench: Objects) -> None:
     """What a joint's follower does to second order, as the file has it."""
     written, own = edge.written, scene.motion.tree.of_joint(edge.joint)
-    values = [scene.known.freedom(k) for k in own]
-    joint = walked(scene.case, scene.known, edge.joint, False, values)
+    joint = walked(scene.case, scene.known, scene.motion.tree, edge.joint)
     if edge.turned:
         wrench = handed(wrench * -1.0, joint.rotation, joint.translation)
     freedoms = np.concatenate(np.split(joint.freedoms, 2), axis=1)

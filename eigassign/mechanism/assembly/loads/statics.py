@@ -287,8 +287,10 @@ class _Wrenches:
         """
         if not loops:
             return
-        case, known, moved = self.scene.case, self.scene.known, self._passive_rates
-        kept = list(DOFS[self.scene.nodes.space])
+        case, known, motion = self.scene.case, self.scene.known, self.scene.motion
+        tree, coords, kept = motion.tree, motion.coordinates, list(DOFS[self.scene.nodes.space])
+        each = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
+        moved = walk(case, known, tree, coords, each)  # the passive freedoms, each by itself
         J = np.concatenate([loop.twist_gap[kept] for loop in moved.loops if loop.edge in loops])
         G = np.zeros((J.shape[1], 1), dtype=object)
         for p in moved.placements:
@@ -303,15 +305,6 @@ class _Wrenches:
         wrenches[:, kept] = found.reshape(len(loops), -1)
         for edge, wrench in zip(loops, wrenches, strict=True):
             self.close(edge, wrench)
-
-    @property
-    def _passive_rates(self) -> Kinematics:
-        """The motion with the passive freedoms as its columns, each by itself."""
-        motion, known = self.scene.motion, self.scene.known
-        tree, coords = motion.tree, motion.coordinates
-        values = [known.freedom(k) for k in range(len(tree.freedoms))]
-        unit = np.eye(len(values), dtype=object)[:, len(coords.relative) :]
-        return walk(self.scene.case, known, tree, coords, values, unit)
 
     def _missing(self, node: NodeName, received: Objects) -> Objects:
         """What must act on a node beside all that is known, in the world about its origin."""

@@ -37,7 +37,7 @@ from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, cross, 
 from eigassign.mechanism.kinematics.loop_closure import passive_motion
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.topology import NodeName
-from eigassign.series.expression import Expression, Scalar, atom_of, one_atom, parts
+from eigassign.series.expression import Scalar, atom_of, one_atom, parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,7 @@ def sagging(coarse: Loaded, g: Mapping[str, Objects]) -> Sagging:
     A: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     for i, j, atom, value in zip(*(each.tolist() for each in K.finish(n)), strict=True):
         if i < n and j < n and value != 0.0:
-            one = Expression(known.recorder, 0.0, {atom: value}) if atom >= 0 else value
-            A[i][j] = A[i][j] + one
+            A[i][j] = A[i][j] + known.recorder.function(atom) * value
     still = np.zeros(3, dtype=object)
     weights = {
         name: pulled(link, np.concatenate([g[name], still])[kept])
