@@ -284,8 +284,8 @@ class CaseFile:
         """SI unit of each design parameter, in the order of y; empty for a plain number."""
         columns = self.design.parameters.values()
         return tuple(
-            self._unit(unit, column.min, column.max, self.value_at(column.parameter))
-            for unit, column in zip(_units(self.design_quantities), columns, strict=True)
+            self._unit(quantity.si, column.min, column.max, self.value_at(column.parameter))
+            for quantity, column in zip(self.design_quantities, columns, strict=True)
         )
 
     @cached_property
@@ -298,12 +298,12 @@ class CaseFile:
         paths = tuple(dict.fromkeys(path for own in sets for path in own))
         of_design = {path for p in self.design.parameters.values() for path in p.factors}
         found = {}
-        for path, unit in zip(paths, _units(self.quantities(paths)), strict=True):
+        for path, quantity in zip(paths, self.quantities(paths), strict=True):
             own = 0.0 if path in of_design else self.value_at(path)
             values = [each.get(path, own) for each in sets]
             along = tuple(own + v.add if isinstance(v, Added) else float(v) for v in values)
             written = (v.add if isinstance(v, Added) else v for v in values)
-            unit = self._unit(unit, *written, self.value_at(path))
+            unit = self._unit(quantity.si, *written, self.value_at(path))
             found[f"{path}.add" if path in of_design else path] = Load(path, own, along, unit)
         return found
 
@@ -322,17 +322,17 @@ class CaseFile:
     @property
     def variant_units(self) -> Mapping[str, str]:
         """SI unit of each value of its `variant`, by key; empty where the schema knows of none."""
-        found = dict[str, Quantity]()
+        found = dict[str, str]()
         designed = dict(zip(self.design.parameters, self.design_quantities, strict=True))
-        for key in self.variant:
+        for key, value in self.variant.items():
             *owners, last = key.split(".")
             owner = reduce(below, owners, self)
             own = quantities(type(owner)).get(last) if isinstance(owner, Part) else None
             known = known_property(self, key.removeprefix("mechanism.")) or own
             bound = last in ("min", "max") and owners[:1] == ["design"]
-            found[key] = known or (designed.get(owners[-1]) if bound else None) or Quantity()
-        values = (Given(math.nan, str(value)) for value in self.variant.values())
-        return dict(zip(found, map(SI, _units(found.values()), values), strict=True))
+            kind = known or (designed.get(owners[-1]) if bound else None) or Quantity()
+            found[key] = SI(kind.si, Given(math.nan, str(value)))
+        return found
 
     @property
     def box(self) -> tuple[tuple[float, float], ...]:
@@ -395,11 +395,6 @@ class CaseFile:
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
         return to_yaml({name: getattr(self, name) for name in Document.model_fields})
-
-
-def _units(quantities: Iterable[Quantity]) -> tuple[str, ...]:
-    """SI units; empty for a plain number."""
-    return tuple(each.dimension.si if each.dimension else "" for each in quantities)
 
 
 NO_VALUES: Mapping[str, object] = FrozenDict()

@@ -266,8 +266,7 @@ def starts_outside(document: Document) -> Iterator[Finding]:
     design = document.design
     chosen = {k for catalogue in design.catalogues for k in catalogue.columns}
     for k, (name, column) in enumerate(design.parameters.items()):
-        dimension = property_at(document, column.parameter).dimension
-        unit, ends = dimension.si if dimension else "", (column.min, column.max)
+        unit, ends = property_at(document, column.parameter).si, (column.min, column.max)
         value, bare = value_at(document, column.parameter), not SI("", *ends).answered
         meant, size = LEFT_OUT.get(unit, ("", 0.0))
         slipped = bare and size * column.min <= value <= size * column.max

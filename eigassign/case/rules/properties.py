@@ -440,8 +440,7 @@ def parameters_agree_with_the_file(document: Document) -> Iterator[Finding]:
             value, wanted = value_at(document, path), factor * first
             # digits that a product has and no file: 0.8 × 0.04 is not 0.032 to the last one
             if abs(value - wanted) > 1e-9 * abs(wanted):
-                dimension = property_at(document, path).dimension
-                unit = SI(dimension.si if dimension else "", value, first)
+                unit = SI(property_at(document, path).si, value, first)
                 yield (
                     placed[name][path],
                     f"is {written(value, unit)} in this file, where {factor:.12g} × "
@@ -481,7 +480,7 @@ def limits(case: Any) -> Iterator[Limit]:
             ("<=", kind.at_most, -1.0),
         ):
             if value is not None:
-                edge = written(value, kind.dimension.si if kind.dimension else "", *own)
+                edge = written(value, kind.si, *own)
                 words = f"{path} must be {sign} {edge}"
                 yield limit({path: factor}, -factor * value, sign in "<>", words)
     for name, section in case.mechanism.sections.items():

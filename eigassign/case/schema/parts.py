@@ -198,6 +198,11 @@ class Quantity:
     elsewhere: str = ""
     rate: bool = False
 
+    @property
+    def si(self) -> str:
+        """SI unit; empty for a plain number."""
+        return self.dimension.si if self.dimension else ""
+
     def read(self, value: object) -> float:
         """SI value within the limits. Raises QuantityError."""
         if isinstance(value, Given):

@@ -270,7 +270,7 @@ def _integrals(first: Floats, second: Floats, degree: int) -> Floats:
 
 @cache
 def _along(dof: int, degree: int | None = None) -> Floats:
-    """[[1, −1], [−1, 1]] on one dof of both nodes; with P_l the mass, [[1/3, 1/6], …] of the mean."""
+    """[[1, −1], [−1, 1]] on one dof of both nodes; with P_l the mass: [[1/3, 1/6], …] of P_0."""
     out, stretch = np.zeros((12, 12)), np.array([[1.0, -1.0], [-1.0, 1.0]])
     small = stretch if degree is None else _integrals(LINEAR, LINEAR, degree)
     out[np.ix_([dof, dof + 6], [dof, dof + 6])] = small

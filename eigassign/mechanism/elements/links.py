@@ -282,7 +282,7 @@ def copies_of(
     loaded = {body.at.partition(".")[0] for body in case.mechanism.bodies.values()}
     found: dict[str, tuple[object, ...]] = {}
     for name, link in case.mechanism.links.items():
-        plain = link_type(case, name) == "beam" and name not in loaded and not tree.riders(name)
+        plain = link_type(case, name) == "beam" and name not in loaded and not tree.riders[name]
         if plain and is_constant(length(case, parameters, name)):
             data = link.model_dump(exclude={"reduce_to"})
             found[name] = tuple((key, str(value)) for key, value in data.items())
@@ -344,7 +344,7 @@ def beam_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name:
     """A straight beam along x, in two segments where a carriage or nut rides on it."""
     link: Any = case.mechanism.links[name]
     total, n = length(case, parameters, name), link.elements
-    riders, turn = tree.riders(name), _rolled(link)
+    riders, turn = tree.riders[name], _rolled(link)
     pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]  # start, span, elements
     if riders:
         at, first = station(parameters, tree, riders[0]), max(1, n // 2)

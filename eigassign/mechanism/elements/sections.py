@@ -58,40 +58,32 @@ def section_values(section: Any, number: Lookup) -> SectionValues:
     box: difference of two rectangles, J by `_box_torsion`, κ by `_box_shear`; I-profile: three
     rectangles, J = Σ bt³/3.
     """
-    kappa = SHEAR.get(section.shape, 0.0)
-    match section.shape:
-        case "circle":
-            area, inertia = _circle(number("diameter", section.diameter))
-            return _round(area, inertia, kappa)
-        case "tube":
-            return _round(*_tube(section, number), kappa)
-        case "rectangle":
-            return _rectangle(section, number, kappa)
-        case "box":
-            return _box(section, number)
-        case "i_profile":
-            return _i_profile(section, number, kappa)
-        case "bare":
-            return _bare(section, number, kappa)
-    raise NotImplementedError(f"no properties are defined for sections of shape {section.shape!r}")
+    kinds = {
+        **{"circle": _circle, "tube": _tube, "rectangle": _rectangle},
+        **{"box": _box, "i_profile": _i_profile, "bare": _bare},
+    }
+    return kinds[section.shape](section, number, SHEAR.get(section.shape, 0.0))
 
 
-def _round(area: Scalar, inertia: Scalar, kappa: float) -> SectionValues:
-    return SectionValues(area, inertia, inertia, inertia * 2.0, inertia * 2.0, kappa)
+def _circle(section: Any, number: Lookup, kappa: float) -> SectionValues:
+    return _round(number("diameter", section.diameter), 0.0, kappa)
 
 
-def _circle(diameter: Scalar) -> tuple[Scalar, Scalar]:
-    return diameter**2.0 * (math.pi / 4.0), diameter**4.0 * (math.pi / 64.0)
-
-
-def _tube(section: Any, number: Lookup) -> tuple[Scalar, Scalar]:
+def _tube(section: Any, number: Lookup, kappa: float) -> SectionValues:
     outer = number("outer_diameter", section.outer_diameter)
     if section.inner_diameter is not None:
         inner = number("inner_diameter", section.inner_diameter)
     else:
         inner = outer - number("thickness", section.thickness) * 2.0
-    (a, i), (b, j) = _circle(outer), _circle(inner)
-    return a - b, i - j
+    return _round(outer, inner, kappa)
+
+
+def _round(outer: Scalar, inner: Scalar, kappa: float) -> SectionValues:
+    area, inertia = (
+        outer**n * (math.pi / over) - inner**n * (math.pi / over)
+        for n, over in ((2.0, 4.0), (4.0, 64.0))
+    )
+    return SectionValues(area, inertia, inertia, inertia * 2.0, inertia * 2.0, kappa)
 
 
 def _rectangle(section: Any, number: Lookup, kappa: float) -> SectionValues:
@@ -118,7 +110,7 @@ def _rectangle_torsion(a: Scalar, b: Scalar) -> Scalar:
     return a * b**3.0 * (1.0 / 3.0 - b / a * total * (64.0 / math.pi**5))
 
 
-def _box(section: Any, number: Lookup) -> SectionValues:
+def _box(section: Any, number: Lookup, _: float) -> SectionValues:
     b, h = number("width", section.width), number("height", section.height)
     t = number("thickness", section.thickness)
     p, q = b - t * 2.0, h - t * 2.0

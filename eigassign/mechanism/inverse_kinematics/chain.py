@@ -321,10 +321,6 @@ class TipChain:
         """The names of the design parameters (n_y,)."""
         return () if self.tables is None else self.tables.parameters.design
 
-    def redesigned(self, y: Floats) -> TipChain:
-        """The chain at another design (n_y,)."""
-        return self if self.tables is None else self.tables.chain(y)
-
     def of_kind(self, kind: str) -> Bools:
         """Mask of the entries of a state that are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)

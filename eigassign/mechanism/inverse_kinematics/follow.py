@@ -424,7 +424,8 @@ class PathOfDesign:
 
     def problem_at(self, y: Floats) -> TipProblem:
         """The problem at a design, in the measure of the first one."""
-        return self.problem._replace(chain=self.problem.chain.redesigned(y))
+        tables = self.problem.chain.tables
+        return self.problem._replace(chain=tables.chain(y)) if tables else self.problem
 
     def states(self, y: Floats) -> Floats:
         """States (n, n_z) at design y, by steps from y0 as large as the branch can be told in."""

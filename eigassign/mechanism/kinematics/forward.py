@@ -261,33 +261,25 @@ def walked(
     joint, path = case.mechanism.joints[name], f"joints.{name}"
     mount = mounting(parameters.angles(path, joint))
     values = [parameters.freedom(k) for k in tree.of_joint(name)]
-    motion = _mounted(joint, mount, joint_motion(joint, values))
+    # what rides on a beam keeps the beam's axis; others are turned as a whole
+    ends = (np.eye(3), mount.T) if joint.type in RIDING else (mount, np.eye(3))
+    motion = _between(joint_motion(joint, values), *ends)
     position = parameters.vector(f"{path}.position", joint.position)
     motion = motion._replace(translation=position + motion.translation)
     if parameters.moved:
-        motion = _between(parameters, joint, name, motion)
+        base = (joint.base, f"@{name}") if joint.type in RIDING else split(joint.base)
+        nodes = base, split(joint.follower)
+        motion = _between(motion, *(parameters.moved.get(node, STILL).turn for node in nodes))
     return turned(motion) if backwards else motion
 
 
 def _between(
-    parameters: ModelParameters, joint: Any, name: str, motion: JointMotion
+    motion: JointMotion, base: Objects | Floats, follower: Objects | Floats
 ) -> JointMotion:
     """The motion of a joint between nodes that are turned."""
-    ends = (joint.base, f"@{name}") if joint.type in RIDING else split(joint.base)
-    b, f = (parameters.moved.get(node, STILL) for node in (ends, split(joint.follower)))
-    A = np.concatenate([multiply(f.turn, motion.freedoms[k : k + 3]) for k in (0, 3)])
-    R = multiply(multiply(b.turn, motion.rotation), f.turn.T)
-    return JointMotion(R, multiply(b.turn, motion.translation), A)
-
-
-def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
-    """The joint turned as a whole; what rides on a beam keeps the beam's axis instead."""
-    if getattr(joint, "type", "") not in RIDING:
-        R, d = multiply(mount, motion.rotation), multiply(mount, motion.translation)
-        return JointMotion(R, d, motion.freedoms)
-    R = multiply(motion.rotation, mount)
-    A = np.concatenate([multiply(mount.T, motion.freedoms[k : k + 3]) for k in (0, 3)])
-    return JointMotion(R, motion.translation, A)
+    A = np.concatenate([multiply(follower, motion.freedoms[k : k + 3]) for k in (0, 3)])
+    R = multiply(multiply(base, motion.rotation), follower.T)
+    return JointMotion(R, multiply(base, motion.translation), A)
 
 
 def shifted(twist: Objects, lever: Objects) -> Objects:

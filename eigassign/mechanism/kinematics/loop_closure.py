@@ -97,7 +97,13 @@ def _bind_passive(
     program = compile_program(recorder, [recorder.atom(s) for s in scalars], n_q + n_y + n_p)
     order = {v: k for k, v in enumerate([*used, *range(n_q + n_y, n_q + n_y + n_p)])}
     renamed = np.array([order[int(v)] for v in program.input_variables], dtype=np.intp)
-    names = (*_joint_names(case, coords), *parameters.varied)
+    # the joint coordinates s are those of q, but where q counts absolute angles
+    plain = (coords.relative == np.eye(n_q)).all(axis=1) & (coords.offset == 0.0)
+    own = [
+        name if same else f"{name} relative to the base of {c.joint!r}"
+        for same, (name, c) in zip(plain, case.coordinates.items(), strict=True)
+    ]
+    names = (*own, *parameters.varied)
     units = (*case.coordinate_units, *[""] * len(parameters.varied))
     known = tuple(names[v] for v in used)
     function = ImplicitFunction(
@@ -116,15 +122,6 @@ def _bind_passive(
     return parameters.with_passive(
         parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
     )
-
-
-def _joint_names(case: CaseFile, coords: CoordinateMap) -> list[str]:
-    """The names of the joint coordinates s: those of q, but where q counts absolute angles."""
-    plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
-    return [
-        name if same else f"{name} relative to the base of {c.joint!r}"
-        for same, (name, c) in zip(plain, case.coordinates.items(), strict=True)
-    ]
 
 
 def _equations(

@@ -276,7 +276,7 @@ class Rails:
 
 def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails | None:
     """The ranges of a mechanism; None where nothing rides."""
-    riders = [(joint, link) for link in case.mechanism.links for joint in tree.riders(link)]
+    riders = [(joint, link) for link in case.mechanism.links for joint in tree.riders[link]]
     if not riders:
         return None
     scalars = [

@@ -7,7 +7,8 @@ joints where the first choice ends between rigid links or at nodes that are carr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -91,18 +92,13 @@ class Topology:
             found.setdefault(edge.base[0], []).extend(own)
         return found
 
-    def riders(self, link: str) -> list[str]:
-        """The carriages and nuts that travel along a link."""
-        return self._riders.get(link, [])
-
     @cached_property
-    def _riders(self) -> dict[str, list[str]]:
-        """The riders of every link: asked for once a link, of which there may be a thousand."""
-        found: dict[str, list[str]] = {}
+    def riders(self) -> Mapping[str, list[str]]:
+        """The carriages and nuts that travel along a link, by its name; none of others."""
+        found = defaultdict[str, list[str]](list)
         for edge in (*self.edges, *self.loops):
-            link, node = edge.written.base
-            if node == f"@{edge.joint}":
-                found.setdefault(link, []).append(edge.joint)
+            if edge.written.base[1] == f"@{edge.joint}":
+                found[edge.written.base[0]].append(edge.joint)
         return found
 
 

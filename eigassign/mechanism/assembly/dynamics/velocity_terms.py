@@ -159,7 +159,7 @@ def stacked(
         _add_dense(T, link.twist, len(kept) * k, nodes.count)
         add_terms(m, whole_mass(link), whole, whole)
         _add_dense(rates, moving.placement(name).twist, 6 * k, 0)
-        if motion.tree.riders(name):
+        if motion.tree.riders[name]:
             meshes.append(nodes.meshes[name])
             riders.append(Riding.of(meshes[-1].strands[0], whole, n_whole))
         basis = sparse.eye_array(size) if link.reduction is None else link.reduction.basis
