@@ -37,7 +37,7 @@ from eigassign.modal.taylor.recursion import (
 )
 from eigassign.process import one_thread
 from eigassign.series.algebra import Polynomials, monomials, polynomials
-from eigassign.series.multi_index import LowerSet
+from eigassign.series.multi_index import LowerSet, frozen
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
@@ -162,8 +162,7 @@ class Expansion:
         x_space, values = substitute(
             self.space, stacked, self.directions, len(self.q0), self.n_linear
         )
-        values.setflags(write=False)
-        return x_space, values
+        return x_space, frozen(values)
 
 
 def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) -> Floats:
@@ -234,11 +233,11 @@ def expand(
         raise UsageError("these series are not of this expansion: a mode is missing")
     return Expansion(
         modes=tuple(m for g in groups for m in g if m in wanted),
-        clusters=tuple(replace(c, coefficients=_frozen(c.coefficients)) for c in known),
-        q0=_frozen(x0[: pencil.n_q]),
-        y0=_frozen(x0[pencil.n_q :]),
+        clusters=tuple(replace(c, coefficients=frozen(c.coefficients)) for c in known),
+        q0=frozen(x0[: pencil.n_q]),
+        y0=frozen(x0[pencil.n_q :]),
         space=local.space,
-        directions=_frozen(local.directions),
+        directions=frozen(local.directions),
         n_linear=local.n_linear,
         vector_space=half,
         notes=_notes(groups, local, pencil),
@@ -258,12 +257,6 @@ def _notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil)
         them = "it" if idle == 1 else "them"
         lines.append(f"{which} left out of the expansion: no frequency depends on {them}")
     return tuple(lines)
-
-
-def _frozen(a: Floats) -> Floats:
-    a = np.ascontiguousarray(a)
-    a.setflags(write=False)
-    return a
 
 
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,7 +194,7 @@ def lower_set(indices: NDArray[np.int64] | Sequence[Sequence[int]]) -> LowerSet:
     if len(rows) > MAX_SIZE:
         raise UsageError(f"{len(rows)} multi-indices; at most {MAX_SIZE}: lower the order")
     rows = rows[np.lexsort((*(-rows.T[::-1]), rows.sum(axis=1)))]
-    space = LowerSet(_frozen(rows))
+    space = LowerSet(frozen(rows))
     for variable in range(space.n_variables):
         below = rows[rows[:, variable] > 0].copy()
         below[:, variable] -= 1
@@ -215,7 +215,8 @@ def _whole(indices: object) -> NDArray[np.int64]:
     return rows.astype(np.int64)
 
 
-def _frozen(a: NDArray[np.int64]) -> NDArray[np.int64]:
+def frozen(a: NDArray[Any]) -> NDArray[Any]:
+    """The array in C order, which cannot be written to."""
     a = np.ascontiguousarray(a)
     a.setflags(write=False)
     return a
@@ -251,7 +252,7 @@ def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
     where = np.flatnonzero(inside | (space.degrees == 0))
     if len(where) == len(space):
         return space, where
-    return LowerSet(_frozen(space.indices[where])), where
+    return LowerSet(frozen(space.indices[where])), where
 
 
 def _simplex(n: int, order: int) -> NDArray[np.int64]:

@@ -473,16 +473,9 @@ def limits(case: Any) -> Iterator[Limit]:
 
     for path, kind in zip(case.varied, case.quantities(case.varied), strict=True):
         own = [case.value_at(path)]
-        for sign, value, factor in (
-            (">", kind.above, 1.0),
-            (">=", kind.at_least, 1.0),
-            ("<", kind.below, -1.0),
-            ("<=", kind.at_most, -1.0),
-        ):
-            if value is not None:
-                edge = written(value, kind.si, *own)
-                words = f"{path} must be {sign} {edge}"
-                yield limit({path: factor}, -factor * value, sign in "<>", words)
+        for sign, value, factor in kind.edges:
+            words = f"{path} must be {sign} {written(value, kind.si, *own)}"
+            yield limit({path: factor}, -factor * value, sign in "<>", words)
     for name, section in case.mechanism.sections.items():
         for own in section.limits():
             small, large = (f"sections.{name}.{key}" for key in (own.small, own.large))

@@ -203,6 +203,13 @@ class Quantity:
         """SI unit; empty for a plain number."""
         return self.dimension.si if self.dimension else ""
 
+    @property
+    def edges(self) -> tuple[tuple[str, float, float], ...]:
+        """Its limits as `>`, `>=`, `<` or `<=`, in SI, with 1 for a lower and −1 for an upper."""
+        lower = (">", self.above, 1.0), (">=", self.at_least, 1.0)
+        upper = ("<", self.below, -1.0), ("<=", self.at_most, -1.0)
+        return tuple((sign, v, way) for sign, v, way in (*lower, *upper) if v is not None)
+
     def read(self, value: object) -> float:
         """SI value within the limits. Raises QuantityError."""
         if isinstance(value, Given):
@@ -227,14 +234,9 @@ class Quantity:
         """
         known = self.dimension or PLAIN
         own = [Given(si, given)] if known.si and isinstance(given, str) else []
-        for sign, limit, holds in (
-            (">", self.above, self.above is None or si > self.above),
-            (">=", self.at_least, self.at_least is None or si >= self.at_least),
-            ("<", self.below, self.below is None or si < self.below),
-            ("<=", self.at_most, self.at_most is None or si <= self.at_most),
-        ):
-            if not holds:
-                edge = written(limit or 0.0, known.si, *own)
+        for sign, limit, way in self.edges:
+            if not (way * si > way * limit or ("=" in sign and si == limit)):
+                edge = written(limit, known.si, *own)
                 raise QuantityError(f"must be {sign} {edge}, got {shown(given)}")
         positive = 0 in (self.above, self.at_least)
         least = known.smallest if positive else _NOTHING

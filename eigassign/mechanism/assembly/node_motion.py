@@ -47,7 +47,7 @@ from eigassign.mechanism.kinematics.joints import (
 from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
 from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, node_position
 from eigassign.mechanism.kinematics.topology import GROUND, Freedom, JointEdge, NodeName, split
-from eigassign.series.expression import Scalar, is_constant
+from eigassign.series.expression import Scalar
 
 Ints = NDArray[np.intp]
 MotionRow = dict[int, Scalar]
@@ -228,13 +228,7 @@ def add_springs(
     rigid = {nodes.count + k for k in motion.rigid}
     for k, here, there in SpringEnds(case, parameters, motion, nodes.rows, nodes.count).all():
         full = combined(there, here, -1.0)
-        row = [(i, value) for i, value in full.items() if i not in rigid and resists(k)]
-        target.add_square(k, row)
-
-
-def resists(stiffness: Scalar) -> bool:
-    """True where it is more than a plain zero."""
-    return not is_constant(stiffness) or stiffness != 0.0
+        target.add_square(k, [(i, value) for i, value in full.items() if i not in rigid])
 
 
 class SpringMotion(NamedTuple):

@@ -22,10 +22,10 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
-from eigassign.mechanism.assembly.node_motion import MotionRows, SpringEnds, resists
+from eigassign.mechanism.assembly.node_motion import MotionRows, SpringEnds
 from eigassign.mechanism.assembly.pencil import AffineEntries, Entries, joined
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.joints import DOFS, Objects, multiply
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, multiply, some
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import NodeName
@@ -116,7 +116,7 @@ def swinging(
         twist = placement.twist[kept][:, free]
         parts.append(np.concatenate([twist, pull[kept][:, None], inertia(link)], axis=1))
     table = parameters.with_passive(motion.passive).compiled(np.array(parts))
-    values = _at_poses(table, reference(case, parameters), _spans(case, parameters))
+    values = _at_poses(table, case, parameters)
     T, g, J = np.split(values, [len(free), len(free) + 1], axis=-1)
     work = np.einsum("slik,slij,sljo->sk", T, J, g)
     # |work| ≤ |g| √m √(Tᵀ J T) of every link: beside these sums round-off is none
@@ -156,7 +156,7 @@ def apart_from_rigid(
     moves = np.zeros(n_dof, dtype=bool)
     moves[list(rigid)] = True
     coupled, across = np.zeros_like(moves), moves[rows] & moves[columns]
-    for theta in _at_poses(table, reference(case, parameters), _spans(case, parameters)):
+    for theta in _at_poses(table, case, parameters):
         values = np.where(across, 0.0, factors * theta[place])
         size = abs(sparse.csr_array((values, (rows, columns)), shape=(n_dof, n_dof)))
         # of N against N/m and N m; a rider of this share of the weight is none
@@ -179,7 +179,7 @@ def _drawn_along(
     n_dof: int,
 ) -> Entries:
     """−K_EF C − Cᵀ K_FE, C = M_FF⁻¹ M_FE, of the rigid motions that are ``coupled``."""
-    place, some = ({dof: k for k, dof in enumerate(own)} for own in (rigid, coupled.tolist()))
+    place, among = ({dof: k for k, dof in enumerate(own)} for own in (rigid, coupled.tolist()))
     M_FF = np.zeros((len(place), len(place)), dtype=object)
     M_FE: dict[tuple[int, int], Floats] = {}  # by rigid motion and atom
     for i, j, atom, factor in zip(*(each.tolist() for each in M), strict=True):
@@ -188,12 +188,12 @@ def _drawn_along(
             M_FF[place[i], place[j]] = M_FF[place[i], place[j]] + value
         elif i in place:
             M_FE.setdefault((place[i], atom), np.zeros(n_dof))[j] += factor
-    unit = np.eye(len(place))[:, [place[f] for f in some]]
+    unit = np.eye(len(place))[:, [place[f] for f in among]]
     inverse = parameters.recorder.solve(M_FF.tolist(), unit.tolist())
     pull: dict[int, Objects] = {}  # K_EF row by row
     for i, f, atom, factor in zip(*K_EF, strict=True):
-        row = pull.setdefault(i, np.zeros(len(some), dtype=object))
-        row[some[f]] = row[some[f]] + parameters.recorder.function(atom) * factor
+        row = pull.setdefault(i, np.zeros(len(among), dtype=object))
+        row[among[f]] = row[among[f]] + parameters.recorder.function(atom) * factor
     out, every = AffineEntries(), np.arange(n_dof)
     for i, row in pull.items():
         shares = [one_atom(share) for share in multiply(np.array(inverse), row[:, None])[:, 0]]
@@ -220,13 +220,6 @@ def _recombined(
     return replace(motion, placements=moved, coordinates=rates, rigid=rigid, passive_rates=passive)
 
 
-def _spans(case: CaseFile, parameters: ModelParameters) -> Floats:
-    """How far z may be varied: a rad or m, and half of the range of a property."""
-    n = len(parameters.coordinates)
-    half = [0.5 * (high - low) for low, high in case.box]
-    return np.append(np.ones(n), parameters.to_z[n:, n:] @ half)
-
-
 def _rows(
     case: CaseFile, parameters: ModelParameters, motion: Kinematics, free: Sequence[int]
 ) -> tuple[Floats, tuple[str, ...]]:
@@ -241,14 +234,13 @@ def _rows(
     springs = list(SpringEnds(case, known, motion, stiff, 0).all())
     entries = [[[row.get(k, 0.0) for k in free] for row in pair] for _, *pair in springs]
     table = parameters.compiled(np.array(entries, dtype=object))
-    at_poses = _at_poses(table, reference(case, parameters), _spans(case, parameters))
-    values = np.moveaxis(at_poses, 0, -1)
+    values = np.moveaxis(_at_poses(table, case, parameters), 0, -1)
     ends = values.reshape(-1, 3, *values.shape[1:])  # three axes of v or ω together
     size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]
     apart = ends[:, :, 1] - ends[:, :, 0]
     noise = np.abs(apart).max(axis=3, keepdims=True) <= np.maximum(RESISTED * size, ROUND_OFF)
     rows = np.where(noise, 0.0, apart).reshape(len(springs), len(free), -1).swapaxes(1, 2)
-    held = [resists(k) for k, *_ in springs]
+    held = [some(k) for k, *_ in springs]
     paths = [
         f"springs.{name}.{key}"
         for name in case.mechanism.springs
@@ -257,9 +249,14 @@ def _rows(
     return rows[held], tuple(path for path, holds in zip(paths, held, strict=True) if holds)
 
 
-def _at_poses(table: CompiledArrays, z: Floats, span: Floats) -> Floats:
-    """Values (n_poses, …) at the reference and at random places about it."""
-    rng = np.random.default_rng(0)
+def _at_poses(table: CompiledArrays, case: CaseFile, parameters: ModelParameters) -> Floats:
+    """Values (n_poses, …) at random places about the reference, else twice there.
+
+    They are within a rad or m of it, and half of the range of a property.
+    """
+    z, n, rng = reference(case, parameters), len(parameters.coordinates), np.random.default_rng(0)
+    half = [0.5 * (high - low) for low, high in case.box]
+    span = np.append(np.ones(n), parameters.to_z[n:, n:] @ half)
     # six poses tell what a direction that changes with the pose resists
     directions = rng.uniform(-1.0, 1.0, (len(z), 6)) * span[:, None]
     for reach in REACH:
