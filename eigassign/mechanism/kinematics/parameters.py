@@ -283,24 +283,19 @@ def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails 
         [station(parameters, tree, joint) for joint, _ in riders],
         [length(case, parameters, link) for _, link in riders],
     ]
+    links: Any = case.mechanism.links
+    n = np.array([links[link].elements for _, link in riders])
+    # 1e-4 of the beam's length, or a tenth of an element's share of it
+    shortest, first = np.minimum(1e-4, 0.1 / n), np.maximum(1, n // 2)
     return Rails(
         tuple(joint for joint, _ in riders),
         tuple(link for _, link in riders),
-        np.array([_margins(case, link) for _, link in riders]),
+        np.stack([first * shortest, np.maximum(1, n - first) * shortest], axis=1),
         parameters.compiled(np.array(scalars, dtype=object).T),
         parameters.coordinates,
         case.coordinate_units,
         tuple(SI("m", case.value_at(f"links.{link}.length"), "m") for _, link in riders),
     )
-
-
-def _margins(case: CaseFile, link: str) -> tuple[float, float]:
-    data: Any = case.mechanism.links[link]
-    n = data.elements
-    first = max(1, n // 2)
-    # 1e-4 of the beam's length, or a tenth of an element's share of it
-    shortest = min(1e-4, 0.1 / n)
-    return first * shortest, max(1, n - first) * shortest
 
 
 def resting_pose(case: CaseFile) -> Floats:

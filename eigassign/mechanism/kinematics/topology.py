@@ -253,8 +253,14 @@ def coordinates(case: CaseFile, tree: Topology) -> CoordinateMap:
     moves = [c.moves for c in case.coordinates.values()]
     columns = tuple(i for i, how in enumerate(moves) if how != "locked")
     free = tuple(i for i in columns if moves[i] == "free")
+    # ṡ per q̇: a held joint's own deflection, and free coordinates while all others stand still;
+    # q̇ = A⁻¹ ṡ, restricted to the free ones ṡ_F = [(A⁻¹)_FF]⁻¹ q̇_F
+    driven = np.eye(len(relative))
+    if not np.array_equal(relative, driven):
+        driven[np.ix_(free, free)] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
+        driven[np.abs(driven) < 1e-12] = 0.0  # round-off of two inverses of a matrix of 0, ±1
     rates = np.zeros((len(tree.freedoms), len(columns)))
-    rates[: len(moves)] = _joint_rates(relative, columns, free)
+    rates[: len(moves)] = driven[:, list(columns)]
     return CoordinateMap(relative, offset, columns, rates)
 
 
@@ -324,15 +330,3 @@ def _carried_angle(
         turn, constant = relative[own[0]], constant + offset[own[0]]
     sign = -1.0 if edge.turned else 1.0
     return below[0] + sign * turn, below[1] + sign * constant
-
-
-def _joint_rates(relative: Floats, columns: tuple[int, ...], free: tuple[int, ...]) -> Floats:
-    """ṡ per q̇: a held joint's own deflection, and free coordinates while all others stand still.
-
-    q̇ = A⁻¹ ṡ; restricted to the free ones, ṡ_F = [(A⁻¹)_FF]⁻¹ q̇_F.
-    """
-    rates = np.eye(len(relative))
-    if not np.array_equal(relative, rates):
-        rates[np.ix_(free, free)] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
-        rates[np.abs(rates) < 1e-12] = 0.0  # round-off of two inverses of a matrix of 0, ±1
-    return np.asarray(rates[:, list(columns)])
