@@ -62,6 +62,9 @@ def section_values(section: Any, number: Lookup) -> SectionValues:
         **{"circle": _circle, "tube": _tube, "rectangle": _rectangle},
         **{"box": _box, "i_profile": _i_profile, "bare": _bare},
     }
+    if section.shape not in kinds:
+        what = f"sections of shape {section.shape!r}"
+        raise NotImplementedError(f"no properties are defined for {what}")
     return kinds[section.shape](section, number, SHEAR.get(section.shape, 0.0))
 
 
