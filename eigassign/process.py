@@ -16,7 +16,7 @@ from contextlib import suppress
 from functools import cache
 from time import monotonic
 from types import FrameType
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple
 
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError
 from eigassign.files import CASE, printable, read_bytes
@@ -289,7 +289,7 @@ def refuse_closed_stdout() -> None:
 def replace_what_cannot_be_encoded() -> None:
     """Write ``?`` for what the terminal's character set lacks, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, ValueError):
+        with suppress(AttributeError, ValueError):
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
 
 
@@ -305,14 +305,10 @@ def flush_streams() -> None:
             if stream is not None and not stream.closed:
                 stream.flush()
         except OSError as error:
-            _silence(stream)
+            with suppress(OSError, ValueError):
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, stream.fileno())
+                os.close(nowhere)
             failure = failure or error
     if failure is not None:
         raise failure
-
-
-def _silence(stream: TextIO) -> None:
-    with contextlib.suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)

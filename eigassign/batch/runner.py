@@ -137,14 +137,20 @@ def run(
         on_start(len(batch.plan), len(rows))
         stages = Stages(say)
 
-        def count(found: CaseOutcome) -> None:
+        def keep(_variant: Variant, found: CaseOutcome) -> None:
+            rows[found.index] = found
             on_outcome(found)
             stages.advance(sum(index in rows for index in todo), len(todo))
 
+        def lose(variant: Variant) -> None:
+            message = "the process that ran it was killed, perhaps because memory ran out"
+            keep(variant, outcome_of(variant, "error", message=message))
+
+        work, tasks = partial(run_case, options=batch.options), (batch.plan[k] for k in todo)
         try:
             with stages("cases", "optimizing"):
                 stages.advance(0, len(todo) or 1)
-                _run(batch, todo, rows, workers, count)
+                run_all(workers, tasks, work, keep, lose)
         finally:
             told = summarise(batch, rows)
     return told
@@ -184,24 +190,3 @@ def _lost_in_check(task: Sequence[Variant]) -> NoReturn:
     which = task[0].name if len(task) == 1 else f"{task[0].name} to {task[-1].name}"
     what = "the process that checked it was killed, perhaps because memory ran out"
     raise StorageError(f"{task[0].path}: {which}: {what}")
-
-
-def _run(
-    batch: Batch,
-    todo: Sequence[int],
-    rows: Rows,
-    workers: Workers,
-    on_outcome: Callable[[CaseOutcome], None],
-) -> None:
-    """Run the cases ``todo``; how each ended comes into ``rows``."""
-
-    def keep(_variant: Variant, found: CaseOutcome) -> None:
-        rows[found.index] = found
-        on_outcome(found)
-
-    def lose(variant: Variant) -> None:
-        message = "the process that ran it was killed, perhaps because memory ran out"
-        keep(variant, outcome_of(variant, "error", message=message))
-
-    work = partial(run_case, options=batch.options)
-    run_all(workers, (batch.plan[index] for index in todo), work, keep, lose)

@@ -97,7 +97,8 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
             build = partial(_fitted, subject, partial(_polynomials, degree))
             yield Method(Kind.SURFACE, f"degree {degree}", build, max(2 * terms, 12))
     for curve, fit, counts in (
-        (Kind.RADIAL, _radial, effort.learnt),
+        # RBFInterpolator as it is: thin plate splines
+        (Kind.RADIAL, lambda u, hz: (RBFInterpolator(u, hz), None), effort.learnt),
         (Kind.KRIGING, _kriged, effort.kriged if find_spec("sklearn") else ()),
     ):
         for count in counts:
@@ -213,11 +214,6 @@ def _polynomials(degree: int, u: Floats, hz: Floats) -> Fits:
     mean = hz.mean(axis=0)  # which too few points would not give
     coefficients = lstsq(terms(u), hz - mean)[0]
     return lambda at: np.asarray(mean + terms(at) @ coefficients), None
-
-
-def _radial(u: Floats, hz: Floats) -> Fits:
-    """scipy.interpolate.RBFInterpolator as it is: thin plate splines."""
-    return RBFInterpolator(u, hz), None
 
 
 def _kriged(u: Floats, hz: Floats) -> Fits:

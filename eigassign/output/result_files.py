@@ -34,10 +34,9 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         for row in results.trajectories
     }
     files["frequencies.csv"] = csv_text(frequency_columns(results))
-    if results.drives:
-        files["drives.csv"] = csv_text([*_samples(results), *_both(results.drives)])
-    if results.statics:
-        files["statics.csv"] = csv_text([*_samples(results), *_both(results.statics)])
+    for name, rows in {"drives.csv": results.drives, "statics.csv": results.statics}.items():
+        if rows:
+            files[name] = csv_text([*_samples(results), *_both(rows)])
     return files
 
 

@@ -367,16 +367,7 @@ def _motion(results: RunResults) -> Iterator[Table]:
 
 
 def _appendix(results: RunResults) -> Iterator[Table]:
-    """Expansions; the certificate of the one shot."""
-    yield _approximation(results)
-    solver = () if results.solver is None else (results.solver,)
-    names = "status iterations primal_residual dual_residual gap"
-    caption = "Residuals, computed again from the data of the scaled program."
-    yield facts_table("Solver", solver, names, caption)
-
-
-def _approximation(results: RunResults) -> Table:
-    """Worst error of both expansions, along the trajectory and everywhere."""
+    """Worst error of both expansions, along and everywhere; the certificate of the one shot."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error of the frequency, against exact solves."
     where = {
@@ -389,7 +380,11 @@ def _approximation(results: RunResults) -> Table:
         for place, worst in study.max_relative.items()
         if worst is not None
     ]
-    return Table("Approximation", columns, tuple(rows), caption)
+    yield Table("Approximation", columns, tuple(rows), caption)
+    solver = () if results.solver is None else (results.solver,)
+    names = "status iterations primal_residual dual_residual gap"
+    caption = "Residuals, computed again from the data of the scaled program."
+    yield facts_table("Solver", solver, names, caption)
 
 
 SECTIONS = {  # of a page, with their headings; what is in none is in the appendix

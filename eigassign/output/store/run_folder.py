@@ -230,20 +230,16 @@ def require_replaceable(target: Path, run: RunOf, *, force: bool, case_path: Pat
     """Raise StorageError unless a run of this case may be put at ``target``."""
     if os.path.ismount(target):
         raise StorageError(f"{target} is a mount point; choose a folder inside it with --out")
-    _require_apart(target, case_path)
+    keep = {"the working folder": Path.cwd(), "the case file": Path(os.path.realpath(case_path))}
+    for name, path in keep.items():
+        if target == path or target in path.parents:
+            raise StorageError(f"{target} holds {name} and cannot become a run folder; use --out")
     reason = _objection(target, run)
     if reason and not force:
         raise StorageError(
             f"{target} {reason}; it was left alone. Choose another folder with --out, "
             f"or use --force to move it aside"
         )
-
-
-def _require_apart(target: Path, case_path: Path) -> None:
-    keep = {"the working folder": Path.cwd(), "the case file": Path(os.path.realpath(case_path))}
-    for name, path in keep.items():
-        if target == path or target in path.parents:
-            raise StorageError(f"{target} holds {name} and cannot become a run folder; use --out")
 
 
 def _objection(target: Path, run: RunOf) -> str | None:
@@ -288,7 +284,9 @@ def _settle(hidden: Path, target: Path) -> None:
                 os.rename(hidden, target)
                 return
             if published and not _is_replaced(hidden, target):
-                aside = _free_sibling(target)
+                number = 1
+                while os.path.lexists(aside := target.with_name(f"{target.name}.{number}")):
+                    number += 1
                 try:
                     os.rename(hidden, aside)
                 except FileNotFoundError:
@@ -315,10 +313,3 @@ def _is_replaced(old: Path, target: Path) -> bool:
     if record is None:
         return not any(old.iterdir())
     return new is not None and new.run.is_same_case(record.run) and is_untouched(old)
-
-
-def _free_sibling(target: Path) -> Path:
-    number = 1
-    while os.path.lexists(target.with_name(f"{target.name}.{number}")):
-        number += 1
-    return target.with_name(f"{target.name}.{number}")
