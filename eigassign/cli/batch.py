@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import eigassign.cli.arguments as arguments
+from eigassign.brief import counted
 from eigassign.cli.arguments import Reporter, reporting, show
 from eigassign.files import folder_name
 
 if TYPE_CHECKING:
     from eigassign.batch.plan import BatchPlan
     from eigassign.batch.runner import Batch
-    from eigassign.batch.workers import Workers
     from eigassign.output.batch.summary import CaseOutcome
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
@@ -65,6 +65,7 @@ def batch(
     skipped: repeat the command to continue after an interruption. A failed case does not stop the
     others. Exit code 1 if a case failed.
     """
+    from eigassign.batch import runner
     from eigassign.batch.plan import cases_in, plan_of
     from eigassign.batch.work import idle_keys
     from eigassign.batch.workers import this_machine
@@ -78,8 +79,19 @@ def batch(
         workers = this_machine(jobs)
         reporter.warn(idle_keys(plan, asked.options))
         if dry_run:
-            return _tell(asked, workers, reporter)
-        rows = _watched(asked, workers, reporter)
+            there = runner.done(asked)
+            todo = runner.require_valid(asked, there, workers, reporter.stage)
+            show(f"{counted(len(todo), 'case')} would run, {len(there)} are done and still current")
+            return 0
+
+        def on_start(total: int, done: int) -> None:
+            if done:
+                reporter.note(f"{done} of {total} cases are done and still current: skipped")
+
+        def on_outcome(found: CaseOutcome) -> None:
+            reporter.stage(f"{found.name}: {found.word}")
+
+        rows = runner.run(asked, workers, on_start, on_outcome, reporter.stage)
         return _told(asked.folder, rows, reporter)
 
 
@@ -109,34 +121,6 @@ def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
     listed = [*rows] if len(rows) <= _MANY else bad[:_MANY]
     console.print_tables([batch_table(listed, console.width(100))] if listed else [])
     if bad:
-        reporter.error(f"{len(bad)} of {_cases(len(rows))} gave no answer to use")
-    show(f"{folder / 'index.html'}: {_cases(len(rows))}, {said(rows) or 'nothing to run'}")
+        reporter.error(f"{len(bad)} of {counted(len(rows), 'case')} gave no answer to use")
+    show(f"{folder / 'index.html'}: {counted(len(rows), 'case')}, {said(rows) or 'nothing to run'}")
     return 1 if bad else 0
-
-
-def _watched(batch: Batch, workers: Workers, reporter: Reporter) -> list[CaseOutcome]:
-    """Run it with progress; the rows of all."""
-    from eigassign.batch import runner
-
-    def on_start(total: int, done: int) -> None:
-        if done:
-            reporter.note(f"{done} of {total} cases are done and still current: skipped")
-
-    def on_outcome(found: CaseOutcome) -> None:
-        reporter.stage(f"{found.name}: {found.word}")
-
-    return runner.run(batch, workers, on_start, on_outcome, reporter.stage)
-
-
-def _cases(count: int) -> str:
-    return "1 case" if count == 1 else f"{count} cases"
-
-
-def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
-    """Count the cases that would run."""
-    from eigassign.batch.runner import done, require_valid
-
-    there = done(batch)
-    todo = require_valid(batch, there, workers, reporter.stage)
-    show(f"{_cases(len(todo))} would run, {len(there)} are done and still current")
-    return 0

@@ -193,7 +193,11 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     )
     expansions = Expansions(fulls, linears, plan.order, full_order)
     (full, linear), known = made[0]
-    notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
+    notes = [
+        f"order {plan.order} in {full.space.n_variables} variables: {len(linear.space)} "
+        f"coefficients partially linearised, {len(full.space)} in full",
+        *dict.fromkeys(full.notes + linear.notes),
+    ]
     if full_order < plan.order:
         notes.append(
             f"the full expansion, only there to compare with, stops at order {full_order}: order "
@@ -202,14 +206,6 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     if known:
         notes.append("the expansion coefficients come from the cache")
     return expansions, notes
-
-
-def _size_note(expansions: Expansions) -> str:
-    full, linear = expansions.full.space, expansions.linear.space
-    return (
-        f"order {expansions.order} in {full.n_variables} variables: {len(linear)} coefficients "
-        f"partially linearised, {len(full)} in full"
-    )
 
 
 def affordable_order(model: Model, order: int) -> int:

@@ -69,46 +69,40 @@ def study_targets(
 
     A wanted frequency is satisfied within ``max_error``, a limit where nothing violates it.
     """
-    weights = time_weights(path)
-    return tuple(
-        _studied(one, solved, curve, one.time_weights(weights), max_error, path.time_s[one.rows])
-        for one, curve in zip(wanted, predicted, strict=True)
-    )
-
-
-def _studied(
-    asked: Requirement,
-    solved: SolvedDesigns,
-    predicted: Floats | None,
-    weights: Floats,
-    max_error: float,
-    time_s: Floats,
-) -> TargetStudy:
+    found, times = list[TargetStudy](), time_weights(path)
     before, after, one_shot = solved.initial, solved.exact, solved.one_shot
-    errors = {
-        "initial": asked.errors(before),
-        "exact": asked.errors(after),
-        "predicted": None if predicted is None else predicted / asked.hz - 1.0,
-        "one_shot": None if one_shot is None else asked.errors(one_shot),
-    }
-    summary, near = _summary(errors, weights), asked.near(before, after)
-    return TargetStudy(
-        asked=asked,
-        time_s=time_s,
-        initial_hz=asked.curve(before),
-        exact_hz=asked.curve(after),
-        predicted_hz=predicted,
-        one_shot_hz=None if one_shot is None else asked.curve(one_shot),
-        error=summary,
-        satisfied=bool(summary.exact.max_relative <= (max_error if asked.is_goal else MET)),
-        weight_s=float(weights.sum()),
-        along=tuple(
-            TargetAlong(name, own, _summary(errors, weights, own)) for name, own in asked.along
-        ),
-        followed=tuple(_followed(asked, before, after)),
-        near=None if near is None else mode_rows(near, before, after, asked.rows),
-        room=_room(asked, after),
-    )
+    for asked, curve in zip(wanted, predicted, strict=True):
+        weights, rows = asked.time_weights(times), asked.rows
+        errors = {
+            "initial": asked.errors(before),
+            "exact": asked.errors(after),
+            "predicted": None if curve is None else curve / asked.hz - 1.0,
+            "one_shot": None if one_shot is None else asked.errors(one_shot),
+        }
+        summary, near = _summary(errors, weights), asked.near(before, after)
+        each = [(name, own, _summary(errors, weights, own)) for name, own in asked.along]
+        followed = zip(asked.followed, asked.followed_numbers, strict=True)
+        found.append(
+            TargetStudy(
+                asked=asked,
+                time_s=path.time_s[rows],
+                initial_hz=asked.curve(before),
+                exact_hz=asked.curve(after),
+                predicted_hz=curve,
+                one_shot_hz=None if one_shot is None else asked.curve(one_shot),
+                error=summary,
+                satisfied=bool(summary.exact.max_relative <= (max_error if asked.is_goal else MET)),
+                weight_s=float(weights.sum()),
+                along=tuple(TargetAlong(*one) for one in each),
+                followed=tuple(
+                    FollowedRow(one.name, one.like, before.numbers[rows, k], after.numbers[rows, k])
+                    for one, k in followed
+                ),
+                near=None if near is None else mode_rows(near, before, after, rows),
+                room=_room(asked, after),
+            )
+        )
+    return tuple(found)
 
 
 def _room(asked: Requirement, solved: Solved) -> float | None:
@@ -121,12 +115,6 @@ def _room(asked: Requirement, solved: Solved) -> float | None:
         curve = asked.curve(solved)
         beyond = [float((row.scale * (curve - row.edge)).max()) for row in asked.edge_rows()]
     return None if np.isinf(max(beyond)) else -max(beyond)
-
-
-def _followed(asked: Requirement, before: Solved, after: Solved) -> Iterator[FollowedRow]:
-    for mode, k in zip(asked.followed, asked.followed_numbers, strict=True):
-        numbers = (solved.numbers[asked.rows, k] for solved in (before, after))
-        yield FollowedRow(mode.name, mode.like, *numbers)
 
 
 def mode_rows(
