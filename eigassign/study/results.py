@@ -59,6 +59,14 @@ WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is k
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 
 
+def _lowest(hz: Floats) -> str:
+    return number(float(hz.min()))
+
+
+def _highest(hz: Floats) -> str:
+    return number(float(hz.max()))
+
+
 def violated(worst: float) -> str:
     """``violated by 1.55 %``; ``met`` where no more than round-off is left."""
     return f"violated by {percent(worst)}" if worst > MET else "met"
@@ -759,8 +767,8 @@ class RangeRow:
     """
 
     label: Annotated[str, Fact("the target in words", "target")]
-    lowest_hz: Annotated[Curve, Fact(digits=lambda hz: number(float(hz.min())))]
-    highest_hz: Annotated[Curve, Fact(digits=lambda hz: number(float(hz.max())))]
+    lowest_hz: Annotated[Curve, Fact(digits=_lowest)]
+    highest_hz: Annotated[Curve, Fact(digits=_highest)]
     how: str
     error: Annotated[Share, Fact(digits=positive_percent)]
 
