@@ -369,6 +369,7 @@ def _tree(thing: Any, leaves: dict[str, list[Array]]) -> Any:
         leaves["f" if thing.dtype.kind == "f" else "i"].append(thing.ravel())
         return {"array": thing.dtype.kind, "shape": thing.shape}
     if is_dataclass(thing):
-        members = {f.name: _tree(getattr(thing, f.name), leaves) for f in fields(thing)}
+        own = (f.name for f in fields(thing) if f.compare)
+        members = {name: _tree(getattr(thing, name), leaves) for name in own}
         return {"class": type(thing).__name__, "fields": members}
     raise UsageError(f"a {type(thing).__name__} cannot be stored")

@@ -7,7 +7,7 @@ reached from a_0 in small steps, and a passage through a singular ∂F/∂p is r
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -58,7 +58,8 @@ class ImplicitFunction:
     p0: Floats
     names: tuple[str, ...]
     title: str
-    shown: Callable[[Floats], str] | None = None  # arguments in words; plain numbers without
+    # arguments in words, plain numbers without; changes no number, and no key of the cache
+    shown: Callable[[Floats], str] | None = field(default=None, compare=False)
 
     @cached_property
     def found(self) -> dict[bytes, Floats]:
