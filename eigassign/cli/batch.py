@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import eigassign.cli.arguments as arguments
-from eigassign.brief import counted
 from eigassign.cli.arguments import Reporter, reporting, show
 from eigassign.files import folder_name
 
@@ -69,6 +68,7 @@ def batch(
     from eigassign.batch.plan import cases_in, plan_of
     from eigassign.batch.work import idle_keys
     from eigassign.batch.workers import this_machine
+    from eigassign.brief import counted
 
     cases = cases_in(paths)
     plan = plan_of(cases, settings)
@@ -114,6 +114,7 @@ def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
 
 def _told(folder: Path, rows: Sequence[CaseOutcome], reporter: Reporter) -> int:
     """Show how the cases ended, all of them or the first that failed; the exit code."""
+    from eigassign.brief import counted
     from eigassign.output import console
     from eigassign.output.batch.summary import batch_table, said
 
