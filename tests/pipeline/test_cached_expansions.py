@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from run_cases import ONE_SHOT, TARGET, automatic, case_of, chain, shipped
+from run_cases import ONE_SHOT, SHIPPED, TARGET, automatic, case_of, chain, shipped
 from scipy import sparse
 
 from eigassign import Case
@@ -39,6 +39,7 @@ def assert_same_bits(one: Expansion, other: Expansion) -> None:
         shipped(),
         automatic((TARGET, TARGET + "\n  - {mode: 2, frequency: 450 Hz}")),
         chain(3, "{stiffness: 3000}", "absolute"),
+        (SHIPPED.parent / "four_bar.yaml").read_text("utf-8"),  # loops
     ],
 )
 def test_a_hit_equals_a_recomputation_bit_for_bit(text: str, tmp_path: Path) -> None:
