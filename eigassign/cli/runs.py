@@ -179,6 +179,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 )
 @click.argument("runs", nargs=-1, required=True, type=arguments.PATH)
 @arguments.out("results")
+@arguments.force
 @arguments.json
 @arguments.common
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any) -> int:
@@ -190,13 +191,12 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any)
     """
     from eigassign.output.console import print_tables
     from eigassign.output.reports.compare import comparison, read_results
-    from eigassign.output.store.atomic import replace_synced
+    from eigassign.output.store.run_folder import put_page
 
     with reporting(how):
         tables, page = comparison({str(run): read_results(run) for run in runs})
         place = (out or Path("results")) / "compare.html"
-        place.parent.mkdir(parents=True, exist_ok=True)
-        replace_synced(place, page)
+        put_page(place, page, force=how["force"])
     if as_json:
         print_json({"page": str(place), "tables": [table._asdict() for table in tables]})
         return 0
@@ -222,12 +222,7 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any)
 @arguments.caching
 @arguments.json
 @arguments.common
-def validate(
-    cases: tuple[Path, ...],
-    junit: Path | None,
-    as_json: bool,
-    **how: Any,
-) -> int:
+def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: Any) -> int:
     """Compare the expansion with exact frequencies.
 
     Compares the full expansion, and the one that is linear in the design, along the trajectory,
@@ -250,9 +245,8 @@ def validate(
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
-                tests.append(
-                    (case.stem, str(case), 0.0, "error", process.failure_of(error).text, "")
-                )
+                text = process.failure_of(error).text
+                tests.append((case.stem, str(case), 0.0, "error", text, ""))
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)

@@ -41,6 +41,7 @@ MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 ANSWER = ("Design", "Objective", "Distance to the target", "Limits and bands")  # on a terminal
+RUNS = "runs"  # the section whose columns are runs, with cells of all kinds: all to the left
 _RANGES = "label lowest_hz highest_hz error"
 
 
@@ -60,7 +61,8 @@ class Table(NamedTuple):
     def numeric(self) -> tuple[bool, ...]:
         """True for each column of numbers, whatever their unit; empty cells do not count."""
         cells = ([row[k] for row in self.rows if row[k]] for k in range(len(self.columns)))
-        return tuple(bool(column) and all(map(_is_number, column)) for column in cells)
+        alike = self.section != RUNS
+        return tuple(alike and bool(own) and all(map(_is_number, own)) for own in cells)
 
     def without(self, name: str) -> Table:
         """The table without this column."""

@@ -152,14 +152,15 @@ def _answer(
     }
 
 
-def _orders(file: CaseFile) -> Iterator[tuple[float, float]]:
-    """The multiples that targets name, and of what in Hz; once of what they write in rpm."""
+def _orders(file: CaseFile) -> Iterator[tuple[float, float, float]]:
+    """The multiples that targets name, of what in Hz, ± what; once of what they write in rpm."""
     for target in file.targets:
-        times = getattr(getattr(target, "keep_out", None), "harmonic", None)
-        values: list[Any] = []
+        band = getattr(target, "keep_out", None)
+        times, margin = (getattr(band, key, 0.0) for key in ("harmonic", "margin"))
+        each: list[Any] = []
         for _, curve in target.frequencies:
-            values += getattr(curve, "frequency", (curve,))
-        yield from ((times or 1.0, hz) for hz in values if times or SI("Hz", hz).answered == "rpm")
+            each += getattr(curve, "frequency", (curve,))
+        yield from ((times or 1, f, margin) for f in each if times or SI("Hz", f).answered == "rpm")
 
 
 def _checked(target: TargetStudy, found: Sequence[ClearanceRow]) -> TargetStudy:

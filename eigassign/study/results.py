@@ -128,9 +128,7 @@ class ModeStudy(Brief):
     everywhere: Unwritten[Comparison | None] = None  # between the samples, all over the bounds
 
     @property
-    def max_relative(
-        self,
-    ) -> Annotated[Mapping[str, Mapping[str, Share] | None], _OF_EXPANSIONS]:
+    def max_relative(self) -> Annotated[Mapping[str, Mapping[str, Share] | None], _OF_EXPANSIONS]:
         """The largest errors of both expansions by where they were looked for."""
         places = {"over_time": (self.over_time, 1.0), "everywhere": (self.everywhere, MARGIN)}
         return {
@@ -608,8 +606,7 @@ class RobustTarget(InOneUnit):
     nominal: Annotated[InUnit, Fact("of the optimum without deviations", "alone")]
     robust: InUnit
     nominal_worst: Annotated[
-        Share | None,
-        Fact("of the optimum without deviations", "deviated alone", absent="no modes"),
+        Share | None, Fact("of the optimum without deviations", "deviated alone", absent="no modes")
     ]
     worst: Annotated[Share, Fact("found by a search", "deviated", digits=positive_percent)]
     drawn: Annotated[Share, Fact("of random deviations", "at random")]
@@ -1022,7 +1019,7 @@ class RunResults(Origin):
     q: Unwritten[Floats]  # (n_t, n_q), of several trajectories one after the other
     poses: Unwritten[DrawnPoses]
     reduced: Unwritten[bool] = False  # links are
-    orders: Unwritten[tuple[tuple[float, float], ...]] = ()  # multiples, and of what, Hz
+    orders: Unwritten[tuple[tuple[float, float, float], ...]] = ()  # multiple, of what Hz, margin
     given: Unwritten[tuple[str, ...]] = ()  # links, drives, what it carries where: a line each
     spectrum: Unwritten[tuple[ModeRow, ...]] = ()  # up to the mode above the highest asked for
     # by trajectory: instants between the samples too, and the modes there, where that is cheap

@@ -3,12 +3,13 @@
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
 from eigassign.cli import main
-from eigassign.output import run_folder
+from eigassign.output import comparison, read_results, run_folder
 
 TEMPLATE = Path(__file__).parents[2] / "eigassign" / "starters" / "planar_arm.yaml"
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -113,7 +114,7 @@ def test_of_equal_durations_the_time_is_shown(capsys: pytest.CaptureFixture[str]
         ("lost", 2, "lost: a file of it was changed or lost"),
         ("edited", 2, "edited: a file of it was changed or lost"),
         ("older", 2, "older: its results.json has schema 2, and"),
-        ("drawn", 2, "drawn is no run of eigassign optimize"),
+        ("drawn", 2, "drawn is not a run of eigassign optimize, or its case has no targets"),
     ],
 )
 def test_what_is_no_run_is_refused_by_its_name(
@@ -130,6 +131,66 @@ def test_what_is_no_run_is_refused_by_its_name(
     assert main(["compare", "results/two", name]) == code
     assert says in capsys.readouterr().err
     assert not Path("results/compare.html").exists()
+
+
+def drawn(page: Path) -> dict[str, Any]:
+    """The plot of the frequencies on a page."""
+    text = page.read_text().partition('id="figures">')[2].partition("</script>")[0]
+    plot: dict[str, Any] = json.loads(text)["compared"]
+    return plot
+
+
+def test_modes_that_are_far_off_do_not_squash_what_is_compared(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = Path("results/one/results.json")
+    found = read_results(Path("results/one"))
+    band = next(row for row in found["targets"] if row["kind"] == "keep_out")
+    band["near"].append({**band["near"][0], "mode": 9, "optimal_hz": [383.0] * 21})
+    page = comparison({"one": found, "two": read_results(Path("results/two"))})[1]
+    path.with_name("page.html").write_bytes(page)
+    low, high = drawn(path.with_name("page.html"))["layout"]["yaxis"]["range"]
+    assert 0.0 <= low < 14.0
+    assert 26.0 < high < 60.0
+    assert "Outside the axis: mode 9, one." in page.decode()
+
+
+def test_without_frequencies_that_are_wanted_there_is_no_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    case = yaml.safe_load(Path("one.yaml").read_text())
+    case["targets"] = [{"keep_out": ["14 Hz", "15 Hz"]}]
+    Path("band.yaml").write_text(json.dumps(case))
+    main(["optimize", "band.yaml", *LITTLE])
+    runs = compared("band.yaml", "one.yaml", capsys=capsys)["Runs"]
+    assert runs["worst error"][0] == runs["worst error before"][0] == runs["rms error"][0] == ""
+    assert runs["worst error"][1] != ""
+    assert runs["worst violation"][0] != ""
+    assert not {"worst error", "rms error"} & set(compared("band.yaml", capsys=capsys)["Runs"])
+
+
+def test_what_is_no_page_of_ours_is_left_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    page = Path("side/compare.html")
+    page.parent.mkdir()
+    page.write_text("<p>my own</p>")
+    assert main(["compare", "one.yaml", "--out", "side"]) == 3
+    assert "side/compare.html is no page of eigassign; it was left alone" in capsys.readouterr().err
+    assert page.read_text() == "<p>my own</p>"
+    assert main(["compare", "one.yaml", "--out", "side", "--force"]) == 0
+    assert Path("side/compare.html.1").read_text() == "<p>my own</p>"
+    assert main(["compare", "two.yaml", "--out", "side"]) == 0  # one of ours
+    assert "results/two" not in page.read_text() and "two.yaml" in page.read_text()
+    assert "Case <code>" not in page.read_text()
+    for inside in ("results/one", "results/one/figures"):
+        assert main(["compare", "one.yaml", "--out", inside, "--force"]) == 3
+        assert "run folder; choose another with --out" in capsys.readouterr().err
+    assert not Path("results/one/figures").exists()
+    assert not Path("results/one/compare.html").exists()
+
+
+def test_cells_stand_alike_in_all_tables() -> None:
+    runs = {name: read_results(Path("results", name)) for name in ("one", "two")}
+    assert all(not any(table.numeric) for table in comparison(runs)[0])
 
 
 def test_a_page_that_cannot_be_written_is_an_io_error(capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,19 +16,7 @@ from numpy.typing import NDArray
 from eigassign.case.units import handy_unit
 from eigassign.facts import capital
 from eigassign.output.figures import graph
-from eigassign.output.figures.graph import (
-    Curve,
-    FigurePlan,
-    Graph,
-    Look,
-    Mark,
-    Panel,
-    Rule,
-    Shade,
-    labelled,
-    series,
-    short,
-)
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
 from eigassign.study.results import ModeRow, RunResults, StaticRow, TargetStudy
 
 Floats = NDArray[np.float64]
@@ -60,10 +48,13 @@ def coordinates(results: RunResults) -> FigurePlan:
     units = list(dict.fromkeys(each))
     for unit, said, size in units:
         own = [i for i, other in enumerate(each) if other == (unit, said, size)]
-        curves = (Curve(results.q[:, i] / size, series(i), short(results.q_names[i])) for i in own)
+        curves = (
+            Curve(results.q[:, i] / size, graph.series(i), graph.short(results.q_names[i]))
+            for i in own
+        )
         quantity = {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate")
         height = 2.6 if len(units) == 1 else 1.8
-        panels.append(Panel(labelled(quantity, said), tuple(curves), height))
+        panels.append(Panel(graph.labelled(quantity, said), tuple(curves), height))
     title = f"Coordinates along {results.along}"
     return FigurePlan(
         f"coordinates{suffix(results)}",
@@ -87,11 +78,11 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
         values = [curve / size for curve in (row.initial_curve, row.optimal_curve)]
         edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
         edges = [edge for edge in edges if any((edge * v > 0.0).any() for v in values)]
-        label = short(row.name, 12) if drives else f"{k}: {row.name.partition(' ')[0]}"
+        label = graph.short(row.name, 12) if drives else f"{k}: {row.name.partition(' ')[0]}"
         curves = map(Curve, values, (_BEFORE, _AFTER))
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
         holds = (np.array([0.0, *edges]),)
-        panels.append(Panel(labelled(label, unit), marks, 1.3, holds=holds))
+        panels.append(Panel(graph.labelled(label, unit), marks, 1.3, holds=holds))
     limited = any(row.limit for row in rows)
     panels[0] = replace(panels[0], key=(*BEFORE_AND_AFTER, *((("limit", EDGE),) * limited)))
     if drives:
@@ -270,10 +261,18 @@ def campbell(results: RunResults) -> FigurePlan:
 
     Order h excites h n/60 Hz at n rpm; it meets a mode at speeds between 60/h times its ends.
     """
-    speeds = sorted({60.0 * hz for _, hz in results.orders})
-    rpm, marks = np.array([0.0, 1.3 * speeds[-1]]), list[Mark]()
-    orders = {f"order {h:g}": h / 60.0 for h, _ in sorted(results.orders)}
-    top = 1.1 * rpm[1] * max(orders.values())
+    speeds = sorted({60.0 * hz for _, hz, _ in results.orders})
+    rpm, marks, meets = np.array([0.0, 1.3 * speeds[-1]]), list[Mark](), list[Mark]()
+    orders = {f"order {h:g}": h / 60.0 for h, *_ in sorted(results.orders)}
+    points = [h * hz for h, hz, _ in results.orders]
+    tops = (float(row.optimal_hz.max()) for row in results.spectrum)
+    above = min((hz for hz in tops if hz > max(points)), default=0.0)  # the next mode is in view
+    top = 1.1 * max(rpm[1] * max(orders.values()), above)
+    wanted = {m for one in results.targets if one.asked.is_goal for m in one.numbers}
+    for h, margin in sorted({(h, margin) for h, _, margin in results.orders if margin}):
+        low, high = (h / 60.0 * (1.0 + side) * rpm for side in (-margin, margin))
+        words = f"order {h:g} ± {100 * margin:g} %"
+        marks.append(Shade(low, high, graph.VERMILLION, words, x=rpm))
     for row in results.spectrum:
         low, high = float(row.optimal_hz.min()), float(row.optimal_hz.max())
         if low < top:
@@ -282,13 +281,13 @@ def campbell(results: RunResults) -> FigurePlan:
             marks += [Curve(np.full(2, hz), look, name * (hz == low), rpm) for hz in (low, high)]
             for order, per_rpm in orders.items():
                 ends, words = np.array([low, high]).clip(0.0, per_rpm * rpm[1]), f"{order}, {name}"
-                if ends[0] == low:
-                    marks.append(Curve(ends, _MEETS, x=ends / per_rpm, hover=words))
-    marks += [Curve(h * rpm, LEVEL, x=rpm, end=order) for order, h in orders.items()]
-    marks += [Rule(n, TARGET, f"{n:.4g} rpm", upright=True) for n in speeds]
-    heading = f"Orders of the speed{where(results)}"
+                if ends[0] == low and not (order == "order 1" and row.mode in wanted):
+                    meets.append(Curve(ends, _MEETS, x=ends / per_rpm, hover=words))
+    marks += [*meets, *(Curve(h * rpm, LEVEL, x=rpm, end=order) for order, h in orders.items())]
+    marks += [Rule(n, TARGET, f"{float(f'{n:.6g}'):.12g} rpm", upright=True) for n in speeds]
     key = (("an order meets a mode", _MEETS),)
-    panel = Panel("frequency [Hz]", tuple(marks), 2.9, within=(0.0, top), key=key)
+    heading = f"Orders of the speed{where(results)}"
+    panel = Panel("frequency [Hz]", tuple(marks), 2.9, within=(0.0, top), key=key * bool(meets))
     return FigurePlan(
         f"orders{suffix(results)}",
         heading,

@@ -14,11 +14,11 @@ from eigassign.errors import UsageError
 from eigassign.facts import number, percent, positive_percent, verdict_word
 from eigassign.files import MATRIX, json_value, read_bytes
 from eigassign.output.figures import graph
-from eigassign.output.figures.curves import TARGET
+from eigassign.output.figures.curves import ROOM, TARGET
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Shade
 from eigassign.output.reports.page import page
 from eigassign.output.store.run_folder import is_whole, read_record
-from eigassign.output.tables import Table
+from eigassign.output.tables import RUNS, Table
 from eigassign.study.results import SCHEMA, CaseRow, Origin, violated
 
 Found = Mapping[str, Any]  # a results.json
@@ -41,7 +41,8 @@ def read_results(path: Path) -> Found:
         what = f"its results.json has schema {found['schema']}, and {SCHEMA} is read"
         raise UsageError(f"{folder}: {what}: run its case again")
     if not found.get("assignment"):
-        raise UsageError(f"{folder} is no run of eigassign optimize that was asked something")
+        what = "is not a run of eigassign optimize, or its case has no targets"
+        raise UsageError(f"{folder} {what}")
     return found
 
 
@@ -59,19 +60,20 @@ def comparison(runs: Mapping[str, Found]) -> tuple[tuple[Table, ...], bytes]:
         for title, name, cell in _cells(run):
             rows.setdefault(title, {}).setdefault(name, [""] * len(runs))[k] = cell
     tables = tuple(
-        Table(title, ("", *runs), tuple((name, *cells) for name, cells in own.items()), "", "runs")
-        for title, own in rows.items()
+        Table(t, ("", *runs), tuple((k, *own) for k, own in r.items() if any(own)), "", RUNS)
+        for t, r in rows.items()
     )
     case = CaseRow(", ".join(runs), f"{len(runs)} runs side by side", None, None, "", {})
     words = zip(runs, rows["Runs"]["verdict"], strict=True)
-    line, headings = "; ".join(map(": ".join, words)), {"runs": "Side by side"}
+    line, headings = "; ".join(map(": ".join, words)), {RUNS: "Side by side"}
     plans = [_frequencies(runs)]
     return tables, page(Compared(case=case), tables, plans, {}, line=line, headings=headings)
 
 
 def _cells(run: Found) -> Iterator[tuple[str, str, str]]:
     """Table, row and cell of what was found, of the design, and of targets and limits with room."""
-    error, violation, found = run["error"], run["violation"], run["assignment"]
+    violation, found = run["violation"], run["assignment"]
+    error = any(row["kind"] == "frequency" for row in run["targets"]) and run["error"]
     unfinished = "" if found["finished"] else ", unfinished"
     yield "Runs", "verdict", verdict_word(found["verdict"]) + unfinished
     for name, row, key in (
@@ -98,7 +100,7 @@ def _frequencies(runs: Mapping[str, Found]) -> FigurePlan:
     """Every run's modes in its colour, and what was asked; over shares of unequal durations."""
     last = [max(row["duration_s"] for row in run["trajectories"]) for run in runs.values()]
     alike = max(last) - min(last) <= 1e-9 * max(last)
-    marks, looks = dict[str, Mark](), dict[str, Look]()
+    marks, looks, held = dict[str, Mark](), dict[str, Look](), list[NDArray[np.float64]]()
     for (name, run), duration in zip(runs.items(), last, strict=True):
         look = looks[name] = replace(graph.series(len(looks)), width=1.8)
         for row in (row for row in run["targets"] if row["kind"] != "gap"):  # that is a distance
@@ -112,21 +114,29 @@ def _frequencies(runs: Mapping[str, Found]) -> FigurePlan:
 
             x = cut(t / (1.0 if alike else duration))
             own = {f"mode {one['mode']}": one["optimal_hz"] for one in row.get("near") or ()}
-            if row["kind"] == "keep_out":
-                low, high = (cut(curves[edge]) for edge in ("lower_hz", "upper_hz"))
-                marks[label] = Shade(low, high, graph.VERMILLION, label, x=x)
+            if (kind := row["kind"]) == "keep_out":
+                edges = [cut(curves[edge]) for edge in ("lower_hz", "upper_hz")]
+                marks[label] = Shade(*edges, graph.VERMILLION, label, x=x)
             else:
-                if row["kind"] != "highest":
-                    marks[label] = Curve(cut(curves["target_hz"]), TARGET, label, x)
+                edges = [cut(curves["exact_hz" if kind == "highest" else "target_hz"])]
+                if kind != "highest":
+                    marks[label] = Curve(*edges, TARGET, label, x)
                 mode = f"mode {row['mode']}" if row["mode"] else row["followed"]["name"]
                 own = {mode: curves["exact_hz"]}
+            hz, top = np.array([*own.values()]).ravel(), float(np.nanmax(edges))
+            away = np.maximum(np.nanmin(edges) - hz, hz - top)
+            near = {"keep_out": away.min(initial=np.inf), "at_least": 0.0, "at_most": 0.0}
+            held += [*edges, hz[away <= max(ROOM * top, near.get(kind, np.inf))]]
             for mode, hz in own.items():
                 words = f"{mode}, {name}"
-                marks[f"{words}, {row.get('trajectory')}"] = Curve(
-                    cut(hz), look, x=x, end=mode, hover=words
-                )
-    panel = Panel("frequency [Hz]", (*marks.values(),), 4.6, key=(*looks.items(),))
+                curve = Curve(cut(hz), look, x=x, end=mode, hover=words)
+                marks[f"{words}, {row.get('trajectory')}"] = curve
+    low, high = graph.bounds(held)
+    ends = low, high = max(low - ROOM * (high - low), 0.0), high + ROOM * (high - low)
+    panel = Panel("frequency [Hz]", (*marks.values(),), 4.6, key=(*looks.items(),), within=ends)
+    off = {one.hover: 0 for one in panel.curves if not ((low < one.y) & (one.y < high)).any()}
     title, axis = "Frequencies of the answers", "time [s]" if alike else "part of the duration"
     caption = "Exact, along the trajectory: a colour and dashes for each run, and what was asked."
+    caption += f" Outside the axis: {', '.join(off)}." * bool(off)
     shows = Graph(title, axis, np.zeros(0), (panel,))
     return FigurePlan("compared", title, caption, "Frequencies of runs over time.", shows, "answer")

@@ -39,23 +39,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import eigassign.output.store.atomic as atomic
 from eigassign._version import __version__
 from eigassign.errors import StorageError
 from eigassign.files import CASE, MATRIX, json_value, name_of, pieces, read_bytes, seen_from
-from eigassign.output.store.atomic import (
-    abandoned,
-    names_of,
-    put_in_place,
-    remove,
-    sync_path,
-    sync_tree,
-    temporary,
-    token_of,
-    write_synced,
-)
 
 MARKER = "run.json"
 UNFINISHED = "unfinished"  # in the outcome of such a run, and the end of its folder's name
+_HOW = "Choose another folder with --out, or use --force to move it aside"
 _SCHEMA = 3  # of run.json: of earlier ones no file is vouched for
 
 
@@ -98,7 +89,8 @@ def write_record(folder: Path, run: RunOf, token: str, outcome: Mapping[str, Any
         "files": sorted(_contents(folder)),
     }
     sealed = {**content, "sha256": _seal(folder, content)}
-    write_synced(folder / MARKER, (json.dumps(sealed, indent=2, allow_nan=False) + "\n").encode())
+    text = json.dumps(sealed, indent=2, allow_nan=False)
+    atomic.write_synced(folder / MARKER, f"{text}\n".encode())
 
 
 def _seal(folder: Path, content: Mapping[str, Any]) -> str:
@@ -191,9 +183,9 @@ def run_folder(
         made = [path for path in (target.parent, *target.parent.parents) if not path.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
-            with temporary(target, Path.mkdir) as folder:
+            with atomic.temporary(target, Path.mkdir) as folder:
                 yield folder
-                write_record(folder, run, token_of(folder), outcome)
+                write_record(folder, run, atomic.token_of(folder), outcome)
                 if outcome.get(UNFINISHED):
                     target, force = unfinished_beside(target), True
                 _publish(folder, target, run, force=force)
@@ -210,7 +202,7 @@ def unfinished_beside(target: Path) -> Path:
 
 def settle_killed(folder: Path) -> None:
     """Delete, keep aside or put back what killed runs left in ``folder``."""
-    for hidden, target in abandoned(folder):
+    for hidden, target in atomic.abandoned(folder):
         if hidden.is_dir() or hidden.suffix != ".tmp":
             _settle(hidden, target)
 
@@ -236,10 +228,7 @@ def require_replaceable(target: Path, run: RunOf, *, force: bool, case_path: Pat
             raise StorageError(f"{target} holds {name} and cannot become a run folder; use --out")
     reason = _objection(target, run)
     if reason and not force:
-        raise StorageError(
-            f"{target} {reason}; it was left alone. Choose another folder with --out, "
-            f"or use --force to move it aside"
-        )
+        raise StorageError(f"{target} {reason}; it was left alone. {_HOW}")
 
 
 def _objection(target: Path, run: RunOf) -> str | None:
@@ -255,19 +244,35 @@ def _objection(target: Path, run: RunOf) -> str | None:
     return None
 
 
+def put_page(page: Path, data: bytes, *, force: bool) -> None:
+    """Write a page beside runs, in place of an earlier one; what is no page of ours stays.
+
+    With ``force`` it is moved aside. Raises StorageError, also for a place inside a run folder.
+    """
+    folder, ours = Path(os.path.realpath(page.parent)), b'<meta name="generator" content="eigassign'
+    if any(map(read_record, (folder, *folder.parents))):
+        raise StorageError(f"{folder} is in a run folder; choose another with --out")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    if os.path.lexists(page) and not (page.is_file() and ours in read_bytes(page, MATRIX)):
+        if not force:
+            raise StorageError(f"{page} is no page of eigassign; it was left alone. {_HOW}")
+        os.rename(page, _free_sibling(page))
+    atomic.replace_synced(page, data)
+
+
 def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
     """Exchange the finished ``folder`` with ``target``."""
-    sync_tree(folder)
+    atomic.sync_tree(folder)
     if (reason := _objection(target, run)) and not force:
         raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
-    new = target.with_name(f".{target.name}.{token_of(folder)}.new")
+    new = target.with_name(f".{target.name}.{atomic.token_of(folder)}.new")
     try:
         os.rename(folder, new)
-        put_in_place(new, target)
-        sync_path(target.parent)
+        atomic.put_in_place(new, target)
+        atomic.sync_path(target.parent)
     finally:
         with contextlib.ExitStack() as rest:  # whatever becomes of one of them
-            for hidden in names_of(new):
+            for hidden in atomic.names_of(new):
                 rest.callback(_settle, hidden, target)
 
 
@@ -279,7 +284,7 @@ def _settle(hidden: Path, target: Path) -> None:
     with contextlib.suppress(FileNotFoundError):
         if hidden.suffix != ".tmp":
             record = read_record(hidden)
-            published = record is None or record.token != token_of(hidden)
+            published = record is None or record.token != atomic.token_of(hidden)
             if published and not os.path.lexists(target):
                 os.rename(hidden, target)
                 return
@@ -299,7 +304,7 @@ def _settle(hidden: Path, target: Path) -> None:
             doomed = hidden.with_name(f"{hidden.name}.tmp")
             os.rename(hidden, doomed)
             hidden = doomed
-        remove(hidden)
+        atomic.remove(hidden)
 
 
 def _is_replaced(old: Path, target: Path) -> bool:
