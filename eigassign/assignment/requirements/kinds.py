@@ -258,7 +258,7 @@ def asked_of(target: AnyTarget, *hz: Floats) -> tuple[str, Floats, Floats]:
             return f"at least {_said(target.gap.at_least)} apart", hz[0], endless
         case KeepOutTarget(keep_out=Harmonic() as band):
             times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} × "
-            of: tuple[float, ...] = getattr(band.of, "frequency", (band.of,))
+            of = band.of.frequency if isinstance(band.of, FrequencyProfile) else (band.of,)
             unit, size = handy_unit(SI("Hz", *of))
             ends = " … ".join(f"{each / size:.12g}" for each in sorted({min(of), max(of)}))
             words = f"clear of {times}{ends} {unit} ± {100 * band.margin:g} %"

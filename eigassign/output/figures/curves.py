@@ -270,9 +270,9 @@ def campbell(results: RunResults) -> FigurePlan:
     top = 1.1 * max(rpm[1] * max(orders.values()), above)
     wanted = {m for one in results.targets if one.asked.is_goal for m in one.numbers}
     for h, margin in sorted({(h, margin) for h, _, margin in results.orders if margin}):
-        low, high = (h / 60.0 * (1.0 + side) * rpm for side in (-margin, margin))
+        edges = [h / 60.0 * (1.0 + side) * rpm for side in (-margin, margin)]
         words = f"order {h:g} ± {100 * margin:g} %"
-        marks.append(Shade(low, high, graph.VERMILLION, words, x=rpm))
+        marks.append(Shade(edges[0], edges[1], graph.VERMILLION, words, x=rpm))
     for row in results.spectrum:
         low, high = float(row.optimal_hz.min()), float(row.optimal_hz.max())
         if low < top:

@@ -116,14 +116,14 @@ def _frequencies(runs: Mapping[str, Found]) -> FigurePlan:
             own = {f"mode {one['mode']}": one["optimal_hz"] for one in row.get("near") or ()}
             if (kind := row["kind"]) == "keep_out":
                 edges = [cut(curves[edge]) for edge in ("lower_hz", "upper_hz")]
-                marks[label] = Shade(*edges, graph.VERMILLION, label, x=x)
+                marks[label] = Shade(edges[0], edges[1], graph.VERMILLION, label, x=x)
             else:
                 edges = [cut(curves["exact_hz" if kind == "highest" else "target_hz"])]
                 if kind != "highest":
-                    marks[label] = Curve(*edges, TARGET, label, x)
+                    marks[label] = Curve(edges[0], TARGET, label, x)
                 mode = f"mode {row['mode']}" if row["mode"] else row["followed"]["name"]
                 own = {mode: curves["exact_hz"]}
-            hz, top = np.array([*own.values()]).ravel(), float(np.nanmax(edges))
+            hz, top = np.hstack([*own.values(), []]), float(np.nanmax(edges))
             away = np.maximum(np.nanmin(edges) - hz, hz - top)
             near = {"keep_out": away.min(initial=np.inf), "at_least": 0.0, "at_most": 0.0}
             held += [*edges, hz[away <= max(ROOM * top, near.get(kind, np.inf))]]

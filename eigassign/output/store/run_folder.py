@@ -251,7 +251,7 @@ def put_page(page: Path, data: bytes, *, force: bool) -> None:
     """
     folder, ours = Path(os.path.realpath(page.parent)), b'<meta name="generator" content="eigassign'
     if any(map(read_record, (folder, *folder.parents))):
-        raise StorageError(f"{folder} is in a run folder; choose another with --out")
+        raise StorageError(f"{folder} is a run folder or in one; choose another with --out")
     page.parent.mkdir(parents=True, exist_ok=True)
     if os.path.lexists(page) and not (page.is_file() and ours in read_bytes(page, MATRIX)):
         if not force:
@@ -289,9 +289,7 @@ def _settle(hidden: Path, target: Path) -> None:
                 os.rename(hidden, target)
                 return
             if published and not _is_replaced(hidden, target):
-                number = 1
-                while os.path.lexists(aside := target.with_name(f"{target.name}.{number}")):
-                    number += 1
+                aside = _free_sibling(target)
                 try:
                     os.rename(hidden, aside)
                 except FileNotFoundError:
@@ -318,3 +316,10 @@ def _is_replaced(old: Path, target: Path) -> bool:
     if record is None:
         return not any(old.iterdir())
     return new is not None and new.run.is_same_case(record.run) and is_untouched(old)
+
+
+def _free_sibling(target: Path) -> Path:
+    number = 1
+    while os.path.lexists(aside := target.with_name(f"{target.name}.{number}")):
+        number += 1
+    return aside
