@@ -115,7 +115,7 @@ def test_of_equal_durations_the_time_is_shown(capsys: pytest.CaptureFixture[str]
         ("lost", 2, "lost: a file of it was changed or lost"),
         ("edited", 2, "edited: a file of it was changed or lost"),
         ("older", 2, "older: its results.json has schema 2, and"),
-        ("drawn", 2, "drawn is not a run of eigassign optimize, or its case has no targets"),
+        ("drawn", 2, "drawn is no run of eigassign optimize, or its case has no targets"),
     ],
 )
 def test_what_is_no_run_is_refused_by_its_name(

@@ -41,8 +41,7 @@ def read_results(path: Path) -> Found:
         what = f"its results.json has schema {found['schema']}, and {SCHEMA} is read"
         raise UsageError(f"{folder}: {what}: run its case again")
     if not found.get("assignment"):
-        what = "is not a run of eigassign optimize, or its case has no targets"
-        raise UsageError(f"{folder} {what}")
+        raise UsageError(f"{folder} is no run of eigassign optimize, or its case has no targets")
     return found
 
 
