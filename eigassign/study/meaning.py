@@ -296,7 +296,7 @@ def as_error(kind: str, F: float) -> float:
 def relaxed_limits(
     file: CaseFile, variant: PosedProblem, F: float, active: Sequence[ActiveLimit]
 ) -> Iterator[RelaxedRow]:
-    """The gain of a little more room at each active limit, if there is any."""
+    """The gain of a little more room at each active limit, where there is one to be seen."""
     problem, kind = variant.problem, error_kind(variant.problem, variant.requirements)
     for row in active:
         if row.multiplier <= 0.0 or _is_natural(file, problem, row):
@@ -305,11 +305,13 @@ def relaxed_limits(
         while row.multiplier * amount > MOST * abs(F) > 0.0:
             amount = _rounded(0.5 * amount, unit)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
-        change = f"{before:.4g} → {after:.4g}"
+        both, per_cent = (before, after), " %" * (kind.endswith("error") or kind == "room")
+        shown = [f"{100.0 * each:#.3g}" if per_cent else f"{each:.4g}" for each in both]
         if kind == "mass":
-            change = " → ".join(handy(each, file.mass_unit, 4) for each in (before, after))
-        if kind.endswith("error") or kind == "room":
-            change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
+            shown = [handy(each, file.mass_unit, 4) for each in both]
+        if shown[0] == shown[1]:
+            continue
+        change = " → ".join(shown) + per_cent
         yield RelaxedRow(
             row.name, row.kind, row.side, amount, unit, kind, before, after,
             f"{_room(variant, row, amount, unit)}: {kind} {change}",

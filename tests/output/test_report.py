@@ -225,6 +225,16 @@ def test_many_samples_keep_a_report_small_and_their_extremes():
     assert len(json.dumps(figure)) < 60_000
 
 
+def test_a_curve_under_the_pointer_has_a_name_and_a_strip_says_which_edges_are_its_own():
+    """What is saved as CSV has a column for each of them, and none for an edge of the panel."""
+    t = np.linspace(0.0, 1.0, 5)
+    marks = (Shade(None, t + 1.0, "#00ff00", "below"), Curve(t, Look("#000000"), hover="after"))
+    strip, line = screen_figure(Graph("g", "t (s)", t, (Panel("J1 [N m]", marks),)))["data"]
+    assert strip["meta"] == [False, True]
+    assert line["name"] == "after"
+    assert "hoverinfo" not in line
+
+
 def test_a_long_document_is_named_and_not_carried():
     html, _, _ = made(make_results(), full=True)
     assert 'id="results"' in html

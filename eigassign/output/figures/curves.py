@@ -79,7 +79,8 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
         edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
         edges = [edge for edge in edges if any((edge * v > 0.0).any() for v in values)]
         label = graph.short(row.name, 12) if drives else f"{k}: {row.name.partition(' ')[0]}"
-        curves = map(Curve, values, (_BEFORE, _AFTER))
+        looks = ((_BEFORE, "before"), (_AFTER, "after"))
+        curves = (Curve(v, look, hover=when) for v, (look, when) in zip(values, looks, strict=True))
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
         holds = (np.array([0.0, *edges]),)
         panels.append(Panel(graph.labelled(label, unit), marks, 1.3, holds=holds))

@@ -210,6 +210,7 @@ def _shade(shade: Shade, panel: Panel, x: Floats, axis: str) -> Json:
         "x": _numbers([*x, *x[::-1]]), "y": _numbers([*low, *high[::-1]]), "yaxis": axis,
         "fillcolor": f"rgba({red},{green},{blue},{shade.opacity})", "hoverinfo": "skip",
         "name": short(shade.label, 60), "showlegend": bool(shade.label),
+        "meta": [shade.low is not None, shade.high is not None],  # edges of its own
     }  # fmt: skip
 
 

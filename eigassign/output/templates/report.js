@@ -122,12 +122,14 @@ const eigassign = (function () {
     const { data, layout } = figures[name], across = layout.xaxis.title.text || "x", columns = new Map(), points = data.filter((t) => t.hovertext);
     const axis = (trace) => layout[trace.yaxis.replace("y", "yaxis")].title.text;
     const lines = (rows) => rows.map((row) => row.map((cell) => quoted(cell ?? "")).join()).join("\n") + "\n";
-    if (points.length) return lines([["point", "series", across, axis(points[0])], ...points.flatMap((t) => t.x.map((x, i) => [t.hovertext[i], t.name, x, t.y[i]]))]);
+    const ups = [...new Set(points.map(axis))].filter(Boolean);  // without a title: rows of a sheet
+    if (points.length) return lines([["point", "series", across, ...ups], ...points.flatMap((t) => t.x.map((x, i) => [t.hovertext[i], t.name, x, ...ups.map((up) => up === axis(t) ? t.y[i] : "")]))]);
     const add = (head, x, y) => { if (!columns.has(head)) columns.set(head, new Map(x.map((at, i) => [at, y[i]]))); };
     for (const t of data.filter((trace) => trace.name && trace.yaxis)) {
       const n = t.x.length / 2, head = `${t.name}: ${axis(t)}`;
       if (!t.fill) add(head, t.x, t.y);
-      else { add(head + ", from", t.x.slice(0, n), t.y.slice(0, n)); add(head + ", to", t.x.slice(0, n), t.y.slice(n).reverse()); }
+      if (t.fill && t.meta[0]) add(head + ", from", t.x.slice(0, n), t.y.slice(0, n));
+      if (t.fill && t.meta[1]) add(head + ", to", t.x.slice(0, n), t.y.slice(n).reverse());
     }
     const every = [...new Set([...columns.values()].flatMap((own) => [...own.keys()]))].filter((x) => x !== null).sort((a, b) => a - b);
     return lines([[across, ...columns.keys()], ...every.map((x) => [x, ...[...columns.values()].map((own) => own.get(x))])]);
