@@ -39,7 +39,7 @@ RelativeError = Annotated[
     Share, Fact(may_lack=True, digits=lambda e: percent(e) if np.isfinite(e) else "no number")
 ]
 ErrorIfAny = Annotated[RelativeError | None, Fact(absent="")]
-TinyIfAny = Annotated[float | None, Fact(digits=".1e", absent="")]
+TinyIfAny = Annotated[float | None, Fact(digits=lambda v: f"{v:.1e}" if v else "0", absent="")]
 
 
 class Kind(StrEnum):

@@ -193,10 +193,10 @@ def _design(results: RunResults) -> Iterator[Table]:
     if price is not None:
         what = "It" if listed else "The change"
         caption = f"{what} costs {number(price)} in all. {caption}".strip()
-    names = "name parameter handy initial optimal lower upper lies_on chosen"
+    names = "name handy initial optimal lower upper lies_on chosen"
     priced = " cost" * (price is not None)
     rows = (*results.design, *filter(None, [results.mass])) if results.design else ()
-    yield facts_table("Design", rows, names + priced, caption, cost=cost)
+    yield facts_table("Design", rows, f"{names}{priced} parameter", caption, cost=cost)
     yield _combinations(results)
 
 

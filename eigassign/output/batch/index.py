@@ -55,7 +55,8 @@ def index_page(
     swept, stems = [*_swept(rows, keys)], {Path(row.path).stem for row in rows}
     apart = len({*zip(*(cells for _, cells in swept), strict=True)}) == len(rows)
     names = [str(row.index + 1) for row in rows] if apart else bare_names(rows)
-    columns = [(("case", "", "name"), names), *swept, *_columns(rows)]
+    verdict, *others = _columns(rows)
+    columns = [(("case", "", "name"), names), verdict, *swept, *others]
     shown = [(head, cells) for head, cells in columns if any(c not in ("", None) for c in cells)]
     data = {
         "columns": [head for head, _ in shown],

@@ -124,7 +124,8 @@ class Panel:
 
     @property
     def _values(self) -> list[Floats]:
-        return [*(curve.y for curve in self.curves), *self.holds]
+        edges = (e for m in self.marks if isinstance(m, Shade) for e in (m.low, m.high))
+        return [*(c.y for c in self.curves), *self.holds, *(e for e in edges if e is not None)]
 
     @cached_property
     def whole(self) -> tuple[float, float]:

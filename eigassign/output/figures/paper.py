@@ -257,7 +257,7 @@ def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -
         axes.annotate(curve.end, (at[-1], curve.y[-1]), (3.0, 0.0), textcoords="offset points")
     return axes.plot(
         at, panel.shown(curve), **look, label=short(curve.label, 60), zorder=above,
-        clip_on=not curve.look.marker and not shown.sheet,
+        clip_on=(panel.within is not None or not curve.look.marker) and not shown.sheet,
     )[0]  # fmt: skip
 
 

@@ -6,6 +6,7 @@ Colours of paper and ink are left to the page, which knows whether it is dark.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ def screen_figure(shown: Graph) -> Json:
     tops = 1.0 - np.cumsum([0.0, *(free * heights / heights.sum() + gap)[:-1]])
     data: list[Json] = []
     shapes: list[Json] = []
-    notes: list[Json] = []
+    notes, every = list[Json](), list[Json]()
     layout: Json = {"shapes": shapes, "annotations": notes, "hovermode": "closest"}
     if not shown.x_logarithmic:
         layout["hovermode"] = "x unified"
@@ -84,14 +85,11 @@ def screen_figure(shown: Graph) -> Json:
                 shapes.append(_rule(mark, axis))
                 notes += _note(mark, axis)
         data += [_key(name, look) for name, look in panel.key]
-        notes += [
-            {"text": name, "x": 1.0, "xref": "paper", "xanchor": "left", "xshift": 6, "y": at,
-             "yref": axis, "showarrow": False, "font": {"color": colour}}
-            for name, at, colour in panel.ends()
-        ]  # fmt: skip
+        notes += _ends(panel, axis)
+        every += _ends(replace(panel, within=None), axis)
     last = f"y{len(heights)}" if len(heights) > 1 else "y"
     if shown.clock is not None:
-        layout["meta"] = {"clock": shown.clock, "whole": _whole(shown)}
+        layout["meta"] = {"clock": shown.clock, "whole": _whole(shown), "ends": every}
     layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
     if across := _unit(shown.x_label):
         layout["xaxis"]["unifiedhovertitle"] = {"text": f"%{{x}} {across}"}
@@ -102,6 +100,14 @@ def screen_figure(shown: Graph) -> Json:
     )  # one below the other, if they are long
     tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM + 19.0 * (rows - 1)  # an inch is 78
     return {"data": data, "layout": {**layout, "height": round(tall)}}
+
+
+def _ends(panel: Panel, axis: str) -> list[Json]:
+    return [
+        {"text": name, "x": 1.0, "xref": "paper", "xanchor": "left", "xshift": 6, "y": at,
+         "yref": axis, "showarrow": False, "font": {"color": colour}}
+        for name, at, colour in panel.ends()
+    ]  # fmt: skip
 
 
 def _whole(shown: Graph) -> dict[str, list[float | None]]:
@@ -171,15 +177,15 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     return {
         "type": "scatter",
         "mode": "markers" if single else "+".join(parts),
-        "x": _numbers(x[plotted]),
-        "y": _numbers(y[plotted]),
+        "x": _numbers(x[plotted]) or [None],  # the legend leaves out what has no points
+        "y": _numbers(y[plotted]) or [None],
         "yaxis": axis,
         "name": name,
         "legendgroup": name,
         "showlegend": bool(curve.label),
         "line": _line(look),
         **({"marker": marker} if look.marker or single else {}),
-        "cliponaxis": not look.marker,
+        "cliponaxis": panel.within is not None or not look.marker,
         "hovertemplate": point if shown.x_logarithmic else f"%{{y:.4~g}} {up}".rstrip(),
         **({"hovertext": list(curve.names), "hovertemplate": named} if curve.names else {}),
         **({"text": list(curve.marks), "textposition": "top right"} if curve.marks else {}),

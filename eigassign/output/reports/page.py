@@ -80,7 +80,11 @@ def _environment() -> Environment:
         """Text with what stands between backticks as code, and no markup of its own."""
         return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
-    environment.filters |= {"words": words, "number": number}
+    def dotted(text: Markup) -> Markup:
+        """Markup whose key paths may go on in a new line after a dot."""
+        return Markup(re.sub(r"(?<=[\w\]])\.(?=[a-z_])", ".<wbr>", text))
+
+    environment.filters |= {"words": words, "dotted": dotted, "number": number}
     return environment
 
 

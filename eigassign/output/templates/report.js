@@ -26,11 +26,15 @@ const eigassign = (function () {
   const touched = !matchMedia("(hover: hover)").matches || innerWidth < 600;
   if (touched) config.displayModeBar = false;
 
-  function themed(figure) {
+  function themed(figure, whole) {
     const copy = JSON.parse(JSON.stringify(figure).replaceAll("#1a1a1a", css("--ink")).replaceAll("#0072B2", css("--blue")));
     const axis = { gridcolor: css("--line"), zerolinecolor: css("--soft"), linecolor: css("--soft"), automargin: true };
     for (const key of Object.keys(copy.layout)) {
       if (/^[xy]axis/.test(key)) copy.layout[key] = { ...axis, ...copy.layout[key] };
+    }
+    if (whole) {
+      copy.layout.annotations = copy.layout.meta.ends;
+      for (const [axis, range] of Object.entries(copy.layout.meta.whole)) copy.layout[axis].range = range;
     }
     const ends = (copy.layout.annotations || []).some((note) => note.xanchor === "left" && note.x === 1);
     if (innerWidth < 600) copy.data.forEach((trace) => { trace.mode = trace.mode.replace("+text", ""); });
@@ -45,7 +49,7 @@ const eigassign = (function () {
 
   const drawn = new Set();
   function draw(box) {
-    const figure = themed(figures[box.dataset.figure]), meta = figure.layout.meta || {};
+    const figure = themed(figures[box.dataset.figure], box.matches(".whole")), meta = figure.layout.meta || {};
     const again = drawn.has(box);
     drawn.add(box);
     const save = { toImageButtonOptions: { filename: box.dataset.figure, scale: 2 } };
@@ -75,10 +79,12 @@ const eigassign = (function () {
     tools.className = "tools";
     const button = tools.appendChild(document.createElement("button"));
     button.type = "button"; button.textContent = "All modes"; button.setAttribute("aria-pressed", "false");
+    const caption = box.closest("figure").querySelector("figcaption"), words = caption.innerHTML;
     button.addEventListener("click", () => {
-      const on = button.getAttribute("aria-pressed") !== "true";
+      const on = box.classList.toggle("whole");
       button.setAttribute("aria-pressed", on);
-      Plotly.relayout(box, Object.fromEntries(axes.map((axis) => [axis + ".range", on ? whole[axis] : layout[axis].range])));
+      caption.innerHTML = on ? words.replace(/ Kept from afar, outside the axis.*/s, "") : words;
+      draw(box);
     });
   }
   function plots() {
@@ -89,10 +95,10 @@ const eigassign = (function () {
     boxes.forEach((box) => seen.observe(box));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach(draw));
     const open = () => boxes.filter((box) => !box.closest("details:not([open])"));
-    // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels.
+    // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels. It has 1016 in height, of which heading and caption leave 700.
     const paper = (on) => {
       document.documentElement.classList.toggle("paper", on);
-      open().forEach((box) => { draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688 } : { autosize: true, width: null }); });
+      open().forEach((box) => { draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688, height: Math.min(figures[box.dataset.figure].layout.height, 700) } : { autosize: true, width: null }); });
     };
     addEventListener("beforeprint", () => paper(true));
     addEventListener("afterprint", () => paper(false));
