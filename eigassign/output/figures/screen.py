@@ -95,9 +95,7 @@ def screen_figure(shown: Graph) -> Json:
         layout["xaxis"]["unifiedhovertitle"] = {"text": f"%{{x}} {across}"}
     named = [*(mark.label for panel in shown.panels for mark in panel.marks if mark.label)]
     named += [name for panel in shown.panels for name, _ in panel.key]
-    rows = (
-        len(named) if sum(map(len, named)) > _LEGEND else 1
-    )  # one below the other, if they are long
+    rows = len(named) if sum(map(len, named)) > _LEGEND else 1  # long ones below each other
     tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM + 19.0 * (rows - 1)  # an inch is 78
     return {"data": data, "layout": {**layout, "height": round(tall)}}
 

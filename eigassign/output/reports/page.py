@@ -48,11 +48,7 @@ TEMPLATES = Path(__file__).parents[1] / "templates"
 def today() -> str:
     """The date as people write it, ``26 November 2026``; that of SOURCE_DATE_EPOCH if it is set."""
     given = os.environ.get("SOURCE_DATE_EPOCH", "")
-    day = (
-        datetime.fromtimestamp(int(given), UTC)
-        if given.isdecimal()
-        else datetime.now().astimezone()
-    )
+    day = datetime.fromtimestamp(int(given), UTC) if given.isdecimal() else datetime.now()
     return f"{day.day} {day:%B %Y}"
 
 
@@ -80,11 +76,9 @@ def _environment() -> Environment:
         """Text with what stands between backticks as code, and no markup of its own."""
         return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
-    def dotted(text: Markup) -> Markup:
-        """Markup whose key paths may go on in a new line after a dot."""
-        return Markup(re.sub(r"(?<=[\w\]])\.(?=[a-z_])", ".<wbr>", text))
-
-    environment.filters |= {"words": words, "dotted": dotted, "number": number}
+    dotted = re.compile(r"(?<=[\w\]])\.(?=[a-z_])")  # in key paths: they go on in a new line
+    environment.filters |= {"words": words, "number": number}
+    environment.filters["dotted"] = lambda text: Markup(dotted.sub(".<wbr>", text))
     return environment
 
 

@@ -135,7 +135,7 @@ def _found(results: UpdateResults) -> Iterator[Table]:
     held = [row.name for row in results.parameters if row.held]
     if held and any(row.deviation is not None for row in results.parameters):
         caption += f" The deviations assume {' and '.join(held)} at the bound."
-    names = "name parameter handy initial value deviation low high remark"
+    names = "name handy initial value deviation low high remark parameter"
     yield facts_table("Parameters", results.parameters, names, caption)
     caption = (
         "Changes from bound to bound that move all measured frequencies together by "

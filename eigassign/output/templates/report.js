@@ -95,10 +95,13 @@ const eigassign = (function () {
     boxes.forEach((box) => seen.observe(box));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach(draw));
     const open = () => boxes.filter((box) => !box.closest("details:not([open])"));
-    // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels. It has 1016 in height, of which heading and caption leave 700.
+    // Paper is narrower or wider than the window: between margins of 14 mm A4 has 688 pixels. It has 1016 in height: 640 leave room for headings and captions.
     const paper = (on) => {
       document.documentElement.classList.toggle("paper", on);
-      open().forEach((box) => { draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688, height: Math.min(figures[box.dataset.figure].layout.height, 700) } : { autosize: true, width: null }); });
+      open().forEach((box) => {
+        const height = Math.min(figures[box.dataset.figure].layout.height, 900), zoom = Math.min(1, 640 / height);
+        box.style.zoom = on ? zoom : "";
+        draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688 / zoom, height } : { autosize: true, width: null }); });
     };
     addEventListener("beforeprint", () => paper(true));
     addEventListener("afterprint", () => paper(false));
