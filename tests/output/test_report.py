@@ -23,7 +23,7 @@ from eigassign.output import (
     write_run,
 )
 
-VOID = {"meta", "img", "br", "link", "input"}
+VOID = {"meta", "img", "br", "wbr", "link", "input"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
 
 

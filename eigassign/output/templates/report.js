@@ -100,8 +100,9 @@ const eigassign = (function () {
       document.documentElement.classList.toggle("paper", on);
       open().forEach((box) => {
         const height = Math.min(figures[box.dataset.figure].layout.height, 900), zoom = Math.min(1, 640 / height);
-        box.style.zoom = on ? zoom : "";
-        draw(box); Plotly.relayout(box, on ? { autosize: false, width: 688 / zoom, height } : { autosize: true, width: null }); });
+        draw(box);
+        Plotly.relayout(box, on ? { autosize: false, width: 688, height: height * zoom, "font.size": 12 * zoom } : { autosize: true, width: null });
+      });
     };
     addEventListener("beforeprint", () => paper(true));
     addEventListener("afterprint", () => paper(false));

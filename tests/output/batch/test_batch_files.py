@@ -89,7 +89,9 @@ def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_
     found = page_data(tmp_path)
     assert [each[0] for each in found["rows"]] == ["c=0", "c=1", "c=2"]
     assert found["links"][1] == ["run%201/report.html", "run%201/figures/frequencies.png"]
-    assert found["columns"][:2] == [["case", "", "name"], ["body.mass", "kg", "swept"]]
+    assert found["columns"][:3] == [
+        ["case", "", "name"], ["verdict", "", "word"], ["body.mass", "kg", "swept"],
+    ]  # fmt: skip
     html = (tmp_path / "index.html").read_text("utf-8")
     assert "3 of 6 cases are shown" in html
 
