@@ -81,10 +81,8 @@ const eigassign = (function () {
     button.type = "button"; button.textContent = "All modes"; button.setAttribute("aria-pressed", "false");
     const caption = box.closest("figure").querySelector("figcaption"), words = caption.innerHTML;
     button.addEventListener("click", () => {
-      const on = box.classList.toggle("whole");
-      button.setAttribute("aria-pressed", on);
-      caption.innerHTML = on ? words.replace(/ Kept from afar, outside the axis.*/s, "") : words;
-      draw(box);
+      const on = box.classList.toggle("whole"); button.setAttribute("aria-pressed", on);
+      caption.innerHTML = on ? words.replace(/ Kept from afar, outside the axis.*/s, "") : words; draw(box);
     });
   }
   function plots() {
