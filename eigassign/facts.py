@@ -127,8 +127,8 @@ def _parts(kind: Any) -> Iterator[Any]:
 
 
 def capital(text: str) -> str:
-    """The text with its first letter as a sentence or a heading has it."""
-    return text[:1].upper() + text[1:]
+    """The text with its first letter as a sentence or a heading has it; but names of nodes."""
+    return text if "." in text.partition(" ")[0].rstrip(".") else text[:1].upper() + text[1:]
 
 
 def verdict_word(word: str) -> str:

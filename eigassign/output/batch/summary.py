@@ -226,7 +226,7 @@ def batch_table(outcomes: Sequence[CaseOutcome], room: int = 100) -> Table:
     """
     names = [_cut(name, max(room // 2, 12)) for name in bare_names(outcomes)]
     rows = [replace(o, name=name) for o, name in zip(outcomes, names, strict=True)]
-    made = facts_table("Batch", rows, "name word exact_max_relative seconds why")
+    made = facts_table("Batch", rows, "name word exact_max_relative room seconds why")
     if made.columns[-1] != "message":
         return made
     wide = [max(map(len, column)) for column in zip(made.columns, *made.rows, strict=True)]
