@@ -65,9 +65,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 def test_tables_are_in_the_units_that_the_case_writes(result: Result) -> None:
     tables = {table.title: table for table in run_tables(result.results)}
-    units = {row[0]: row[2] for row in tables["Design"].rows}
+    design = tables["Design"]
+    unit, lower = (design.columns.index(name) for name in ("unit", "lower"))
+    units = {row[0]: row[unit] for row in design.rows}
     assert units == {"d": "mm", "k": "N m/arcmin", "m": "g", "mass": "g"}
-    bounds = {row[0]: row[5:7] for row in tables["Design"].rows}
+    bounds = {row[0]: row[lower : lower + 2] for row in design.rows}
     assert bounds["d"] == ("35", "50")
     assert bounds["k"] == ("2", f"{15e3 * ARCMIN:.4g}")
     slopes = {row[0]: row[2] for row in tables["Sensitivity"].rows}
