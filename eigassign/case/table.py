@@ -160,10 +160,14 @@ def _rows(file: Path, key: str) -> Iterator[tuple[int, list[str]]]:
     comma = between != "," and not _POINT.search(text)
     lines.seek(0)
     reader = csv.reader(lines, delimiter=between, skipinitialspace=between != "\t", strict=True)
+    width = None  # of the header: a separator may end every row
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
+            while len(cells) > (width or 1) and not cells[-1]:
+                cells.pop()
             if any(cells) and not cells[0].startswith("#") and cells[0].lower() != "sep=":
+                width = len(cells) if width is None else width
                 yield reader.line_num, [*map(_with_point, cells)] if comma else cells
     except csv.Error as error:
         message = f"{file.name}:{reader.line_num}: {error}: between separators stands one number"

@@ -37,7 +37,7 @@ from eigassign.case.units import written
 from eigassign.files import MATRIX, MESH, TABLE, objection, printable
 
 _SPARE = ("measurements", "sweep")
-_VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62})", re.DOTALL)
+_VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62}(?:\.[A-Za-z]\w{0,62})?)", re.DOTALL)
 
 
 class NamedFile(NamedTuple):

@@ -440,14 +440,15 @@ class SolidNode(Part):
     """A node that stands for a surface of a solid.
 
     Keys:
-        surface: its name in the mesh: a physical group, node set, surface or property
+        surface: its name in the mesh: a physical group, node set, surface, property or coupling
+            (`RBE2 7`, the name of a `*COUPLING`, or `node 12` of its node)
         coupling: `rigid`, the surface moves with the node as one (RBE2); or `distributing`, the
-            node follows the mean motion of the surface (RBE3)
-        position: its place; the centre of the surface unless given
+            node follows the mean motion of the surface (RBE3); as the mesh couples it, else `rigid`
+        position: its place; that of the coupling's node, else the centre of the surface
     """
 
     surface: str
-    coupling: Literal["rigid", "distributing"] = "rigid"
+    coupling: Literal["rigid", "distributing"] | None = None
     position: Vector | None = None
 
 

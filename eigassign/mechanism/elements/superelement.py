@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
+from eigassign.case.reader import listed
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.craig_bampton import coefficients, held_factor, is_semidefinite
 from eigassign.mechanism.elements.links import (
@@ -239,7 +240,11 @@ def part_lines(case: CaseFile) -> tuple[str, ...]:
             mesh = (solid_mesh if kind == "solid" else superelement_mesh)(case, numbers, name)
             found += free_part_lines(case, numbers, title, mesh)
             flat = case.mechanism.space == "planar"
-            if flat if kind == "solid" else imported_part(case, name).held:
+            part = None if kind == "solid" else imported_part(case, name)
+            if part is not None and part.null:
+                rows = f"rows {listed(part.null)} are zero in stiffness and mass"
+                found.append(f"{title}: {rows}, and left out")
+            if flat if part is None else part.held:
                 found.append(
                     f"{title}: u_z, θ_x and θ_y of its nodes are held; modes in which it moves out "
                     "of the plane between them are counted"

@@ -49,18 +49,25 @@ def main(memory: int, seconds: int, room: int) -> None:
 
 
 def _matrices(data: bytes) -> Found:
-    """Those of versions 5 to 7, without objects, cells, structures and text."""
+    """Those of versions 5 to 7, in structures as SE.K; without objects, cells and text."""
     from scipy.io import loadmat, whosmat
 
     stream: Any = io.BytesIO(data)
     for name, shape, kind in whosmat(stream):
         if kind in _NUMBERS and len(shape) == 2:
-            A = loadmat(stream, variable_names=[name])[name]
-            if kind == "sparse":
-                A = A.tocsc()
-                yield name, A.shape, [A.data, A.indices, A.indptr]
-            else:
-                yield name, A.shape, [A.T.reshape(-1)]
+            yield _sent(name, loadmat(stream, variable_names=[name])[name])
+        elif kind == "struct" and shape == (1, 1):
+            struct = loadmat(stream, variable_names=[name])[name][0, 0]
+            for field in struct.dtype.names or ():
+                if struct[field].ndim == 2 and struct[field].dtype.kind in "iuf":
+                    yield _sent(f"{name}.{field}", struct[field])
+
+
+def _sent(name: str, A: Any) -> tuple[str, tuple[int, ...], list[Any]]:
+    if hasattr(A, "tocsc"):
+        A = A.tocsc()
+        return name, A.shape, [A.data, A.indices, A.indptr]
+    return name, A.shape, [A.T.reshape(-1)]
 
 
 if __name__ == "__main__":

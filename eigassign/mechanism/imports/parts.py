@@ -91,11 +91,14 @@ def matrix_of(
         raise MechanismError(key, f"cannot read {file.name}: it is damaged, or no file of {_KNOWN}")
     found = contents.matrices
     named = [n for n in found if (n == name if name else kind in ("", kind_of(n)))]
-    named = [n for n in named if n.upper() == kind] or named
+    # of what an EXTSEOUT leaves, KAAX, MAAX, BAAX, MUG1T, …, the reduced ones
+    usual = (kind, f"{kind}AAX", f"{kind}AA") if kind and not name else ()
+    first = ([n for n in named if _own_name(n) == own] for own in usual)
+    named = next(filter(None, first), named)
     if not name and not named and alone and len(found) == 1:
         named = [n for n in found if not kind_of(n)]
     if len(named) != 1:
-        raise MechanismError(key, f"{file.name} {_missing(found, name, kind, len(named))}")
+        raise MechanismError(key, f"{file.name} {_missing(found, name, kind, len(named), alone)}")
 
     def matrix() -> Matrix:
         read = found[named[0]]()
@@ -104,20 +107,27 @@ def matrix_of(
     return guarded(matrix, file, key)
 
 
+def _own_name(name: str) -> str:
+    """In capitals, without that of the structure that it is in."""
+    return name.rpartition(".")[2].upper()
+
+
 def kind_of(name: str) -> str:
     """K or M by the name of a matrix: KAAX, stiffness, MAAX, mass; nothing of others."""
-    own = name.upper()
+    own = _own_name(name)
     return "K" if own.startswith(("K", "STIF")) else "M" if own.startswith("M") else ""
 
 
-def _missing(found: Mapping[str, Any], name: str, kind: str, count: int) -> str:
+def _missing(found: Mapping[str, Any], name: str, kind: str, count: int, alone: bool) -> str:
     names = listed(each or "one without a name" for each in found)
     if not found:
         return "holds no matrix"
     if name:
         return f"has no matrix {shown(name)}; it has {names}"
     if count > 1 or kind == "":
-        return f"holds {len(found)} matrices, {names}: name one, as parts.mat:K does"
+        own = "name one, as" if alone else "in place of file write stiffness: parts.mat:K and mass:"
+        own += " parts.mat:K does" if alone else " parts.mat:M"
+        return f"holds {len(found)} matrices, {names}: {own}"
     words = {"K": "stiffness", "M": "mass"}
     have = next((words[k] for k in map(kind_of, found) if k), f"matrices, {names}")
     twin = next((f" ({kind}{n[1:]})" for n in found if re.fullmatch("[KM]AAX?", n)), "")
@@ -199,6 +209,7 @@ class ImportedPart:
     rows: Mapping[str, NDArray[np.intp]]
     places: Mapping[str, tuple[float, ...]]  # m, in the part's axes
     held: int  # freedoms out of the plane of the nodes, left out
+    null: tuple[str, ...]  # rows that are zero in K and M, left out: numbers, or node and freedom
 
 
 def imported_part(case: CaseFile, name: str) -> ImportedPart:
@@ -244,7 +255,12 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
         raise MechanismError(f"{path}.nodes", message)
     for own in rows.values():
         scale[own[: 2 if space == "planar" else 3]] = 1.0 / unit.length
-    kept = np.setdiff1d(np.arange(n), held)
+    null = _null_rows(K, M)
+    for name, own in rows.items():
+        if (nothing := np.intersect1d(own, null).tolist()) != []:
+            message = f"its rows {listed(map(str, nothing))} are zero in stiffness and in mass"
+            raise MechanismError(f"{path}.nodes.{name}", message)
+    kept = np.setdiff1d(np.arange(n), [*held, *null])
     D = sparse.diags_array(scale).tocsr()[:, kept]
     return ImportedPart(
         sparse.csr_array(unit.energy * (D.T @ K @ D)),
@@ -252,7 +268,15 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
         {name: np.searchsorted(kept, own) for name, own in rows.items()},
         places,
         len(held),
+        tuple(
+            str(k) if labels is None else f"{labels[k] // LABEL}.{labels[k] % LABEL}" for k in null
+        ),
     )
+
+
+def _null_rows(K: sparse.csr_array, M: sparse.csr_array) -> NDArray[np.intp]:
+    """Rows that are zero in both: rotations of nodes of solid elements, as programs leave them."""
+    return np.flatnonzero((abs(K).sum(axis=1) == 0.0) & (abs(M).sum(axis=1) == 0.0))
 
 
 # --- Files

@@ -15,6 +15,7 @@ Fields are 8 or, in lines with an asterisk, 16 characters wide. Form 6 gives one
 Each kind is told by its first lines:
 
     1,1, 2,3, 1.5e+05   *MATRIX GENERATE of Abaqus: node, freedom, node, freedom, value
+    P-1.1,1, P-1.2,3, 1.5e+05   its FORMAT=LABELS, before each node the instance of its part
     1 6  1.5e+05        .sti and .mas of CalculiX, COORDINATE of Abaqus: row, column, value
     %%MatrixMarket      coordinates behind a header, of Ansys: row, column, value
     12.3                .dof of CalculiX: node.freedom of each row
@@ -244,6 +245,8 @@ _NEXT = rb"[ \t]*[, \t][ \t]*"
 _ENTRY = re.compile(
     _COMMENTS + rb"[ \t]*-?\d+((?:" + _NEXT + rb"-?\d+){1,3})" + _NEXT + _NUMBER + rb"\s"
 )
+_INSTANCE = re.compile(rb"([A-Z][\w-]*)\.(?=\d+[ \t]*,)", re.IGNORECASE)  # before a node's number
+_LABELS = re.compile(_COMMENTS + rb"[ \t]*" + _INSTANCE.pattern, re.IGNORECASE)
 _BANNER = re.compile(
     rb"%%MatrixMarket\s+matrix\s+coordinate\s+(?:real|double|integer)\s+(general|symmetric)\s*?\n"
     rb"(?:[ \t]*(?:%[^\n]*)?\n)*[ \t]*(\d{1,9})[ \t]+(\d{1,9})[ \t]+(\d{1,15})\s*?\n",
@@ -257,6 +260,10 @@ _NODES = re.compile(rb"^\*NODE\b(?! *(?:FILE|PRINT|OUTPUT))[^\n]*\n([^*]*)", re.
 
 def read_entries(data: bytes) -> Contents | None:
     """The one matrix of a list of entries, whose nodes are named or its rows counted from 1."""
+    if _LABELS.match(data):
+        if len(set(_INSTANCE.findall(data))) > 1:
+            raise UnfitError("has rows of several part instances: write them of one part")
+        data = _INSTANCE.sub(b"", data)
     entry = _ENTRY.match(data)
     places = 1 + len(entry.group(1).replace(b",", b" ").split()) if entry else 0
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 import io
 import itertools
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,16 +47,26 @@ _EDGES = {  # of each kind, where a format has another order than Abaqus
 }
 
 
+class Joined(NamedTuple):
+    """How a file couples a set to a node of its own, at ``place`` (3,)."""
+
+    place: Floats
+    rigid: bool
+    alike: bool = False  # each node of the set counts as much, and not by its share of the area
+
+
 @dataclass(frozen=True, eq=False)
 class SolidMesh:
     """Nodes in the file's unit of length, solid elements by their number of nodes, sets of nodes.
 
-    Nodes within elements are in the order of `KINDS`; those of no element are left out.
+    Nodes within elements are in the order of `KINDS`; those of no element are left out. What the
+    file couples to a node is a set too.
     """
 
     x: Floats  # (n, 3)
     elements: dict[int, Ints]  # (m, number of nodes)
     sets: dict[str, Ints]
+    joined: dict[str, Joined]
 
     def pieces(self, most: int) -> Iterator[tuple[int, Ints]]:
         """The elements with their number of nodes, so many at a time at most."""
@@ -71,6 +82,7 @@ class _Raw:
     nodes: dict[int, tuple[float, ...]] = field(default_factory=dict)
     elements: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[str, set[int]] = field(default_factory=dict)
+    joined: dict[str, tuple[int, bool, bool]] = field(default_factory=dict)  # by id: see `Joined`
 
     def add(self, name: str, nodes: Iterable[int]) -> None:
         self.sets.setdefault(name, set()).update(nodes)
@@ -87,12 +99,12 @@ def read_mesh(file: Path, key: str) -> SolidMesh:
 
 @lru_cache(maxsize=4)  # a case reads its meshes for each model anew
 def _read(data: bytes) -> SolidMesh:
+    if re.match(rb"\s*\$MeshFormat\s+\S+\s+1\s", data):
+        raise UnfitError("is binary: save it as ASCII (in gmsh Mesh.Binary = 0)")
     if any(len(line) > LONGEST for line in io.BytesIO(data)):
         raise UnfitError(f"has a line of more than {LONGEST} characters, which no mesh has")
     head = data[:100_000].upper()
     if data.lstrip().startswith(b"$MeshFormat"):
-        if b" 1 " in data.split(b"\n", 2)[1]:
-            raise UnfitError("is binary: save it as ASCII (Mesh.Binary = 0)")
         raw, program = _gmsh(data.decode("utf-8", "replace")), "gmsh"
     elif re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
         raw, program = _abaqus(data.decode("utf-8", "replace")), "Abaqus"
@@ -108,6 +120,11 @@ def _read(data: bytes) -> SolidMesh:
 
 def _numbered(raw: _Raw, program: str) -> SolidMesh:
     """Nodes by place instead of id, and those within elements in one order."""
+    if not raw.elements and program == "gmsh" and raw.sets:
+        raise UnfitError(
+            "has no solid elements: gmsh saves what is in a physical group alone, so add a "
+            "Physical Volume, or save with Mesh.SaveAll = 1"
+        )
     if not raw.elements:
         raise UnfitError("has no solid elements" + _MESH_WITH)
     used = sorted({node for nodes in raw.elements.values() for node in nodes})
@@ -134,7 +151,14 @@ def _numbered(raw: _Raw, program: str) -> SolidMesh:
         name: np.array(sorted(place[node] for node in nodes if node in place), dtype=np.intp)
         for name, nodes in raw.sets.items()
     }
-    return SolidMesh(x, found, {name: nodes for name, nodes in sets.items() if len(nodes)})
+    if missing := {node for node, *_ in raw.joined.values()} - raw.nodes.keys():
+        raise UnfitError(f"couples nodes to one that it does not define, {min(missing)}")
+    joined = {
+        name: Joined(np.array(raw.nodes[node], dtype=np.float64), *kind)
+        for name, (node, *kind) in raw.joined.items()
+        if len(sets[name])
+    }
+    return SolidMesh(x, found, {name: own for name, own in sets.items() if len(own)}, joined)
 
 
 def _checked(x: Floats, elements: Ints, count: int, ids: Sequence[int]) -> Ints:
@@ -234,7 +258,8 @@ def _gmsh_4(
 # --- Abaqus and CalculiX
 
 _ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
-_JOINED = ("TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "KINEMATIC COUPLING", "CONTACT PAIR")
+_JOINED = ("TIE", "MPC", "EQUATION", "CONTACT PAIR", "CONTACT", "DISTRIBUTING COUPLING")
+_COUPLED = ("RIGID BODY", "KINEMATIC COUPLING", "KINEMATIC", "DISTRIBUTING")
 _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
 
 
@@ -246,6 +271,7 @@ def _abaqus(text: str) -> _Raw:
     _require_one(
         {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
     )
+    coupled, couplings = dict[str, str](), list[Any]()
     for word, options, lines in blocks:
         rows = [[entry.strip() for entry in line.split(",")] for line in lines]
         if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
@@ -265,6 +291,13 @@ def _abaqus(text: str) -> _Raw:
             target.add(options[word], _members(target, rows, "GENERATE" in options))
         elif word == "SURFACE":
             raw.add(options["NAME"], _surface(raw, groups, options, rows))
+        elif word == "COUPLING":
+            coupled = options
+        elif word in _COUPLED:
+            own = coupled if word in ("KINEMATIC", "DISTRIBUTING") else options
+            couplings.append((word, own, rows))
+    for each in couplings:
+        _abaqus_coupling(raw, groups, *each)
     for name, elements in groups.sets.items():  # of elements, where no set of nodes has the name
         if name not in raw.sets:
             both = (raw.elements.get(key) or groups.elements.get(key, []) for key in elements)
@@ -306,6 +339,28 @@ def _abaqus_elements(
     for key, *nodes in entries:
         groups.elements[key] = nodes
         groups.add(options.get("ELSET", ""), [key])
+
+
+def _abaqus_coupling(
+    raw: _Raw, groups: _Raw, word: str, options: dict[str, str], rows: list[list[str]]
+) -> None:
+    """A set that follows a node, under its constraint's name, or ``node 12`` of that node."""
+    (node,) = _members(raw, [[options["REF NODE"]]], False)
+    if word == "KINEMATIC COUPLING":
+        own, freedoms = _members(raw, [row[:1] for row in rows], False), [row[1:] for row in rows]
+    else:
+        keys = ("NSET", "PIN NSET", "TIE NSET", "SURFACE")
+        own = set[int]().union(*(raw.sets.get(options.get(key, ""), ()) for key in keys))
+        for key in groups.sets.get(options.get("ELSET", ""), ()):
+            own.update(raw.elements.get(key, groups.elements.get(key, [])))
+        freedoms = rows if word == "KINEMATIC" else []
+    ends = [[int(entry) for entry in row[:2] if entry] for row in freedoms]
+    held = {k for row in filter(None, ends) for k in range(row[0], row[-1] + 1)}
+    if any(ends) and not held >= {1, 2, 3}:
+        raise UnfitError(f"has *{word} of some directions alone{_ALONE}")
+    name = options.get("CONSTRAINT NAME", f"node {node}")
+    raw.add(name, own)
+    raw.joined[name] = (node, word != "DISTRIBUTING", False)
 
 
 def _members(groups: _Raw, rows: list[list[str]], generate: bool) -> set[int]:
@@ -356,11 +411,7 @@ _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
 def _nastran(text: str) -> _Raw:
     start = re.search(r"^BEGIN\s+BULK.*$", text, re.MULTILINE | re.IGNORECASE)
     control, bulk = ("", text) if start is None else (text[: start.start()], text[start.end() :])
-    raw, materials = _Raw(), set[str | None]()
-    for number, members in re.findall(
-        r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", control, re.MULTILINE | re.IGNORECASE
-    ):
-        raw.add(number, _listed(re.split(r"[,\s]+", members.strip())))
+    raw, materials, sets = _Raw(), set[str | None](), dict(_controlled(control))
     for name, values in _cards(bulk):
         if name == "INCLUDE":
             raise UnfitError("includes other files: save the mesh in one")
@@ -378,13 +429,43 @@ def _nastran(text: str) -> _Raw:
             n = (4 if "QUAD" in name else 3) * (2 if name in ("CTRIA6", "CQUAD8") else 1)
             raw.add(f"pid {int(values[1])}", (int(v) for v in values[2 : 2 + n] if v))
         elif name == "SET1":
-            raw.add(values[0], _listed(values[1:]))
+            sets[values[0]] = values[1:]
+        elif name in ("RBE2", "RBE3"):
+            _nastran_coupling(raw, name, values)
         elif name == "PSOLID":
             materials.add(values[1])
         elif name not in _PASSED and re.match(r"C[A-Z]|RB[AE]|RROD|RTRPLT|MPC", name):
             raise UnfitError(f"has {name[:8]}{_ALONE}")
     _require_one(materials)
+    for number, entries in sets.items():
+        raw.add(number, _listed(entries, raw.nodes))
     return raw
+
+
+def _nastran_coupling(raw: _Raw, name: str, values: list[str]) -> None:
+    """RBE2: EID, GN, CM, nodes, α. RBE3: EID, –, REFGRID, REFC, w, C, nodes, …, UM, …."""
+    given = list(itertools.takewhile(lambda v: v.upper() not in ("UM", "ALPHA"), values))
+    if name == "RBE2":
+        (node, freedoms, *rest), weights = given[1:], set[str]()
+    else:
+        node, _, *rest = given[2:]
+        weights = {value for value in rest if "." in value}
+        starts = [k for k, value in enumerate(rest) if "." in value]
+        freedoms = min((rest[k + 1] for k in starts), key=len)
+        rest = [v for k, v in enumerate(rest) if k - 1 not in starts and k not in starts]
+    if not set(freedoms) >= set("123") or len(set(map(_real, weights))) > 1:
+        raise UnfitError(f"has {name} of some directions alone, or of several weights{_ALONE}")
+    key = f"{name} {int(values[0])}"
+    raw.add(key, _listed((v for v in rest if "." not in v), raw.nodes))
+    raw.joined[key] = (int(node), name == "RBE2", name == "RBE3")
+
+
+def _controlled(control: str) -> list[tuple[str, list[str]]]:
+    """Number and entries of each SET of the case control, which goes on behind a comma."""
+    lines = (line.split("$", 1)[0].strip() for line in control.splitlines())
+    whole = re.sub(r",\s*\n", ",", "\n".join(filter(None, lines)))
+    found = re.findall(r"^SET\s+(\d+)\s*=(.*)", whole, re.MULTILINE | re.IGNORECASE)
+    return [(number, re.split(r"[,\s]+", entries)) for number, entries in found]
 
 
 def _require_one(materials: set[str | None]) -> None:
@@ -394,18 +475,32 @@ def _require_one(materials: set[str | None]) -> None:
         )
 
 
-def _listed(entries: Iterable[str]) -> set[int]:
-    """Ids, with THRU between two for all from one to the other."""
-    found: set[int] = set()
-    last, through = 0, False
-    for entry in entries:
-        if entry.upper() == "THRU":
-            through = True
-        elif entry:
-            first, last = last + 1 if through else int(entry), int(entry)
+def _listed(entries: Iterable[str], known: Collection[int]) -> set[int]:
+    """Ids: 1, 5 THRU 10, 5 THRU 10 BY 2, 5 THRU 10 EXCEPT 7, 8, ALL; none of reals and names."""
+    words = [entry.upper() for entry in entries if entry]
+    if not all(re.fullmatch(r"\d{1,9}|THRU|BY|EXCEPT|ALL|NONE", word) for word in words):
+        return set()
+    found, first, last, before = set[int](), 0, -1, ""
+    for word in words:
+        if not word.isdigit():
+            before = word
+            if word == "ALL":
+                found.update(known)
+                last = max(known, default=-1)
+        elif before == "EXCEPT" and int(word) <= last:
+            found.discard(int(word))
+        elif before == "THRU":
+            last, before = int(word), ""
             _require_few(last - first)
             found.update(range(first, last + 1))
-            through = False
+        elif before == "BY":
+            found.difference_update(
+                set(range(first, last + 1)) - set(range(first, last + 1, int(word) or 1))
+            )
+            before = ""
+        else:
+            first, last, before = int(word), -1, ""
+            found.add(first)
     return found
 
 

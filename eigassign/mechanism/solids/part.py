@@ -184,6 +184,7 @@ class Coupling(NamedTuple):
     own: Ints
     place: Floats
     rigid: bool
+    alike: bool = False  # of a distributing one the nodes count alike, and not by their area
 
 
 def centre(mesh: SolidMesh, own: Ints) -> Floats:
@@ -298,10 +299,8 @@ def moments(mesh: SolidMesh, each: Coupling) -> tuple[Floats, Floats, Floats, Fl
 
     Where it moves as one its nodes count alike.
     """
-    x = mesh.x[each.own]
-    w, first = (
-        (np.full(len(x), 1.0 / len(x)), x / len(x)) if each.rigid else _moments(mesh, each.own)
-    )
+    x, alike = mesh.x[each.own], each.rigid or each.alike
+    w, first = (np.full(len(x), 1.0 / len(x)), x / len(x)) if alike else _moments(mesh, each.own)
     arms, levers = x - w @ x, first - np.outer(w, w @ x)
     return w, arms, levers, (levers * arms).sum() * np.eye(3) - arms.T @ levers
 
@@ -363,17 +362,26 @@ def couplings(link: Any, path: str) -> tuple[SolidMesh, dict[str, Coupling]]:
     Raises MechanismError for what cannot be read, and for surfaces that the mesh does not have.
     """
     mesh = _sound(read_mesh(Path(link.mesh), f"{path}.mesh"), UNITS[link.units].length, path)
-    known, found = {name.upper(): own for name, own in mesh.sets.items()}, {}
+    known, found = {name.upper(): own for name, own in mesh.sets.items()}, dict[str, Coupling]()
+    loose = dict(mesh.joined)
     for name, node in link.nodes.items():
         own = mesh.sets.get(node.surface, known.get(node.surface.upper()))
         if own is None:
             named = listed(mesh.sets) if mesh.sets else "none: name them in the program that meshes"
             message = f"the mesh has no surface {shown(node.surface)}; it has {named}"
             raise MechanismError(f"{path}.nodes.{name}.surface", message)
-        place = centre(mesh, own)
+        place, rigid, alike = centre(mesh, own), True, False
+        for key in [key for key in loose if np.array_equal(mesh.sets[key], own)]:
+            place, rigid, alike = loose.pop(key)
         if node.position is not None:
             place = np.array([*map(float, node.position), 0.0][:3])
-        found[name] = Coupling(own, place, node.coupling == "rigid")
+        if node.coupling is not None:
+            rigid = node.coupling == "rigid"
+        found[name] = Coupling(own, place, rigid, alike)
+    for key in loose:
+        message = f"couples nodes by {shown(key)}, for which no node of the link stands: add one, "
+        message += f"{{surface: {shown(key)}}}, or take the coupling out of the file"
+        raise MechanismError(f"{path}.mesh", message)
     return mesh, found
 
 
@@ -384,7 +392,8 @@ def _sound(mesh: SolidMesh, factor: float, path: str) -> SolidMesh:
     if not length.smallest < far < length.largest:
         message = f"has nodes {far:.3g} m from its origin: is it damaged, or in other units?"
         raise MechanismError(f"{path}.mesh", message)
-    found, volume = mesh if factor == 1.0 else replace(mesh, x=factor * mesh.x), 0.0
+    joined = {n: own._replace(place=factor * own.place) for n, own in mesh.joined.items()}
+    found, volume = replace(mesh, x=factor * mesh.x, joined=joined), 0.0
     for count, rows in found.elements.items():
         for xi, weights in ((KINDS[count].points, 0.0), KINDS[count].heavy):
             J = jacobians(found.x[rows], count, xi)
@@ -407,17 +416,17 @@ def _sound(mesh: SolidMesh, factor: float, path: str) -> SolidMesh:
 def solid_part(link: Any, nu: float, path: str) -> tuple[SolidPart, Mapping[str, Floats]]:
     """The part of a solid link, and the places of its nodes; raises MechanismError."""
     mesh, nodes = couplings(link, path)
-    key = tuple((n, c.own.tobytes(), tuple(c.place.tolist()), c.rigid) for n, c in nodes.items())
+    key = tuple((n, c.own.tobytes(), tuple(c.place.tolist()), *c[2:]) for n, c in nodes.items())
     return _made(mesh, nu, key, path), {name: each.place for name, each in nodes.items()}
 
 
 @lru_cache(maxsize=4)  # a case makes its links for each model anew
 def _made(
-    mesh: SolidMesh, nu: float, key: tuple[tuple[str, bytes, Any, bool], ...], path: str
+    mesh: SolidMesh, nu: float, key: tuple[tuple[str, bytes, Any, bool, bool], ...], path: str
 ) -> SolidPart:
     given = {
-        name: Coupling(np.frombuffer(own, dtype=np.intp), np.array(place), rigid)
-        for name, own, place, rigid in key
+        name: Coupling(np.frombuffer(own, dtype=np.intp), np.array(place), *kind)
+        for name, own, place, *kind in key
     }
     T, free = joined(mesh, given, path)
     n = T.shape[0]

@@ -200,7 +200,7 @@ WRONG = {
     ),
     "two metals of Nastran": ("BEGIN BULK\nPSOLID,1,1\nPSOLID,2,7\n", "is of 2 materials"),
     "heavy point": ("BEGIN BULK\nCONM2,1,1,0,5.0\n", "has CONM2, which is not read"),
-    "coupled": ("BEGIN BULK\nRBE2,1,1,123,2\n", "has RBE2, which is not read"),
+    "joined": ("BEGIN BULK\nRBAR,1,1,2,123\n", "has RBAR, which is not read"),
     "huge set": ("*NODE\n1,0,0,0\n*NSET, NSET=a, GENERATE\n1,99999999999\n", "more than it can"),
 }
 

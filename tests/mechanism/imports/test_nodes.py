@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from imported_parts import ELEMENTS, LENGTH, arm, beam_arm, exported, read_matrix
+from scipy import io, sparse
 from spatial_cases import built, case_of
 from spatial_oracle import Tree
 from test_formats import (
@@ -237,7 +238,7 @@ def test_one_of_several_matrices_is_named(tmp_path: Path) -> None:
     K, M = exported("spatial")
     matlab(tmp_path / "part.mat", {"K1": K, "K2": K, "M": M}, "5")
     link = {"file": "part.mat", "nodes": BY_ID}
-    said = "holds 3 matrices, K1, K2, M: name one, as parts.mat:K does"
+    said = "holds 3 matrices, K1, K2, M: in place of file write stiffness: parts.mat:K and mass:"
     assert said in refusal(tmp_path, link)
     link = {"stiffness": "part.mat:K3", "mass": "part.mat:M", "nodes": BY_ID}
     assert "has no matrix 'K3'; it has K1, K2, M" in refusal(tmp_path, link)
@@ -369,3 +370,60 @@ def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
     one = lam(tmp_path, link)
     two = lam(tmp_path, of_dmig(tmp_path, 4 * K, M, labels_of("spatial")))
     assert (two > 1.001 * one).all()
+
+
+def test_rows_that_are_zero_in_both_are_named_and_left_out(tmp_path: Path) -> None:
+    """As Nastran leaves the rotations of nodes of solids (AUTOSPC)."""
+    K, M = exported("spatial")
+    link = of_abaqus(tmp_path, K, M, labels_of("spatial"))
+    n, more = len(K), [3, 17, 40]
+    at = np.setdiff1d(np.arange(n + len(more)), more)
+    for name, A in (("K", K), ("M", M)):
+        wide = np.zeros((n + len(more),) * 2)
+        wide[np.ix_(at, at)] = A
+        np.save(tmp_path / f"{name}.npy", wide)
+    ends = {"start": at[:6].tolist(), "end": at[-6:].tolist()}
+    places = {"start": [0, 0, 0], "end": [LENGTH, 0, 0]}
+    own = {"stiffness": "K.npy", "mass": "M.npy"}
+    own["nodes"] = {k: {"dofs": v, "position": places[k]} for k, v in ends.items()}
+    np.testing.assert_allclose(lam(tmp_path, own), lam(tmp_path, link), rtol=1e-6)
+    assert any("rows 3, 17, 40 are zero in stiffness and mass" in s for s in lines(tmp_path, own))
+    own["nodes"]["end"]["dofs"] = [*ends["end"][:5], 40]
+    assert "its rows 40 are zero in stiffness and in mass" in refusal(tmp_path, own)
+
+
+def test_entries_of_a_part_instance_are_those_of_its_nodes(tmp_path: Path) -> None:
+    """FORMAT=LABELS of Abaqus."""
+    link = of_abaqus(tmp_path, *exported("spatial"), labels_of("spatial"))
+    plain = lam(tmp_path, link)
+    text = {f: (tmp_path / f).read_text() for f in ("K.mtx", "M.mtx")}
+    for file, own in text.items():
+        named = re.sub(r"(?<!\d)(\d+)(?=,[1-6],)", r"PART-1-1.\1", own)
+        (tmp_path / file).write_text("** labels\n" + named)
+    assert "PART-1-1.1000,1, PART-1-1.1000,1," in (tmp_path / "K.mtx").read_text()
+    np.testing.assert_array_equal(lam(tmp_path, link), plain)
+    two = (tmp_path / "K.mtx").read_text().replace("PART-1-1.1000,1,", "PART-2-1.1000,1,", 1)
+    (tmp_path / "K.mtx").write_text(two)
+    assert "several part instances: write them of one part" in refusal(tmp_path, link)
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_matrices_in_a_structure_are_found_and_named(tmp_path: Path, full: bool) -> None:
+    K, M = (A if full else sparse.csc_array(A) for A in exported("spatial"))
+    io.savemat(tmp_path / "part.mat", {"SE": {"K": K, "M": M, "dof": np.arange(3.0), "of": "me"}})
+    texts(tmp_path, p_dof=dofs(labels_of("spatial")), nodes_csv=CSV)
+    files = {"nodes_file": ["nodes.csv", "p.dof"], "nodes": BY_ID}
+    one = lam(tmp_path, {"file": "part.mat", **files})
+    both = {"stiffness": "part.mat:SE.K", "mass": "part.mat:SE.M"}
+    np.testing.assert_array_equal(lam(tmp_path, {**both, **files}), one)
+    np.testing.assert_allclose(one, built(beam_arm("spatial")).lam([0.4, 0.9], 6), rtol=1e-7)
+
+
+def test_of_all_that_a_punch_holds_the_reduced_matrices_are_taken(tmp_path: Path) -> None:
+    """KAAX, MAAX, BAAX, VAX, MUG1T of EXTSEOUT(DMIGPCH)."""
+    K, M = exported("spatial")
+    link = of_dmig(tmp_path, K, M, labels_of("spatial"))
+    plain, text = lam(tmp_path, link), (tmp_path / "part.pch").read_text()
+    more = (dmig(name, np.eye(len(K)), labels_of("spatial")) for name in ("BAAX", "MUG1T", "KX"))
+    (tmp_path / "part.pch").write_text(text + "".join(more))
+    np.testing.assert_array_equal(lam(tmp_path, link), plain)
