@@ -8,7 +8,8 @@ with the mass, centre and inertia of their ``inertial``.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -39,10 +40,10 @@ def urdf_mapping(
 
     ``stiffness`` of the drives of all joints, or by joint (None: free), in N m/rad, N/m where they
     slide, or text with a unit; a parameter is ``coordinates.<joint>.drive.stiffness``. Links are
-    rigid; the root of the tree stands on the ground. Raises UsageError for what is no such robot,
-    StorageError for a file that cannot be read.
+    rigid; the root of the tree stands on the ground; joints that mimic are locked. Raises
+    UsageError for what is no such robot, StorageError for a file that cannot be read.
     """
-    title, links, joints = _parsed(Path(path))
+    title, links, joints, _ = _parsed(Path(path))
     names = _identifiers(links, path)
     own = _identifiers([joint.name for joint in joints], path)
     written: dict[str, Any] = {}
@@ -68,6 +69,9 @@ def urdf_mapping(
         }
         if joint.type in _MOVING:
             by_joint = stiffness if isinstance(stiffness, Mapping) else {joint.name: stiffness}
+            if joint.mimic is not None:
+                drives[own[joint.name]] = "locked"
+                continue
             if joint.name not in by_joint:
                 raise UsageError(f"{path}: no stiffness is given for joint {joint.name}")
             given = by_joint[joint.name]
@@ -97,32 +101,42 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
     away from their own, stiffnesses of drives, the trajectory. A joint that moves no mass is
     locked. Raises as `urdf_mapping`, and UsageError for what would be no case.
     """
-    _, links, joints = _parsed(path)
+    _, links, joints, lines = _parsed(path)
     moving = {joint.name: joint for joint in joints if joint.type in _MOVING}
     content = urdf_mapping(path, {key: STANDING[joint.type] for key, joint in moving.items()})
     if not moving:
         raise UsageError(f"{path}: no joint moves: a robot of fixed joints has no coordinate")
     long = {joint.parent for joint in joints if np.linalg.norm(joint.place) > _LEVEL}
     asked = [f"flexibility of link {link}: rigid stands there" for link in links if link in long]
-    steps = []
+    heavy = _with_mass(links, joints)
+    steps = dict[str, Floats]()
     for joint, coordinate in zip(moving.values(), content["coordinates"].values(), strict=True):
-        carried = [links[each] for each in _beyond(joint.child, joints=joints)]
-        if all(each is None or each[0] == 0.0 == np.abs(each[2]).max() for each in carried):
+        steps[joint.name] = np.zeros(2)
+        if joint.mimic is not None:
+            one, k, more = joint.mimic
+            tied = f"{k:g} × {one}" + (f" {'+' if more > 0 else '−'} {abs(more):g}" if more else "")
+            asked.append(f"drive of {joint.name}, which follows as {tied}: locked there")
+        elif joint.child not in heavy:
             coordinate["drive"] = "locked"
             asked.append(f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked")
-            steps.append((0.0, 0.0))
-            continue
-        drive = f"stiffness of the drive of {joint.name}"
-        asked.append(f"{drive}: {STANDING[joint.type]} stands there")
-        lower, upper = joint.limits
-        start = float(np.clip(0.0, lower, upper))
-        step = 0.1 if joint.type == "prismatic" else 0.5
-        room = max(upper - start, lower - start, key=abs)
-        steps.append((start, float(start + np.clip(0.25 * room, -step, step))))
-    if not np.any(steps):
-        raise UsageError(f"{path}: no joint moves a mass: give its links <inertial>")
+        else:
+            drive = f"stiffness of the drive of {joint.name}"
+            asked.append(f"{drive}: {STANDING[joint.type]} stands there")
+            lower, upper = joint.limits
+            start = float(np.clip(0.0, lower, upper))
+            step = 0.1 if joint.type == "prismatic" else 0.5
+            room = max(upper - start, lower - start, key=abs)
+            steps[joint.name] = start + np.array([0.0, np.clip(0.25 * room, -step, step)])
+    following = [joint for joint in moving.values() if joint.mimic is not None]
+    for _ in following:  # each of a chain of them is right one turn after the one before it
+        for joint in following:
+            one, k, more = joint.mimic or ("", 0.0, 0.0)
+            steps[joint.name] = k * steps.get(one, np.zeros(2)) + more
+    if not heavy.intersection(joint.child for joint in moving.values()):
+        without = listed(name for name, inertial in links.items() if inertial is None)
+        raise UsageError(f"{path}: no joint moves a mass: give links <inertial>, as {without}")
     asked.append("trajectory: poses between which the joints move; small steps stand there")
-    points = [[round(at, 6) for at in pose] for pose in zip(*steps, strict=True)]
+    points = np.round(np.transpose([*steps.values()]), 6).tolist()
     content["trajectory"] = {"points": points, "duration": "2 s"}
     first = f"From {path.name}: masses, places and axes. To be filled in, as URDF has none:"
     head = "\n".join(f"# {printable(each)}" for each in (first, *(f"- {one}" for one in asked)))
@@ -133,9 +147,28 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
     try:
         parse(text.encode(), path.with_suffix(".yaml"))
     except CaseError as error:
-        problem = error.problems[0]
-        raise UsageError(f"{path}: gives no case: {problem.path}: {problem.message}") from error
+        names = {own: name for name, own in _identifiers(links, path).items()}
+        told = []
+        for problem in error.problems:
+            _, _, own, *key = [*problem.path.split("."), "", "", ""]
+            name = names.get(own, "")
+            at = f"link {name} (line {lines.get(name)}), {'.'.join(filter(None, key))}"
+            where = at if name in lines else problem.path
+            told.append(f"{where}: {problem.message}")
+        raise UsageError(f"{path}: gives no case: {'; '.join(told)}") from error
     return text, asked
+
+
+def _with_mass(links: Mapping[str, Inertial | None], joints: Sequence[_Joint]) -> set[str]:
+    """The links that have mass or inertia, or carry one that has."""
+    over = {joint.child: joint.parent for joint in joints}
+    found = set[str]()
+    for name, inertial in links.items():
+        own = inertial is not None and (inertial[0] != 0.0 or inertial[2].any())
+        while own and name not in found:
+            found.add(name)
+            name = over.get(name, name)
+    return found
 
 
 class _Joint(NamedTuple):
@@ -147,6 +180,7 @@ class _Joint(NamedTuple):
     turn: Floats  # (3,): roll, pitch and yaw
     axis: Floats  # (3,)
     limits: Floats  # lower and upper, infinite where there is none
+    mimic: tuple[str, float, float] | None  # k × that joint + so much more
 
 
 class _Tree(ElementTree.TreeBuilder):
@@ -157,8 +191,13 @@ class _Tree(ElementTree.TreeBuilder):
         raise ValueError("a URDF file has no document type and no entities")
 
 
-def _parsed(path: Path) -> tuple[str, dict[str, Inertial | None], list[_Joint]]:
-    """Name, links and joints of a file without its meshes; raises UsageError, StorageError."""
+def _parsed(
+    path: Path,
+) -> tuple[str, dict[str, Inertial | None], list[_Joint], dict[str, int]]:
+    """Name, links, joints and lines of links of a file without its meshes.
+
+    Raises UsageError with all that is wrong, StorageError.
+    """
     try:
         data = read_bytes(path, CASE)
     except (FileNotFoundError, NotADirectoryError):
@@ -168,7 +207,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Inertial | None], list[_Joint]]:
     parser = ElementTree.XMLParser(target=_Tree())
     expand = f"xacro is a language that writes URDF: xacro {path} > robot.urdf expands it"
     try:
-        parser.feed(data)
+        parser.feed(data.lstrip())
         robot = parser.close()
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         hint = f"; {expand}" if b"xacro:" in data else ""
@@ -177,13 +216,34 @@ def _parsed(path: Path) -> tuple[str, dict[str, Inertial | None], list[_Joint]]:
         raise UsageError(f"{path}: not a URDF file: {expand}")
     try:
         if robot.tag != "robot":
-            raise ValueError(f"not a URDF file: it begins with <{robot.tag}>, not <robot>")
-        links = {_text(e, "name"): _link(e) for e in robot.findall("link")}
-        joints = [_read_joint(e) for e in robot.findall("joint")]
-        _require_tree(links, joints, len(robot.findall("link")))
+            raise ValueError(f"not a URDF file: it begins with <{short(robot.tag)}>, not <robot>")
+        wrong = list[str]()
+        links = [*_each(robot.findall("link"), _link, wrong)]
+        joints = [*_each(robot.findall("joint"), _read_joint, wrong)]
+        if wrong:
+            raise ValueError("; ".join(wrong))
+        _require_tree(dict(links), joints, len(links))
     except ValueError as error:
-        raise UsageError(f"{path}: {short(printable(str(error)), LONGEST)}") from error
-    return short(printable(robot.get("name") or path.stem)), links, joints
+        raise UsageError(f"{path}: {printable(str(error))}") from error
+    text = data.decode("utf-8", "replace")
+    lines = {
+        found.group(2): text.count("\n", 0, found.start()) + 1
+        for found in re.finditer(r"<link\b[^>]*?\bname\s*=\s*([\"'])(.*?)\1", text)
+    }
+    return short(printable(robot.get("name") or path.stem)), dict(links), joints, lines
+
+
+def _each(
+    elements: Sequence[ElementTree.Element],
+    read: Callable[[ElementTree.Element], Any],
+    wrong: list[str],
+) -> Iterator[Any]:
+    """What is read of each; what is wrong with others goes to ``wrong``."""
+    for element in elements:
+        try:
+            yield read(element)
+        except ValueError as error:
+            wrong.append(short(str(error), LONGEST))
 
 
 def _text(element: ElementTree.Element, *keys: str) -> str:
@@ -202,7 +262,8 @@ def _numbers(element: ElementTree.Element | None, key: str, default: Sequence[fl
         found = np.array(default if given is None else [float(word) for word in given.split()])
     except ValueError:
         found = np.zeros(0)
-    if len(found) != len(default) or np.isnan(found).any():
+    unfit = len(found) != len(default) or np.isnan(found).any()
+    if unfit or (np.isinf(found) & np.isfinite(default)).any():  # limits alone may be infinite
         many = "a number" if len(default) == 1 else f"{len(default)} numbers"
         raise ValueError(f'<{element.tag} {key}="{given}">: expected {many}')  # type: ignore[union-attr]
     return found
@@ -214,13 +275,13 @@ def _origin(element: ElementTree.Element) -> tuple[Floats, Floats]:
     return _numbers(origin, "xyz", [0.0] * 3), _numbers(origin, "rpy", [0.0] * 3)
 
 
-def _link(element: ElementTree.Element) -> Inertial | None:
-    inertial = element.find("inertial")
+def _link(element: ElementTree.Element) -> tuple[str, Inertial | None]:
+    name, inertial = _text(element, "name"), element.find("inertial")
     if inertial is None:
-        return None
+        return name, None
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or inertia is None:
-        raise ValueError(f"link {element.get('name')}: inertial needs mass and inertia")
+        raise ValueError(f"link {name}: inertial needs mass and inertia")
     xx, xy, xz, yy, yz, zz = (
         float(_numbers(inertia, f"i{key}", [0.0])[0])
         for key in ("xx", "xy", "xz", "yy", "yz", "zz")
@@ -229,7 +290,7 @@ def _link(element: ElementTree.Element) -> Inertial | None:
     own *= np.abs(own).max() > _NOTHING
     center, turn = _origin(inertial)
     R = Rotation.from_euler("xyz", turn).as_matrix()
-    return float(_numbers(mass, "value", [0.0])[0]), center, R @ own @ R.T
+    return name, (float(_numbers(mass, "value", [0.0])[0]), center, R @ own @ R.T)
 
 
 def _read_joint(element: ElementTree.Element) -> _Joint:
@@ -239,11 +300,10 @@ def _read_joint(element: ElementTree.Element) -> _Joint:
             f'joint {name}: type {kind} is not supported; type="fixed" if it does not move, else '
             "a chain of revolute and prismatic joints"
         )
-    if element.find("mimic") is not None:
-        raise ValueError(
-            f"joint {name}: mimic is not supported; without <mimic> it is a coordinate of its own, "
-            'with type="fixed" it is held'
-        )
+    mimic, tied = element.find("mimic"), None
+    if mimic is not None and kind != "fixed":
+        k, more = (_numbers(mimic, w, [d])[0] for w, d in (("multiplier", 1.0), ("offset", 0.0)))
+        tied = (_text(element, "mimic", "joint"), float(k), float(more))
     axis = _numbers(element.find("axis"), "xyz", [1.0, 0.0, 0.0])
     if kind != "fixed" and not axis.any():
         raise ValueError(f"joint {name}: its axis has no direction")
@@ -254,7 +314,9 @@ def _read_joint(element: ElementTree.Element) -> _Joint:
     if not lower < upper:  # as it is written where there are no limits: 0 and 0
         lower, upper = -np.inf, np.inf
     parent, child = (_text(element, key, "link") for key in ("parent", "child"))
-    return _Joint(name, kind, parent, child, *_origin(element), axis, np.array([lower, upper]))
+    return _Joint(
+        name, kind, parent, child, *_origin(element), axis, np.array([lower, upper]), tied
+    )
 
 
 def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) -> None:
@@ -263,6 +325,7 @@ def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) 
         raise ValueError("two links or two joints have one name")
     children = [joint.child for joint in joints]
     missing = {n for j in joints for n in (j.parent, j.child)} - set(links)
+    _require_masters(joints)
     once = len(set(children)) == len(children) == len(links) - 1
     if missing or not once or len(_beyond(*set(links) - set(children), joints=joints)) != count:
         loose = [n for n in links if n not in children][1:] or sorted(missing)
@@ -270,11 +333,25 @@ def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) 
         raise ValueError(f"the joints do not connect all links to one tree{which}")
 
 
+def _require_masters(joints: Sequence[_Joint]) -> None:
+    """Raises ValueError for joints that mimic none, or each other."""
+    over, names = {j.name: j.mimic[0] for j in joints if j.mimic}, {j.name for j in joints}
+    for name, at in over.items():
+        if at not in names:
+            raise ValueError(f"joint {name}: mimics {at}, which is no joint")
+        for _ in over:
+            at = over.get(at, "")
+        if at:
+            raise ValueError(f"joint {name}: mimics itself, by {over[name]}")
+
+
 def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:
     """These links and all that they carry."""
-    found = list(links)
+    found, below = list(links), defaultdict[str, list[str]](list)
+    for joint in joints:
+        below[joint.parent] += [joint.child] if joint.child != joint.parent else []
     for name in found:  # which grows
-        found += [joint.child for joint in joints if joint.parent == name and joint.child != name]
+        found += below[name]
     return found
 
 

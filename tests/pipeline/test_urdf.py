@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
@@ -119,7 +120,9 @@ def test_a_stiffness_is_a_parameter_and_the_case_can_be_kept(crane: Path, tmp_pa
         ('<parent link="slide"/>', "", "not a URDF file"),
         ("</robot>", "", "not a URDF file"),
         ("<robot", "<!DOCTYPE x [<!ENTITY a 'b'>]><robot", "no document type and no entities"),
-        ('<axis xyz="0 0 1"/>', '<mimic joint="pitch"/>', "joint yaw: mimic is not supported"),
+        ('<axis xyz="0 0 1"/>', '<mimic joint="jaw"/>', "joint yaw: mimics jaw, which is no joint"),
+        ('<axis xyz="0 0 1"/>', '<mimic joint="yaw"/>', "joint yaw: mimics itself, by yaw"),
+        ('<mass value="5"/>', '<mass value="inf"/>', "expected a number"),
         ('name="slide"', 'name="sledge"', "do not connect all links to one tree"),
         ('"slide"', '"upper_arm"', "two names of links or joints are alike"),
         ('"yaw"', '"ground"', "or one is ground"),
@@ -232,3 +235,67 @@ def test_init_takes_robots_as_programs_write_them(crane: Path) -> None:
     assert main(["init", "--urdf", str(crane), "--out", str(crane.parent)]) == 0
     case = ea.load_case(crane.parent / "crane.yaml")
     assert (np.ptp(case.trajectory.q, axis=0) > 0.02).all()
+
+
+ARM = """
+
+  <?xml version="1.0"?>
+<robot name="hand"><link name="base"/>
+<link name="a">{a}</link>
+<link name="b">{b}</link>
+<link name="c">{a}</link>
+<joint name="j" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="inf"/></joint>
+<joint name="k" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.2"/>
+<axis xyz="0 1 0"/>{k}</joint>
+<joint name="l" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0 0.1 0.2"/>
+<axis xyz="0 1 0"/>{l}</joint></robot>
+"""
+BODY = """<inertial><origin xyz="0 0 0.1"/><mass value="0.5"/>
+<inertia ixx="{0}" iyy="{0}" izz="0.0003" ixy="0" ixz="0" iyz="0"/></inertial>"""
+SOUND, FAULTY = BODY.format("0.0012"), BODY.format("-0.0012")
+
+
+def test_joints_that_mimic_follow_on_locked_drives_and_it_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One mimics a joint that mimics, and stands before blanks and an infinite limit."""
+    ties = {"k": '<mimic joint="j" multiplier="-2" offset="0.1"/>', "l": '<mimic joint="k"/>'}
+    (tmp_path / "hand.urdf").write_text(ARM.format(a=SOUND, b=SOUND, **ties))
+    assert main(["init", "--urdf", str(tmp_path / "hand.urdf"), "--out", str(tmp_path)]) == 0
+    asked, case = capsys.readouterr().out, yaml.safe_load((tmp_path / "hand.yaml").read_text())
+    first, last = np.array(case["trajectory"]["points"])
+    for pose in (first, last):
+        assert pose[1:] == pytest.approx([0.1 - 2.0 * pose[0]] * 2)
+    assert first[0] != last[0]
+    assert [each["drive"] for each in case["coordinates"].values()][1:] == ["locked", "locked"]
+    said = "drive of k, which follows as -2 × j + 0.1: locked there"
+    assert said in asked
+    assert "drive of l, which follows as 1 × k: locked there" in asked
+    model = ea.load_case(ea.urdf_mapping(tmp_path / "hand.urdf", 2e3)).model()
+    assert model.frequencies(first, [], 1)[0, 0] > 1.0
+
+
+def refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["init", "--urdf", str(folder / "hand.urdf"), "--out", str(folder)]) == 2
+    return capsys.readouterr().err
+
+
+def test_all_faulty_inertias_are_told_at_once_with_their_lines(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "hand.urdf").write_text(ARM.format(a=FAULTY, b=SOUND, k="", l=""))
+    told = refused(tmp_path, capsys)
+    assert re.search(
+        r"link a \(line 5\), inertia: not pos.*; link c \(line 9\), inertia: not", told
+    ), told
+    both = ARM.format(a=FAULTY, b=SOUND, k="", l="").replace('value="0.5"', 'value="inf"')
+    (tmp_path / "hand.urdf").write_text(both)
+    assert refused(tmp_path, capsys).count('<mass value="inf">: expected a number') == 3
+
+
+def test_a_robot_without_masses_says_whose_are_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "hand.urdf").write_text(ARM.format(a="", b="", k="", l=""))
+    assert "give links <inertial>, as base, a, b, c" in refused(tmp_path, capsys)
