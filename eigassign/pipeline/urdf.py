@@ -30,6 +30,7 @@ Inertial = tuple[float, Floats, Floats]  # mass, its centre, inertia about it, i
 _MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 _TAKEN = {"ground", "start", "end"}
 _NOTHING = 1e-15  # kg m²: zeros of icub.urdf have products of up to 4e-18, which turns no body
+_ROUNDED = 1e-30  # of any number: what programs leave of zeros
 _LEVEL = 1e-9  # m: a joint this near to another one is at its place
 
 
@@ -222,6 +223,8 @@ def _parsed(
         joints = [*_each(robot.findall("joint"), _read_joint, wrong)]
         if wrong:
             raise ValueError("; ".join(wrong))
+        if not links:
+            raise ValueError("has no link")
         _require_tree(dict(links), joints, len(links))
     except ValueError as error:
         raise UsageError(f"{path}: {printable(str(error))}") from error
@@ -266,7 +269,7 @@ def _numbers(element: ElementTree.Element | None, key: str, default: Sequence[fl
     if unfit or (np.isinf(found) & np.isfinite(default)).any():  # limits alone may be infinite
         many = "a number" if len(default) == 1 else f"{len(default)} numbers"
         raise ValueError(f'<{element.tag} {key}="{given}">: expected {many}')  # type: ignore[union-attr]
-    return found
+    return np.where(np.abs(found) < _ROUNDED, 0.0, found)
 
 
 def _origin(element: ElementTree.Element) -> tuple[Floats, Floats]:
@@ -336,13 +339,15 @@ def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) 
 def _require_masters(joints: Sequence[_Joint]) -> None:
     """Raises ValueError for joints that mimic none, or each other."""
     over, names = {j.name: j.mimic[0] for j in joints if j.mimic}, {j.name for j in joints}
+    wrong = [
+        f"{name} mimics {at}, which is no joint" for name, at in over.items() if at not in names
+    ]
     for name, at in over.items():
-        if at not in names:
-            raise ValueError(f"joint {name}: mimics {at}, which is no joint")
         for _ in over:
             at = over.get(at, "")
-        if at:
-            raise ValueError(f"joint {name}: mimics itself, by {over[name]}")
+        wrong += [f"{name} mimics itself, by {over[name]}"] if at in over else []
+    if wrong:
+        raise ValueError("; ".join(f"joint {each}" for each in wrong))
 
 
 def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:
