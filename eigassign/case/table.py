@@ -14,10 +14,11 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from eigassign.case.reader import NUMBER, listed, shown, suggestion
+from eigassign.case.reader import NUMBER, listed, shown, suggestion, unknown
 from eigassign.case.units import (
     DIMENSIONS,
     ONE,
@@ -40,12 +41,14 @@ MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
 class CsvColumn(NamedTuple):
     """A column to be read: numbers of one of these dimensions, or words where it has none.
 
-    The first dimension is meant where the header gives no unit.
+    The first dimension is meant where the header gives no unit. ``written`` is what the header
+    calls it, `name` or `name [unit]`, where that is something else.
     """
 
     name: str
     dimensions: tuple[Dimension, ...] = ()
     optional: bool = False
+    written: str = ""
 
 
 class CsvTable(NamedTuple):
@@ -103,10 +106,16 @@ def read_table(
         message = f"{file.name}:{line}: expected a header with {wanted}, and numbers below it"
         raise MechanismError(key, message) from None  # what the file says is not for a message
     lines, values = [], list[list[float | str]]([] for _ in found)
+    clocks = [column.place for column in found if column.dimension == DIMENSIONS["time"]]
+    first: datetime | None = None
     for k, (number, row) in enumerate(rows):
         try:
             if k >= MOST:
                 raise ValueError(f"more than {MOST} rows")
+            for place in clocks:  # times of day count from the first one
+                if (at := _instant(row[place : place + 1])) is not None:
+                    first = first or at
+                    row[place] = str((at - first).total_seconds())
             read = _values(row, found, len(header))
             for column, value in zip(values, read, strict=True):
                 column.append(value)
@@ -125,6 +134,15 @@ def read_table(
         dimensions={c.name: c.dimension for c in found if c.dimension},
         notes=(f"{file.name}: ignored the columns {extra}",) if passed_over else (),
     )
+
+
+def renamed(columns: Sequence[CsvColumn], written: Mapping[str, str], key: str) -> list[CsvColumn]:
+    """The columns, with what the header calls some; raises MechanismError for others at ``key``."""
+    known = [column.name for column in columns]
+    for name in written:
+        if name not in known:
+            raise MechanismError(key, f"columns: {unknown('column', name, known)}")
+    return [column._replace(written=written.get(column.name, "")) for column in columns]
 
 
 def read_words(file: Path, key: str) -> list[tuple[int, list[str]]]:
@@ -174,6 +192,14 @@ def _rows(file: Path, key: str) -> Iterator[tuple[int, list[str]]]:
         raise MechanismError(key, f"{message}, or one name; close every quote") from error
 
 
+def _instant(cells: Sequence[str]) -> datetime | None:
+    """The date and time of a cell in ISO 8601."""
+    try:
+        return datetime.fromisoformat(cells[0]) if cells and ":" in cells[0] else None
+    except ValueError:
+        return None
+
+
 def _with_point(cell: str) -> str:
     number = cell.replace(",", ".", 1)
     return number if NUMBER.fullmatch(number) else cell
@@ -209,12 +235,15 @@ def _headings(
         units.append(match.group(2) or "")
     found = []
     for column in columns:
-        if column.name not in names and column.optional:
+        if (match := _HEADER_CELL.fullmatch(column.written or column.name)) is None:
+            raise ValueError(f"column {shown(column.written)} must read `name` or `name [unit]`")
+        name, unit_written = match.groups()
+        if name not in names and column.optional and not column.written:
             continue
-        if names.count(column.name) != 1:
-            raise ValueError(_miscounted(column, names))
-        index = names.index(column.name)
-        unit = _unit(column, units[index]) if column.dimensions else ()
+        if names.count(name) != 1:
+            raise ValueError(_miscounted(column._replace(name=name), names))
+        index = names.index(name)
+        unit = _unit(column, unit_written or units[index]) if column.dimensions else ()
         found.append(_Heading(column.name, index, *unit))
     return names, found
 

@@ -18,6 +18,7 @@ from eigassign.case.schema.design import Tolerance, YValue
 from eigassign.case.schema.parts import (
     ByReference,
     File,
+    FrozenDict,
     Mistakes,
     NumberOr,
     OneOrList,
@@ -147,7 +148,8 @@ class Measurement(Part):
             give `q` where the machine followed the path with another one
         q: instead of the time: one value of each coordinate
         trajectory: name of the trajectory, where there are several
-        mode: its number, counted from the lowest elastic one
+        mode: its number, counted from the lowest elastic one; without it that of the model as it is
+            written whose frequency is nearest, no two of a pose alike
         frequency: what was measured
         deviation: its standard deviation; a share is one of the frequency
     """
@@ -155,7 +157,7 @@ class Measurement(Part):
     time: Annotated[float, TIME] | None = None
     q: Coordinates | None = None
     trajectory: str | None = None
-    mode: Mode
+    mode: Mode | None = None
     frequency: Frequency
     deviation: Tolerance
     one_of = ("time", "q")
@@ -167,10 +169,12 @@ class MeasurementFile(Part):
     Keys:
         file: relative to the case file; columns of the same names, and one for each coordinate
             instead of `q`
+        columns: what the header calls them, where that is something else
         deviation: of rows for which the file gives none
     """
 
     file: File
+    columns: ByReference[str] = FrozenDict()
     deviation: Tolerance | None = None
 
 

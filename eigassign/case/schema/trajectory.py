@@ -122,10 +122,16 @@ class FileTrajectory(AnyTrajectory):
     """Samples of the coordinates in a CSV file.
 
     Keys:
-        file: relative to the case file; columns `time` and one for each coordinate
+        file: relative to the case file; columns `time` and one for each coordinate; times of day
+            count from the first one
+        columns: what the header calls them, where that is something else: `{time: timestamp,
+            q1: "actual_q_0 [deg]"}`
+        rate: samples per second, where there is no column of time
     """
 
     file: File
+    columns: ByReference[str] = FrozenDict()
+    rate: Annotated[float, quantity("frequency", above=0)] | None = None
 
 
 class Timed(AnyTrajectory):

@@ -11,12 +11,13 @@ Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ from eigassign.case.schema.trajectory import (
     SampledTrajectory,
     TipTrajectory,
 )
-from eigassign.case.table import CsvColumn, read_table
+from eigassign.case.table import CsvColumn, read_table, renamed
 from eigassign.case.units import DIMENSIONS, handy
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import (
@@ -140,29 +141,39 @@ def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> l
     ]
 
 
-def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()) -> Trajectory:
+def read_samples(
+    file: Path,
+    q_names: Sequence[str],
+    q_units: Sequence[str] = (),
+    written: Mapping[str, str] = MappingProxyType({}),
+    rate_hz: float | None = None,
+) -> Trajectory:
     """Samples of the coordinates ``q_names`` from a CSV file, in SI units.
 
-    ``q_units`` are "rad" or "m", all rad if empty. s and rad (m for strokes) are meant where no
-    unit is written; see `eigassign.case.table`. The columns of the tip that runs write (`tip x
+    ``q_units`` are "rad" or "m", all rad if empty; ``written`` what the header calls columns; with
+    ``rate_hz`` there is none of time. s and rad (m for strokes) are meant where no unit is written;
+    see `eigassign.case.table`. The columns of the tip that runs write (`tip x
     [m]`, …) are passed over without a note.
 
     Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
     TrajectoryError for a line that does not hold one finite number a column, or goes back in time;
     both name the line.
     """
-    columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
+    clock = [] if rate_hz else [CsvColumn(TIME, (DIMENSIONS["time"],))]
+    columns = [*clock, *coordinate_columns(q_names, q_units)]
+    columns = renamed(columns, written, _KEY)
     table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
     if len(table.lines) < 2:
         message = f"{file.name}: {len(table.lines)} samples; at least two are needed"
         raise MechanismError(_KEY, message)
-    values = np.column_stack([table.numbers[column.name] for column in columns])
-    time_s = values[:, 0].copy()
+    q = np.column_stack([table.numbers[name] for name in q_names])
+    time_s = np.array(table.numbers.get(TIME, ()))
+    if rate_hz:
+        time_s = np.arange(len(q)) / rate_hz
     for k in np.flatnonzero(np.diff(time_s) <= 0.0).tolist():
         before, after = time_s[k : k + 2]
         message = f"time must increase, and goes from {before:g} s to {after:g} s"
         raise TrajectoryError(_KEY, f"{table.where(k + 1)}: {message}", k + 1)
-    q = np.ascontiguousarray(values[:, 1:])
     return Trajectory(time_s, q, (*table.notes, *_jumps(q, q_names, q_units)))
 
 
@@ -184,7 +195,7 @@ def build_trajectory(
     if isinstance(spec, TipTrajectory):
         return _from_tip_path(spec, tip_chain, moved)
     if isinstance(spec, FileTrajectory):
-        return read_samples(Path(spec.file), q_names, q_units)
+        return read_samples(Path(spec.file), q_names, q_units, spec.columns, spec.rate)
     if isinstance(spec, PointTrajectory):
         return _from_points(spec)
     return _from_samples(spec, q_names, q_units)

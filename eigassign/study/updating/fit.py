@@ -410,7 +410,21 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
         yield "of lists of values and choices only the smallest and largest value count"
 
 
+MOST_PAIRS = 12  # that a warning lists
+
+
 def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
+    pairs = [each for each in problem.measured if each.paired_hz is not None]
+    if pairs:
+        told = "; ".join(
+            f"{each.label}, {each.hz:g} Hz, is mode {each.mode}, {each.paired_hz:.4g} Hz there"
+            for each in pairs[:MOST_PAIRS]
+        )
+        told += f"; and {len(pairs) - MOST_PAIRS} more" * (len(pairs) > MOST_PAIRS)
+        yield (
+            "measurements without a mode are paired by frequency with the model as it is written: "
+            f"{told}; where a pair is wrong, write its mode"
+        )
     modes = sorted({each.mode for each in problem.measured})
     error = problem.model.discretisation_error(problem.q, found.y, modes)
     at = [modes.index(each.mode) for each in problem.measured]

@@ -7,7 +7,7 @@ trajectory is that of the design as the file writes it, for that is what the dri
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import shown, unknown
 from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, MeasurementFile
-from eigassign.case.table import CsvColumn, CsvTable, read_table
+from eigassign.case.table import CsvColumn, CsvTable, read_table, renamed
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.trajectory import TIME, Trajectories, coordinate_columns
@@ -26,6 +26,7 @@ from eigassign.study.built_case import BuiltCase
 
 Floats = NDArray[np.float64]
 _KEY = "measurements.file"
+MODES_AROUND = 4  # of the model, more than twice as many as there are frequencies at a pose
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,10 @@ class PosedMeasurement:
     time_s: float | None
     trajectory: str | None
     q: Floats  # (n_q,) in rad or m
-    mode: int
+    mode: int  # 0 until it is paired
     hz: float
     deviation_hz: float
+    paired_hz: float | None = None  # of the model as it is written, if the mode was told by that
 
 
 def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
@@ -50,8 +52,32 @@ def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tu
     given = case.file.measurements or ()
     if isinstance(given, MeasurementFile):
         with case.located():
-            return _from_file(case, given)
-    return tuple(_posed(case, f"measurements[{k}]", each) for k, each in enumerate(given)), ()
+            found, notes = _from_file(case, given)
+            return _paired(case, found), notes
+    posed = tuple(_posed(case, f"measurements[{k}]", each) for k, each in enumerate(given))
+    return _paired(case, posed), ()
+
+
+def _paired(case: BuiltCase, given: tuple[PosedMeasurement, ...]) -> tuple[PosedMeasurement, ...]:
+    """With the modes of those that name none: nearest in frequency, no two of a pose alike."""
+    from scipy.optimize import linear_sum_assignment
+
+    found, y0 = list(given), case.initial_design
+    for q in {one.q.tobytes(): one.q for one in given if not one.mode}.values():
+        rows = [k for k, one in enumerate(given) if one.q.tobytes() == q.tobytes()]
+        taken, rows = {given[k].mode for k in rows}, [k for k in rows if not given[k].mode]
+        count = min(len(case.model().pencil.elastic), MODES_AROUND + 2 * len(rows) + max(taken))
+        hz = case.model().frequencies(q, y0, count)[0]
+        left = [mode for mode in range(1, count + 1) if mode not in taken]
+        if len(left) < len(rows):
+            message = f"{len(rows)} frequencies at one pose, and the model has {len(left)} modes"
+            raise MechanismError("measurements", message + " for them")
+        ratios = [[hz[mode - 1] / given[k].hz for mode in left] for k in rows]
+        wide = np.log(ratios) ** 2  # squares keep the order of those that are as far off
+        for i, j in zip(*linear_sum_assignment(wide), strict=True):
+            written_hz = float(hz[left[j] - 1])
+            found[rows[i]] = replace(given[rows[i]], mode=left[j], paired_hz=written_hz)
+    return tuple(found)
 
 
 def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
@@ -62,7 +88,7 @@ def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
             q = _with_loads(case.file, given.q or (), given.trajectory)
     deviation = given.deviation.deviation(given.frequency)
     hz, where = float(given.frequency), given.trajectory
-    return PosedMeasurement(label, given.time, where, frozen(q), given.mode, hz, deviation)
+    return PosedMeasurement(label, given.time, where, frozen(q), given.mode or 0, hz, deviation)
 
 
 def _at_time(path: Trajectories, time: float, name: str | None, key: str, where: str) -> Floats:
@@ -95,7 +121,7 @@ def _from_file(
     columns = [
         CsvColumn(TIME, (DIMENSIONS["time"],), optional=True),
         CsvColumn("trajectory", optional=True),
-        CsvColumn("mode", (DIMENSIONS["fraction"],)),
+        CsvColumn("mode", (DIMENSIONS["fraction"],), optional=True),
         CsvColumn("frequency", (hz,)),
         CsvColumn("deviation", (hz, DIMENSIONS["fraction"]), optional=given.deviation is not None),
         *(
@@ -103,7 +129,7 @@ def _from_file(
             for column in coordinate_columns(names, file.coordinate_units)
         ),
     ]
-    table = read_table(Path(given.file), _KEY, columns)
+    table = read_table(Path(given.file), _KEY, renamed(columns, given.columns, _KEY))
     if not 0 < len(table.lines) <= MOST_MEASUREMENTS:
         some = (
             "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
@@ -122,8 +148,8 @@ def _rows(
     known = [name for _, name, _ in case.file.trajectories]
     for k in range(len(table.lines)):
         where = f"{table.where(k)}: "
-        mode, hz = table.numbers["mode"][k], table.numbers["frequency"][k]
-        if not (mode.is_integer() and 1 <= mode <= 1000):
+        mode, hz = table.numbers.get("mode", {k: 0.0})[k], table.numbers["frequency"][k]
+        if "mode" in table.numbers and not (mode.is_integer() and 1 <= mode <= 1000):
             raise MechanismError(_KEY, f"{where}column mode: {mode:g} is not a mode (1, 2, …)")
         if not hz > 0.0:
             raise MechanismError(_KEY, f"{where}column frequency: must be > 0 Hz, got {hz:g}")

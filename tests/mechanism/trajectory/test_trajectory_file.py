@@ -49,7 +49,7 @@ def test_degrees_become_radians(tmp_path, unit):
 def test_extra_columns_are_ignored_with_a_note(tmp_path):
     table = read_samples(written(tmp_path, "time,q1,q2,torque [N m],\n0,1,2,x,\n1,1,2,,\n"), Q)
     assert table.q.shape == (2, 2)
-    assert table.notes == ("arm.csv: ignored the columns torque, (no name)",)
+    assert table.notes == ("arm.csv: ignored the columns torque",)
 
 
 GOOD = "time,q1,q2\n0,1,2\n"
@@ -173,3 +173,44 @@ def test_degrees_without_their_unit_are_refused_where_they_cannot_be_radians(tmp
 def test_many_turns_and_long_strokes_are_read_where_the_unit_is_clear(tmp_path, header, units):
     file = written(tmp_path, f"time,{header}\n0,0,-720.5\n1,91.7,0\n")
     assert len(read_samples(file, Q, units).q) == 2
+
+
+LOG = "timestamp;actual_q_0;actual_q_1;\n"
+NAMES = {"time": "timestamp", "q1": "actual_q_0 [deg]", "q2": "actual_q_1"}
+
+
+def test_columns_of_a_log_are_mapped_with_their_units(tmp_path):
+    """A separator ends every row, as controllers write it."""
+    table = read_samples(written(tmp_path, f"{LOG}0,5;180;1;\n0,75;90;1;\n"), Q, written=NAMES)
+    np.testing.assert_allclose(table.q, [[np.pi, 1.0], [np.pi / 2, 1.0]], rtol=1e-15)
+    np.testing.assert_array_equal(table.time_s, [0.5, 0.75])
+    assert table.notes == ()
+
+
+def test_a_log_without_time_has_a_rate(tmp_path):
+    names = {key: NAMES[key] for key in Q}
+    file = written(tmp_path, "actual_q_0,actual_q_1\n0,1\n10,1\n20,1\n")
+    table = read_samples(file, Q, written=names, rate_hz=125.0)
+    np.testing.assert_allclose(table.time_s, [0.0, 0.008, 0.016], rtol=1e-15)
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
+def test_times_of_day_count_from_the_first(tmp_path, zone):
+    days = ("2026-02-28T23:59:59.998", "2026-03-01T00:00:00.002", "2026-03-01T00:00:00.006")
+    rows = "".join(f"{day}{zone},{k},1\n" for k, day in enumerate(days))
+    table = read_samples(written(tmp_path, f"time,q1,q2\n{rows}"), Q)
+    np.testing.assert_allclose(table.time_s, [0.0, 0.004, 0.008], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ({"q1": "actual_q_7"}, "no column actual_q_7; .*did you mean"),
+        ({"q3": "actual_q_0"}, "columns: unknown column 'q3'"),
+        ({"q1": "actual_q_0 [kg]"}, "column q1: .*kg"),
+        ({"q1": "a[b]c"}, "must read `name` or `name"),
+    ],
+)
+def test_wrong_columns_of_a_log_are_told(tmp_path, names, message):
+    with pytest.raises(MechanismError, match=message):
+        read_samples(written(tmp_path, f"{LOG}0;1;1;\n1;1;1;\n"), Q, written={**NAMES, **names})

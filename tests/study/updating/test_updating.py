@@ -238,6 +238,23 @@ def test_a_deviation_for_all_rows_stands_in_the_case(tmp_path: Path) -> None:
         np.testing.assert_allclose(rows[0].q, [np.radians(104), 5.3])
 
 
+def test_measurements_without_modes_are_paired_by_frequency_and_said(tmp_path: Path) -> None:
+    """In any order, with every frequency 10 % low, and where the file calls columns otherwise."""
+    case = case_of((CASES / "two_link.yaml").read_text())
+    hz = 0.9 * case.model().frequencies(case.trajectory.q[0], case.initial_design, 4)[0]
+    rows = "".join(f"0,{hz[mode]},0.1\n" for mode in (2, 0, 1))
+    named = {"columns": {"frequency": "peak [Hz]", "time": "t"}}
+    content = f"t,peak,deviation\n{rows}"
+    measured, _ = read_measurements(from_file(tmp_path, content, **named))
+    assert [each.mode for each in measured] == [3, 1, 2]
+    found = updated(from_file(tmp_path, content, **named))
+    (said,) = (w for w in found.warnings if "paired by frequency" in w)
+    assert f"m.csv:2, {hz[2]:g} Hz, is mode 3, {hz[2] / 0.9:.4g} Hz there" in said
+    twice = f"time,mode,frequency,deviation\n0,1,{hz[0]},0.1\n"
+    measured, _ = read_measurements(from_file(tmp_path, twice))
+    assert measured[0].paired_hz is None
+
+
 def test_of_several_trajectories_each_row_names_its_own(tmp_path: Path) -> None:
     case = load_case(CASES / "five_bar.yaml")
     names = [name for _, name, _ in case.file.trajectories]
@@ -259,7 +276,7 @@ HEADER = "time,mode,frequency,deviation"
     [
         ("", "m.csv: is empty"),
         (f"{HEADER}\n", "m.csv: no measurements"),
-        ("time,frequency,deviation\n0,1,1\n", "m.csv:1: no column mode"),
+        ("time,mode,deviation\n0,1,1\n", "m.csv:1: no column frequency"),
         ("time,mode,frequency\n0,1,1\n", "m.csv:1: no column deviation"),
         ("mode,frequency,deviation\n1,1,1\n", "either the column time, or one for each coordinate"),
         ("q1,mode,frequency,deviation\n1,1,1,1\n", "either the column time, or one for each"),
