@@ -89,10 +89,14 @@ def kept_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
 
     A part that a design leaves alone has the same stiffness at every design and in every model.
     """
+    return _kept(_digested(matrix))
+
+
+def _digested(matrix: sparse.csc_array) -> _Matrix:
     indices = (np.asarray(a, dtype=np.int64) for a in (matrix.indptr, matrix.indices))
     parts = (*indices, np.asarray(matrix.data, dtype=np.float64))  # the first tells the order n
     digest = hashlib.sha256(b"".join(hashlib.sha256(a.tobytes()).digest() for a in parts)).digest()
-    return _kept(_Matrix(digest, matrix))
+    return _Matrix(digest, matrix)
 
 
 @lru_cache(maxsize=4)  # few, for factors of large parts are large
@@ -411,6 +415,13 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
 
 
+@lru_cache(maxsize=4)  # what is reduced to higher and higher frequencies asks for the same ones
+def _lowest(stiff: _Matrix, heavy: _Matrix, count: int) -> tuple[Floats, Floats]:
+    factor, rows = _kept(stiff), heavy.matrix.T  # symmetric: products run faster row by row
+    assert factor is not None
+    return largest_modes(factor, stiff.matrix.T, lambda v: np.asarray(rows @ v), count)
+
+
 def fixed_modes(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
 ) -> Floats:
@@ -425,9 +436,9 @@ def fixed_modes(
         mu, b = np.linalg.eigh(root.T @ M[h][:, h].toarray() @ root)
         return np.asarray(flexible @ np.linalg.solve(root.T, b[:, mu >= least][:, ::-1]))
     # Lanczos is asked for 16 modes first, then for twice as many
-    rows, count = M.T, 16  # M is symmetric: products run faster row by row
+    stiff, heavy, count = _digested(K), _digested(M), 16
     while n > DENSE and count < n // 2:
-        mu, phi = largest_modes(factor, K.T, lambda v: np.asarray(rows @ v), count)
+        mu, phi = _lowest(stiff, heavy, count)
         if mu[-1] < least:
             return np.asarray(phi[:, mu >= least])
         count *= 2
