@@ -56,6 +56,8 @@ def failure_of(error: BaseException) -> Failure:
             return Failure(STORAGE, "")
         case OSError():
             reason = error.strerror or str(error) or type(error).__name__
+            if isinstance(error, FileNotFoundError) and error.filename is None:
+                reason = "the working folder, where relative paths begin, does not exist any more"
             named = f"{error.filename}: {reason}" if error.filename else reason
             return Failure(STORAGE, f"error: {named}")
         case MemoryError():

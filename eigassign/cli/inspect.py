@@ -125,7 +125,7 @@ def _described(name: str, answer: CheckAnswer) -> list[str]:
 )
 @arguments.case
 @arguments.pose
-@click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="How many.")
+@click.option("--count", type=click.IntRange(1), help="How many (default: 4, or all there are).")
 @click.option("--draw", is_flag=True, help="Draw the mode shapes.")
 @arguments.out("results/<case>_modes; --out asks for the drawings too")
 @arguments.force
@@ -136,7 +136,7 @@ def modes(
     case: Path,
     q: str | None,
     y: str | None,
-    count: int,
+    count: int | None,
     as_json: bool,
     draw: bool,
     **how: Any,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +33,7 @@ from eigassign.study.checks import GIVEN, judged_mesh, mesh_lines, study_weight,
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.judgement import far_off
 from eigassign.study.meaning import levers
-from eigassign.study.planning import expansion_needed, plan_expansion
+from eigassign.study.planning import expansion_needed, plan_expansion, reduced_to
 from eigassign.study.results import LeverRow, WeightRow
 from eigassign.study.scene import Scene
 from eigassign.study.updating.measured import read_measurements
@@ -86,7 +86,7 @@ def modes(
     path: str | Path,
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
-    count: int = 3,
+    count: int | None = None,
     allow_outside: bool = False,
 ) -> ModesAnswer:
     """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
@@ -98,17 +98,40 @@ def modes(
     """
     case = load_case(path, allow_outside)
     at_q, at_y = pose_and_design(case, q, y)
+    case, count = _with_modes(case, count)
     with case.located():
-        model = case.model()
-        hz = model.frequencies(at_q, at_y, count)[0]
+        hz = case.model().frequencies(at_q, at_y, count)[0]
     return _answer(case, at_q, at_y, hz)
+
+
+FEW = 4  # modes, where no number is asked for
+
+
+def _with_modes(case: BuiltCase, count: int | None) -> tuple[BuiltCase, int]:
+    """The case with links reduced so that as many modes as are asked for are right, and how many.
+
+    Without a number at most as many as there are.
+    """
+    with case.located():
+        most = len(case.model().pencil.elastic)
+    if count is None or count <= most:
+        return case, min(FEW, most) if count is None else count
+    modes = tuple(range(1, count + 1))
+    expansion = case.file.expansion.model_copy(update={"modes": modes})
+    again = BuiltCase(replace(case.file, expansion=expansion))
+    with again.located():
+        model = again.model()
+    if model.is_reduced and len(model.pencil.elastic) < count:
+        many = f"{count} modes asked for, and {len(model.pencil.elastic)} are kept"
+        raise UsageError(f"{many}: raise reduce_to of {', '.join(reduced_to(again.file))}")
+    return again, count
 
 
 def draw_modes(
     path: str | Path,
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
-    count: int = 3,
+    count: int | None = None,
     out: Path | None = None,
     force: bool = False,
     formats: Sequence[str] = ("png",),
@@ -120,6 +143,7 @@ def draw_modes(
     """
     case = load_case(path, allow_outside)
     at_q, at_y = pose_and_design(case, q, y)
+    case, count = _with_modes(case, count)
     with new_run_folder(case.file, out, force, "_modes") as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)

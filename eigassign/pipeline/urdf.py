@@ -152,8 +152,8 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
         told = []
         for problem in error.problems:
             _, _, own, *key = [*problem.path.split("."), "", "", ""]
-            name = names.get(own, "")
-            at = f"link {name} (line {lines.get(name)}), {'.'.join(filter(None, key))}"
+            name = f"link {names.get(own)}"
+            at = f"{name} (line {lines.get(name)}), {'.'.join(filter(None, key))}"
             where = at if name in lines else problem.path
             told.append(f"{where}: {problem.message}")
         raise UsageError(f"{path}: gives no case: {'; '.join(told)}") from error
@@ -218,9 +218,9 @@ def _parsed(
     try:
         if robot.tag != "robot":
             raise ValueError(f"not a URDF file: it begins with <{short(robot.tag)}>, not <robot>")
-        wrong = list[str]()
-        links = [*_each(robot.findall("link"), _link, wrong)]
-        joints = [*_each(robot.findall("joint"), _read_joint, wrong)]
+        wrong, lines = list[str](), _lines(data)
+        links = [*_each(robot.findall("link"), _link, wrong, lines)]
+        joints = [*_each(robot.findall("joint"), _read_joint, wrong, lines)]
         if wrong:
             raise ValueError("; ".join(wrong))
         if not links:
@@ -228,11 +228,6 @@ def _parsed(
         _require_tree(dict(links), joints, len(links))
     except ValueError as error:
         raise UsageError(f"{path}: {printable(str(error))}") from error
-    text = data.decode("utf-8", "replace")
-    lines = {
-        found.group(2): text.count("\n", 0, found.start()) + 1
-        for found in re.finditer(r"<link\b[^>]*?\bname\s*=\s*([\"'])(.*?)\1", text)
-    }
     return short(printable(robot.get("name") or path.stem)), dict(links), joints, lines
 
 
@@ -240,13 +235,23 @@ def _each(
     elements: Sequence[ElementTree.Element],
     read: Callable[[ElementTree.Element], Any],
     wrong: list[str],
+    lines: Mapping[str, int],
 ) -> Iterator[Any]:
-    """What is read of each; what is wrong with others goes to ``wrong``."""
+    """What is read of each; what is wrong with others goes to ``wrong``, with its line."""
     for element in elements:
         try:
             yield read(element)
         except ValueError as error:
-            wrong.append(short(str(error), LONGEST))
+            name, words = f"{element.tag} {element.get('name')}", short(str(error), LONGEST)
+            words = words if name in words else f"{name}: {words}"
+            wrong.append(f"line {lines[name]}: {words}" if name in lines else words)
+
+
+def _lines(data: bytes) -> dict[str, int]:
+    """The line of each ``link NAME`` and ``joint NAME``."""
+    text = data.decode("utf-8", "replace")
+    named = re.finditer(r"<(link|joint)\b[^>]*?\bname\s*=\s*([\"'])(.*?)\2", text)
+    return {f"{m.group(1)} {m.group(3)}": text.count("\n", 0, m.start()) + 1 for m in named}
 
 
 def _text(element: ElementTree.Element, *keys: str) -> str:

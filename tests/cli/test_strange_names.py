@@ -33,6 +33,24 @@ def test_a_case_file_with_escapes_in_its_name_is_named_without_them(
     said(capsys)
 
 
+def test_no_escape_of_a_name_stands_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a\x1bb\x07.yaml").write_text(GOOD)
+    main(["optimize", "a\x1bb\x07.yaml", "--figures", "none"])
+    (page,) = Path("results").glob("*/report.html")
+    assert not {"\x1b", "\x07"}.intersection(page.read_text("utf-8"))
+
+
+def test_a_working_folder_that_is_gone_is_called_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "good.yaml").write_text(GOOD)
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert main(["optimize", str(tmp_path / "good.yaml")]) == 3
+    assert "the working folder, where relative paths begin, does not exist any" in said(capsys)
+
+
 @pytest.mark.parametrize(
     ("name", "typed"),
     [

@@ -19,7 +19,7 @@ def test_without_any_pose_one_is_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path, without(chain(2), "trajectory", "targets"))
     with pytest.raises(UsageError, match="give a value for q0, q1"):
         modes(path)
-    assert len(modes(path, [0.1, 0.2]).frequencies_hz) == 3
+    assert len(modes(path, [0.1, 0.2]).frequencies_hz) == 4
 
 
 def test_modes_state_what_round_off_leaves(tmp_path: Path) -> None:
@@ -171,3 +171,44 @@ def test_loops_stand_as_they_are_assembled_where_no_pose_is_given(tmp_path: Path
     assert '--q "90 deg" --draw' in check(path).next
     with pytest.raises(CaseError, match="at a dead point, at q = 0 deg"):
         modes(path, [0.0])
+
+
+SOLID = """\
+title: a tetrahedron
+mechanism:
+  space: spatial
+  gravity: none
+  materials: {steel: {youngs_modulus: 210 GPa, density: 7800, poissons_ratio: 0.3}}
+  links:
+    part: {type: solid, mesh: part.bdf, material: steel, nodes: {foot: {surface: "9"}}}
+  joints: {root: {type: fixed, base: ground, follower: part.foot}}
+coordinates: {}
+"""
+DECK = """\
+SET 9 = 1,2,3
+BEGIN BULK
+GRID,1,,0.,0.,0.
+GRID,2,,1.,0.,0.
+GRID,3,,0.,1.,0.
+GRID,4,,0.,0.,1.
+GRID,5,,1.,1.,1.
+CTETRA,1,1,1,2,3,4
+CTETRA,2,1,2,3,4,5
+ENDDATA
+"""
+
+
+def test_as_many_modes_are_kept_as_are_asked_for(tmp_path: Path) -> None:
+    """By parts that are reduced as far as what is expanded allows; else the key is named."""
+    (tmp_path / "part.bdf").write_text(DECK)
+    path = tmp_path / "case.yaml"
+    path.write_text(SOLID)
+    few, all_of_them = modes(path), modes(path, count=6)
+    assert len(few.frequencies_hz) < 6
+    path.write_text(SOLID.replace("nodes:", "reduce_to: 1 MHz, nodes:"))
+    whole = modes(path, count=6)
+    np.testing.assert_allclose(all_of_them.frequencies_hz, whole.frequencies_hz, rtol=1e-3)
+    lowest = f"reduce_to: {1.01 * whole.frequencies_hz[0]} Hz, nodes:"
+    path.write_text(SOLID.replace("nodes:", lowest))
+    with pytest.raises(UsageError, match="4 modes asked for, and 1 are kept: raise reduce_to of p"):
+        modes(path, count=4)

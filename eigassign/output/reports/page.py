@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.units import handy
 from eigassign.facts import about, capital, number, percent, positive_percent
+from eigassign.files import printable
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.mechanism import mode_figures
@@ -77,7 +78,7 @@ def _environment() -> Environment:
         return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
     dotted = re.compile(r"(?<=[\w\]])\.(?=[a-z_])")  # in key paths: they go on in a new line
-    environment.filters |= {"words": words, "number": number}
+    environment.filters |= {"words": words, "number": number, "printable": printable}
     environment.filters["dotted"] = lambda text: Markup(dotted.sub(".<wbr>", text))
     return environment
 
