@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from solid_parts import METAL, Bar, bar, bdf, inp, msh
+from solid_parts import Bar, bar, bdf, case, inp, msh
 
 import eigassign as ea
 from eigassign.errors import MechanismError
@@ -17,29 +17,10 @@ ROOT, TIP = (-0.02, 0.0, 0.0), (0.35, 0.0, 0.0)
 
 def frequencies(mesh: Path, start: Any, end: Any, mass: float = 0.3) -> np.ndarray:
     """Four of a part that is held at its start, with a mass at its end."""
-    case = {
-        "title": "a bar",
-        "mechanism": {
-            "space": "spatial",
-            "gravity": "none",
-            "materials": {"metal": METAL},
-            "links": {
-                "part": {
-                    **{"type": "solid", "mesh": str(mesh), "material": "metal"},
-                    **{"reduce_to": 1e5, "nodes": {"start": start, "end": end}},
-                }
-            },
-            "joints": {
-                "weld": {
-                    **{"type": "fixed", "base": "ground", "follower": "part.start"},
-                    "position": [0, 0, 0],
-                }
-            },
-            "bodies": {"tip": {"at": "part.end", "mass": mass}},
-        },
-        "coordinates": {},
-    }
-    return ea.load_case(case, allow_outside=True).model().frequencies([], [], 4)[0]
+    ends = {"start": start, "end": end}
+    tree = case(mesh.parent, bar((1, 1, 1), 4), mesh=str(mesh), nodes=ends, reduce_to=1e5)
+    tree["mechanism"] |= {"gravity": "none", "bodies": {"tip": {"at": "bar.end", "mass": mass}}}
+    return ea.load_case(tree, allow_outside=True).model().frequencies([0.0], [], 4)[0]
 
 
 def point(key: int, x: tuple[float, float, float]) -> str:
@@ -115,10 +96,10 @@ def test_rbe3_follows_the_mean_of_its_nodes(tmp_path: Path) -> None:
     mesh = read_mesh(tmp_path / "bar.bdf", "mesh")
     assert not mesh.joined["RBE3 2"].rigid
     # a surface of nodes that counts by area is another one
-    (tmp_path / "bar.msh").write_text(msh(part))
+    (tmp_path / "part.msh").write_text(msh(part))
     place = {"position": list(TIP), "coupling": "distributing"}
     by_area = frequencies(
-        tmp_path / "bar.msh",
+        tmp_path / "part.msh",
         {"surface": "root", "position": list(ROOT)},
         {"surface": "tip", **place},
     )
@@ -192,13 +173,13 @@ def test_a_mesh_without_a_physical_volume_is_called_that(tmp_path: Path) -> None
     part = bar((1, 1, 1), 4, SIZE)
     lines = msh(part, "2.2").splitlines()
     flat = [line for line in lines if " 4 2 9 1 " not in line]
-    (tmp_path / "bar.msh").write_text("\n".join(flat))
+    (tmp_path / "part.msh").write_text("\n".join(flat))
     with pytest.raises(MechanismError, match=r"add a Physical Volume, or save with Mesh\.SaveAll"):
-        read_mesh(tmp_path / "bar.msh", "mesh")
+        read_mesh(tmp_path / "part.msh", "mesh")
 
 
 def test_a_binary_mesh_is_called_binary_whatever_its_lines(tmp_path: Path) -> None:
     head = b"$MeshFormat\n4.1 1 8\n" + b"\1\0\0\0\n$EndMeshFormat\n"
-    (tmp_path / "bar.msh").write_bytes(head + bytes(20_000))
+    (tmp_path / "part.msh").write_bytes(head + bytes(20_000))
     with pytest.raises(MechanismError, match="is binary: save it as ASCII"):
-        read_mesh(tmp_path / "bar.msh", "mesh")
+        read_mesh(tmp_path / "part.msh", "mesh")

@@ -9,7 +9,6 @@ from chains import model_of, random_chain, two_link
 from large import large
 from scipy import sparse
 
-import eigassign as ea
 from eigassign.errors import MissingMassError
 from eigassign.mechanism import Pencil
 from eigassign.modal import (
@@ -43,16 +42,6 @@ def agree(pencil: Pencil, x: np.ndarray, count: int) -> None:
             assert apart.max() < max(1e-12, (1e3 * rounding) ** 2)
 
 
-@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
-def test_shipped_cases_have_the_modes_of_the_dense_solver(path: Path) -> None:
-    case = ea.load_case(path)
-    if case.file.trajectory is None:
-        pytest.skip("no trajectory")
-    model = case.model()
-    x = model.x(case.trajectory.q[:: len(case.trajectory.q) // SAMPLES or 1], case.initial_design)
-    agree(model.pencil, x, min(4, len(model.pencil.elastic) - 2))
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_random_chains_have_the_modes_of_the_dense_solver(seed: int) -> None:
     tree, q = random_chain(seed)
@@ -60,20 +49,6 @@ def test_random_chains_have_the_modes_of_the_dense_solver(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x = model.x(q + rng.uniform(-1.0, 1.0, (SAMPLES, np.size(q))), [])
     agree(model.pencil, x, min(4, len(model.pencil.elastic) - 2))
-
-
-@pytest.mark.parametrize("drives", [("free", "free"), ("locked", {"stiffness": 2e3})])
-def test_a_design_parameter_may_vary_where_few_unknowns_feel_it(drives: tuple[Any, Any]) -> None:
-    model = model_of(two_link((9, 7), drives=drives))
-    rng = np.random.default_rng(1)
-    x = model.x(rng.uniform(-2.0, 2.0, (SAMPLES, 2)), rng.uniform(0.05, 0.25, (SAMPLES, 2)))
-    agree(model.pencil, x, 4)
-
-
-def test_samples_that_are_all_alike_have_no_varying_unknown() -> None:
-    model = model_of(two_link((9, 7), drives=("locked", "locked")))
-    x = model.x(np.tile([0.3, 1.9], (SAMPLES, 1)), [0.1, 0.1])
-    agree(model.pencil, x, 4)
 
 
 def twins(arms: int = 3) -> dict[str, Any]:
@@ -118,28 +93,6 @@ def test_modes_that_no_joint_feels_are_found_and_cuts_may_fall_between_equal_one
     model = model_of(twins())
     q = np.linspace([0.0, -1.0], [0.5, 1.0], SAMPLES)
     agree(model.pencil, model.x(q, []), count)
-
-
-def test_answers_are_the_same_every_time() -> None:
-    model = model_of(twins())
-    theta = model.pencil.theta(model.x(np.linspace([0.0, -1.0], [0.5, 1.0], SAMPLES), []))
-    first, second = (solve_large(model.pencil, theta, 3, True) for _ in range(2))
-    np.testing.assert_array_equal(first.lam, second.lam)
-    np.testing.assert_array_equal(first.phi, second.phi)
-
-
-def test_many_equal_modes_at_some_samples_are_all_found() -> None:
-    """At every third sample nine bars are alike."""
-    names = [f"arm{k}" for k in range(9)]
-    tree = twins(len(names))
-    tree["mechanism"]["bodies"] = {name: {"at": f"{name}.end", "mass": 0.0} for name in names}
-    tree["design"] = {
-        name: {"parameter": f"bodies.{name}.mass", "min": 0.0, "max": 1.0} for name in names
-    }
-    model = model_of(tree)
-    y = np.tile(0.05 * 1.8 ** np.arange(len(names)), (SAMPLES, 1))
-    y[::3] = 0.05
-    agree(model.pencil, model.x(np.linspace([0.0, -1.0], [0.5, 1.0], SAMPLES), y), 4)
 
 
 def test_a_mode_without_mass_is_none_for_many_samples_either() -> None:
