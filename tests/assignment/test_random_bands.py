@@ -1,8 +1,8 @@
 """Random mechanisms that are to keep out of a band: what is called clear stays clear everywhere.
 
-The second family has load cases, several trajectories with jumps, profiles finer than the samples,
-and parts of trajectories that end between samples. It is judged by counting modes at 20 000
-instants, q being linear between samples and the profile between its points.
+They have load cases, several trajectories with jumps, profiles finer than the samples, and parts
+of trajectories that end between samples. Judged by counting modes at 20 000 instants, q being
+linear between samples and the profile between its points.
 """
 
 import json
@@ -14,72 +14,6 @@ import yaml
 from random_assignments import load_text, random_case
 
 import eigassign as ea
-from eigassign.assignment import ForbiddenBand
-from eigassign.mechanism import NamedTrajectory, Trajectories
-from eigassign.study import check_band
-
-SEEDS = range(200)
-QUICK = (0,)
-EACH = [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in SEEDS]
-INSTANTS = 5000
-
-
-def banded(seed: int) -> tuple[ea.Case, float, float]:
-    """A random case whose first or second mode is to leave a band that it is in at first."""
-    rng = np.random.default_rng([seed, 23])
-    text = random_case(seed)
-    case = load_text(text)
-    hz = case.model().frequencies(case.trajectory.q, case.initial_design, 2)
-    edge = float(hz[:, rng.integers(2)].mean() * rng.uniform(0.97, 1.01))
-    low, high = edge, edge * float(rng.uniform(1.005, 1.03))
-    data = yaml.safe_load(text)
-    data["targets"] = [{"keep_out": [low, high]}]
-    data["assignment"] = {"starts": 1, "steps": 15}
-    return load_text(yaml.safe_dump(data)), low, high
-
-
-def along(case: ea.Case, path: Any, y: np.ndarray, low: float, high: float) -> np.ndarray:
-    """At random instants of a trajectory: the modes below each edge."""
-    at = np.random.default_rng(0).uniform(path.time_s[0], path.time_s[-1], INSTANTS)
-    between = path.motion.poses(at)
-    model = case.model()
-    available = model.n_dof - model.n_rigid
-    count = min(4, available)
-    while True:
-        hz = model.frequencies(between, y, count)
-        if count == available or hz[:, -1].min() > high:
-            return np.array([(hz < edge).sum(axis=1) for edge in (low, high)])
-        count = min(2 * count, available)
-
-
-@pytest.mark.parametrize("seed", EACH)
-def test_an_answer_called_clear_is_clear_at_random_instants_and_a_forged_one_is_not(
-    seed: int,
-) -> None:
-    """Forged: another number of modes below the band, or a band that a mode is in somewhere."""
-    case, low, high = banded(seed)
-    found = ea.assign(case)
-    row, y = found.results.assignment, np.array(list(found.design.values()))
-    assert row is not None
-    if row.verdict == "reached":
-        assert all(said.clear for said in row.clearances)
-    model = case.model()
-    for said, part in zip(row.clearances, case.trajectory.parts, strict=True):
-        q = part.trajectory.given.q
-        path = Trajectories((NamedTrajectory("1", part.trajectory.given),))
-        kind = "forged", "", (), slice(0, len(q)), np.full(len(q), low)
-        band = ForbiddenBand(*kind, np.full(len(q), high))
-        if not said.clear:
-            continue
-        assert (along(case, part.trajectory, y, low, high) == said.below).all()
-        for k in {said.below + 1, max(said.below - 1, 0)} - {said.below}:
-            assert not check_band(model, path, band, k, y).clear
-        hz = model.frequencies(q, y, said.below + 1)[:, said.below]
-        wide = ForbiddenBand(*kind, np.full(len(q), hz.min() * (1.0 + 1e-9)))
-        assert not check_band(model, path, wide, said.below, y).clear
-
-
-# --- Load cases, several trajectories, jumps, profiles, parts
 
 MANY = [pytest.param(k, marks=() if k == 2 else pytest.mark.slow) for k in range(300)]
 COUNTED = 20_000
