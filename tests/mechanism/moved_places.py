@@ -15,9 +15,6 @@ from eigassign.errors import CaseError
 Tree = dict[str, Any]
 TIPS: dict[str, Tree] = {
     "five_bar": {"tip": "left_arm.end", "waypoints": [[0.05, 0.5], [0.1, 0.48], [0.15, 0.5]]},
-    "slider_crank": {
-        "tip": "slider.start", "waypoints": [[0.54, 0], [0.45, 0]], "start": ["60 deg"]
-    },
     "arm_6r": {
         "tip": "hand.end",
         "waypoints": [[0.75, -0.2, 0.6], [0.8, 0.1, 0.7], [0.7, 0.3, 0.65]],

@@ -75,17 +75,6 @@ def test_random_loops_need_what_the_principle_of_dalembert_says(
     agree(tree, q, seed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(200, 260))
-def test_many_random_mechanisms_need_what_the_principle_of_dalembert_says(
-    seed: int, space: str
-) -> None:
-    agree(*random_open(seed, space, seed % 2 > 0), seed)
-    tree, q, _ = random_closed(seed, space, 1 + seed % 2, seed % 3 > 0)
-    agree(tree, q, seed)
-
-
 # --- Textbooks
 
 

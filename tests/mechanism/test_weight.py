@@ -163,30 +163,6 @@ def test_known_mechanisms_under_weight_are_those_of_the_nonlinear_potential(name
     agree(make(), q, 1)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100))
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_many_random_trees_under_weight(space: str, seed: int) -> None:
-    tree, q = random_open(1000 + seed, space, seed % 2 == 1)
-    agree(tree, q, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(30))
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_many_random_loops_under_weight(space: str, seed: int) -> None:
-    tree, q, _ = random_closed(seed, space, 1 + (seed % 5 == 4), seed % 2 == 1)
-    agree(tree, q, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_random_loops_of_rigid_links_under_weight(space: str, seed: int) -> None:
-    tree, q, _ = random_closed(seed, space, 1 + seed % 3 // 2, seed % 2 == 0, ("rigid",))
-    agree_under_weight(tree, q, direction(tree, seed))
-
-
 def agree_about_sag(tree: Tree, q: Any, g: np.ndarray) -> None:
     """What sag changes of the lowest λ, from the forces that a mode's own inertia causes."""
     found, plain = weigh(tree, q, g), built(tree)
@@ -216,17 +192,6 @@ def test_sag_of_known_mechanisms_is_that_of_the_nonlinear_potential(name: str) -
     make, q = KNOWN[name]
     tree = make()
     agree_about_sag(tree, q, direction(tree, 1))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(50))
-def test_sag_of_many_mechanisms_is_that_of_the_nonlinear_potential(seed: int) -> None:
-    space = "spatial" if seed % 2 else "planar"
-    if seed % 4 < 2:
-        tree, q = random_open(3000 + seed, space, seed % 8 > 3)
-    else:
-        tree, q, _ = random_closed(seed, space, 1, seed % 8 > 3)
-    agree_about_sag(tree, q, direction(tree, seed))
 
 
 # --- what stays rigid
@@ -367,12 +332,6 @@ def agree_within_a_web(seed: int, pinned: float) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_forces_between_bars_are_found_in_whatever_order_joints_come(seed: int) -> None:
     agree_within_a_web(seed, 0.2 * (seed % 2))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100))
-def test_forces_between_bars_of_many_webs(seed: int) -> None:
-    agree_within_a_web(100 + seed, 0.2 * (seed % 2))
 
 
 @pytest.mark.parametrize("seed", [1, 3])

@@ -3,10 +3,8 @@
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
-from time import process_time
 
 import numpy as np
-import pytest
 
 from eigassign.case import parse
 from eigassign.pipeline import solve_case
@@ -24,7 +22,7 @@ LISTS = {
 }
 
 
-def random_case(rng: np.random.Generator, most: int, free: tuple[str, ...] = ()) -> BuiltCase:
+def random_case(rng: np.random.Generator, most: int) -> BuiltCase:
     """The arm on drives, its targets set about what a combination drawn at random does."""
     samples = int(rng.integers(2, 12))
     head = HEAD.replace("samples: 152", f"samples: {samples}")
@@ -35,7 +33,6 @@ def random_case(rng: np.random.Generator, most: int, free: tuple[str, ...] = ())
         "rod: {shape: circle, diameter: 30 mm}",
     )
     names = list(rng.permutation(list(LISTS))[: rng.integers(2, 6)])
-    names += [name for name in free if name not in names]
     sizes = {name: int(rng.integers(2, 20)) for name in names}
     while np.prod(list(sizes.values())) > most:
         largest = max(sizes, key=lambda name: sizes[name])
@@ -47,8 +44,6 @@ def random_case(rng: np.random.Generator, most: int, free: tuple[str, ...] = ())
         if low > 0.0:
             values = np.sort(low * (high / low) ** rng.random(sizes[name]))
         given = "values: [" + ", ".join(f"{v:.5g}" for v in values) + "]"
-        if name in free:
-            given = f"min: {low}, max: {high}"
         price = f"{rng.normal(0.3, 1.0) / (high - low):.4g}"
         design += f"  {name}: {{parameter: {path}, {given}, price: {price}}}\n"
     plain = design + "targets:\n  - {mode: 1, at_least: 1 Hz}\n"
@@ -117,16 +112,14 @@ def brute_force(case: BuiltCase) -> list[tuple[float, tuple[float, ...]]]:
     return [(float(objective[k]), tuple(designs[k])) for k in order]
 
 
-def compared(case: BuiltCase) -> tuple[str, float, float, float]:
-    """The verdict's kind, F of the answer and of the best of all, and the seconds."""
-    since = process_time()
-    result = solve_case(case)
-    row, seconds = result.results.assignment, process_time() - since
+def compared(case: BuiltCase) -> tuple[str, float, float]:
+    """The verdict's kind, F of the answer and of the best of all."""
+    row = solve_case(case).results.assignment
     assert row is not None
     best = next((F for F, y in brute_force(case) if is_clear(case, y)), np.inf)
     clear = all(one.clear for one in row.clearances)
     found = row.objective_optimal if row.catalogue.best[0].violation <= 1e-9 and clear else np.inf
-    return row.optimality.kind, found, best, seconds
+    return row.optimality.kind, found, best
 
 
 def is_clear(case: BuiltCase, y: tuple[float, ...]) -> bool:
@@ -144,14 +137,6 @@ def agree(found: float, best: float) -> bool:
 
 def test_the_best_of_random_catalogues_is_that_of_brute_force() -> None:
     for seed in (1, 3, 108):
-        kind, found, best, _ = compared(random_case(np.random.default_rng(seed), 120))
+        kind, found, best = compared(random_case(np.random.default_rng(seed), 120))
         assert kind == "proved"
         assert agree(found, best)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 150))
-def test_so_it_is_of_up_to_5000_combinations(seed: int) -> None:
-    kind, found, best, _ = compared(random_case(np.random.default_rng(seed), 5000))
-    assert kind == "proved"
-    assert agree(found, best)

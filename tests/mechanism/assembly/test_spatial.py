@@ -79,26 +79,6 @@ def test_random_double_loops_have_the_spectrum_of_the_plain_frame(seed: int, spa
     agree(tree, tuple(poses))
 
 
-@pytest.mark.slow
-@SPACES
-@pytest.mark.parametrize("seed", range(600))
-def test_many_more_random_trees_agree(seed: int, space: str) -> None:
-    tree, q = random_open(seed, space, swap=seed % 2 == 0)
-    agree(tree, (q,))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("space", "loops"),
-    [("planar", 1), ("planar", 2), ("planar", 3), ("spatial", 1), ("spatial", 2)],
-)
-@pytest.mark.parametrize("seed", range(64))
-def test_many_more_random_loops_agree(seed: int, space: str, loops: int) -> None:
-    kinds = ("rigid",) if seed % 4 == 1 else ("beam", "rigid", "frame")
-    tree, *poses = random_closed(seed, space, loops, seed % 2 == 0, kinds)
-    agree(tree, tuple(poses))
-
-
 @SPACES
 @pytest.mark.parametrize("seed", range(4))
 def test_every_sample_of_a_batch_is_its_own_pose(seed: int, space: str) -> None:
