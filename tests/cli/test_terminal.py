@@ -12,6 +12,7 @@ from eigassign.cli import main
 
 Captured = pytest.CaptureFixture[str]
 TARGETS = ARM.partition("targets:")[2]
+BEYOND = " [{mode: 1, at_least: 30 Hz}]\nassignment: {starts: 1}\n"
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +34,7 @@ def results() -> dict[str, dict[str, object]]:
 
 
 @pytest.mark.parametrize("columns", [60, 80, 120])
-@pytest.mark.parametrize("targets", [TARGETS, " [{mode: 1, at_least: 30 Hz}]\n"])
+@pytest.mark.parametrize("targets", [TARGETS, BEYOND])
 def test_an_answer_has_few_lines_and_none_is_wider_than_the_terminal(
     targets: str, columns: int, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:

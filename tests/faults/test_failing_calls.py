@@ -26,7 +26,6 @@ from eigassign.cli import main
 from eigassign.output import is_untouched
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-CASES = Path(__file__).parents[2] / "cases"
 CALLS: dict[str, tuple[tuple[Any, str], ...]] = {
     "open": ((builtins, "open"), (io, "open"), (os, "open")),
     "rename": ((os, "rename"), (os, "replace")),
@@ -42,7 +41,8 @@ SWEEP = ("batch", "beam.yaml", "--jobs", "1", "--reports", "none", "--set")
 TWO, THREE = ((*SWEEP, f"targets.0.frequency={hz}") for hz in ("185,1", "185,190,1"))
 STUDY = ("--study", "none", "--cache-dir", "cache")
 OPTIMIZE = ("optimize", "beam.yaml", "--out", "out", *STUDY, *LITTLE)
-UPDATE = ("update", "arm_update.yaml", "--out", "out", *LITTLE)
+UPDATE = ("update", "measured.yaml", "--out", "out", *LITTLE)
+MEASURED = "q1 [rad],mode,frequency [Hz],deviation [Hz]\n0.5,1,185,1\n1,1,185.4,1\n"
 # The command, and those before it: it takes the place of what they left, or goes on from there.
 COMMANDS: dict[str, tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]] = {
     "optimize": (OPTIMIZE, (OPTIMIZE,)),
@@ -144,8 +144,8 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Scene]:
             before = tmp_path_factory.mktemp(name) / "before"
             before.mkdir()
             (before / "beam.yaml").write_text(TEXT)
-            for file in ("arm_update.yaml", "arm_update.csv"):
-                shutil.copy(CASES / file, before)
+            (before / "measured.yaml").write_text(TEXT + "measurements: {file: measured.csv}\n")
+            (before / "measured.csv").write_text(MEASURED)
             for each in first:
                 assert ended(each, before).code in (0, 1)
             if name in ("optimize", "update"):

@@ -102,7 +102,7 @@ def said_and_true(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_what_is_said_of_sag_covers_a_corotational_program() -> None:
     """Less than 1e-4 is nothing; what is said too much is 30 %, or 4 % of the largest."""
-    pairs = [said_and_true(seed) for seed in (0, 1, 2, 3, 6)]
+    pairs = [said_and_true(seed) for seed in range(4)]
     said, true = (np.array(each) for each in zip(*pairs, strict=True))
     assert (true <= np.maximum(said, 1e-4)).all()
     assert (said <= np.maximum(1.3 * true, true + 0.04 * true.max(axis=1, keepdims=True))).all()

@@ -130,5 +130,6 @@ def test_the_error_of_the_mesh_is_stated_at_the_optimum(tmp_path: Path) -> None:
 def test_the_order_is_chosen_about_a_bound_where_a_place_is_0(tmp_path: Path) -> None:
     place = "  x: {parameter: joints.elbow.position.0, min: -60 mm, max: 0}\n\nexpansion:"
     y = "  y: [0.125, 0.125] # kg, the middle of the box", ""
-    path = automatic(tmp_path, "1 %", ("\nexpansion:", place), y)
+    once = "targets:", "assignment: {starts: 1}\ntargets:"
+    path = automatic(tmp_path, "1 %", ("\nexpansion:", place), y, once)
     assert solve_case(load_case(path)).results.assignment is not None

@@ -190,7 +190,7 @@ def test_robust_where_it_cannot_be_is_refused(design: str, assignment: str, expe
 
 def test_deviations_that_cannot_follow_the_path_are_kept_off_or_named_with_what_to_do() -> None:
     fore = "  fore: {parameter: links.forearm.length, min: 418 mm, max: 450 mm, tolerance: 10 mm}\n"
-    text = "assignment: {robust: true, objective: lightest, starts: 1}\n"
+    text = "assignment: {robust: true, objective: lightest, starts: 1, steps: 10}\n"
     limit = "  - {mode: 1, at_least: 100 Hz}\n"
     _, results = solved(fore, limit, text)
     (length,) = (row.optimal for row in results.design)
