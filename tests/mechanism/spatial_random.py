@@ -43,6 +43,17 @@ EVERY_LOOP = [  # seed, space, loops, swap
 ]
 
 
+def geared(tree: Tree, seed: int) -> Tree:
+    """The tree with an inertia on the drive of every coordinate that is not locked."""
+    rng = np.random.default_rng(seed)
+    for data in tree["coordinates"].values():
+        given: Any = data.get("drive", "free")
+        if given != "locked":
+            held = given if isinstance(given, dict) else {}
+            data["drive"] = {**held, "inertia": float(10 ** rng.uniform(-2, 1))}
+    return tree
+
+
 def empty(space: str, rng: Random) -> Tree:
     d = rng.uniform(0.02, 0.04)
     sections = {

@@ -79,9 +79,11 @@ def crooked(space: str, spring: Tree) -> Tree:
     return {**tree, "coordinates": {"q": {"joint": "j", "drive": {"stiffness": 3e3}}}}
 
 
-@pytest.mark.parametrize("node", ["b.end", "b.start"])
-@pytest.mark.parametrize("turns", [False, True])
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize(
+    ("space", "turns", "node"),
+    [("planar", False, "b.end"), ("planar", True, "b.start"),
+     ("spatial", False, "b.start"), ("spatial", True, "b.end")],
+)  # fmt: skip
 def test_either_end_of_a_crooked_arm_rests_as_on_a_post(space: str, turns: bool, node: str) -> None:
     planar = space == "planar"
     turn = {"angle": 0.3} if planar else {"orientation": [0.1, 0.2, 0.3]}

@@ -2,15 +2,14 @@
 
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from chains import A_PAPER, Tree, bar, model_of, random_chain, two_link
+from chains import A_PAPER, bar, model_of, random_chain, two_link
 from frame_comparison import agree
 from small_case import edited
 from spatial_oracle import world
-from spatial_random import EVERY_TREE, random_closed, random_open
+from spatial_random import geared, random_closed
 
 from eigassign.case import parse
 from eigassign.errors import CaseError, MechanismError, UsageError
@@ -166,25 +165,6 @@ def test_the_inertia_may_be_a_design_parameter() -> None:
             written.frequencies([0.3, 1.1], [], 4),
             rtol=1e-12,
         )
-
-
-def geared(tree: Tree, seed: int) -> Tree:
-    """The tree with an inertia on the drive of every coordinate that is not locked."""
-    random = np.random.default_rng(seed)
-    for data in tree["coordinates"].values():
-        given: Any = data.get("drive", "free")
-        if given != "locked":
-            held = given if isinstance(given, dict) else {}
-            data["drive"] = {**held, "inertia": float(10 ** random.uniform(-2, 1))}
-    return tree
-
-
-@pytest.mark.parametrize("drawn", EVERY_TREE, ids=str)
-def test_random_trees_with_geared_drives_have_the_spectrum_of_the_plain_frame(
-    drawn: tuple[int, str, bool],
-) -> None:
-    tree, q = random_open(*drawn)
-    agree(geared(tree, drawn[0]), (q,))
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])

@@ -14,6 +14,7 @@ from spatial_random import (
     EVERY_TREE,
     PLANAR,
     SPATIAL,
+    geared,
     random_closed,
     random_open,
 )
@@ -27,8 +28,9 @@ SPACES = pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_random_trees_have_the_spectrum_and_places_of_the_plain_frame(
     drawn: tuple[int, str, bool],
 ) -> None:
+    """Their drives with the inertia that a gear reflects."""
     tree, q = random_open(*drawn)
-    agree(tree, (q,))
+    agree(geared(tree, drawn[0]), (q,))
 
 
 @pytest.mark.parametrize("drawn", EVERY_LOOP, ids=str)
