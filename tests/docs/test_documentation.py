@@ -6,6 +6,7 @@ import keyword
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -168,6 +169,7 @@ def names_code(name: str) -> bool:
     )
 
 
+@cache
 def case_keys() -> set[str]:
     listed = re.findall(r"^`([\w.]+)`", read(MANUAL / "reference" / "keys.md"), re.MULTILINE)
     return {

@@ -74,11 +74,6 @@ def made(folder: Path) -> dict[str, tuple[object, object]]:
     return found
 
 
-def done_in(out: Path) -> int:
-    """How many cases are done in a folder of results."""
-    return len([*out.glob("*/run.json")])
-
-
 def placed(folder: Path) -> Path:
     folder.mkdir()
     (folder / "arm.yaml").write_text(SMALL.read_text())
