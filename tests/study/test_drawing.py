@@ -1,5 +1,6 @@
 """What is drawn of a mechanism is where kinematics and modes put it."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,7 @@ def test_poses_say_which_of_several_trajectories_they_belong_to() -> None:
     assert one.of == ()
 
 
+@cache
 def pictures(name: str, count: int = 2) -> tuple[ea.Case, ModePictures]:
     case = ea.load_case(CASES / f"{name}.yaml")
     q = with_middle_loads(case.file, case.file.expansion.q)
