@@ -23,6 +23,7 @@ from eigassign.case.units import (
     DIMENSIONS,
     ONE,
     TWO_TURNS,
+    UNITS,
     Dimension,
     QuantityError,
     Unit,
@@ -33,6 +34,7 @@ from eigassign.errors import MechanismError, StorageError
 from eigassign.files import TABLE, objection, read_bytes
 
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+_UNIT_BEHIND = re.compile(r"(.+?)(?:\s*\(\s*([^()]+?)\s*\)|[_ ]([^\W\d_]+))")  # (deg), or _deg
 _SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
 _POINT = re.compile(r"\d\.\d")
 MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
@@ -193,8 +195,10 @@ def _rows(file: Path, key: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _instant(cells: Sequence[str]) -> datetime | None:
-    """The date and time of a cell in ISO 8601."""
+    """The date and time of a cell in ISO 8601, or the time of a day."""
     try:
+        if cells and cells[0].count(":") == 2 and "-" not in cells[0]:
+            return datetime.fromisoformat(f"2000-01-01 {cells[0]}")
         return datetime.fromisoformat(cells[0]) if cells and ":" in cells[0] else None
     except ValueError:
         return None
@@ -238,6 +242,8 @@ def _headings(
         if (match := _HEADER_CELL.fullmatch(column.written or column.name)) is None:
             raise ValueError(f"column {shown(column.written)} must read `name` or `name [unit]`")
         name, unit_written = match.groups()
+        if not unit_written and (column.written or name not in names):
+            name, unit_written = _behind(name, names, column) or (name, unit_written)
         if name not in names and column.optional and not column.written:
             continue
         if names.count(name) != 1:
@@ -246,6 +252,23 @@ def _headings(
         unit = _unit(column, unit_written or units[index]) if column.dimensions else ()
         found.append(_Heading(column.name, index, *unit))
     return names, found
+
+
+def _behind(name: str, names: Sequence[str], column: CsvColumn) -> tuple[str, str | None] | None:
+    """The name in the header and the unit that stands behind it, as ``name (deg)`` or ``x_deg``.
+
+    The latter only where the case says that the column is called so.
+    """
+    for own in (other for other in names if other == name or other.startswith(f"{name} (")):
+        match = _UNIT_BEHIND.fullmatch(own)
+        written = match and (match.group(2) or (match.group(3) if column.written else ""))
+        try:
+            unit = parse_unit(written) if written else None
+        except QuantityError:
+            continue
+        if unit and any(unit.exponents == each.exponents for each in column.dimensions):
+            return own, written
+    return None
 
 
 def _unit(column: CsvColumn, written: str) -> tuple[Unit, Dimension, bool]:
@@ -277,6 +300,8 @@ def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
     if near is None:
         return f"{message}{suggestion(name, known)}"
     unit = next((f" [{each.si}]" for each in column.dimensions[:1] if each.si), "")
+    if (match := _UNIT_BEHIND.fullmatch(near)) and (match.group(2) or match.group(3)) in UNITS:
+        unit = f" [{match.group(2) or match.group(3)}]"
     return f"{message}; if it is {shown(near)}, call it {name + unit}"
 
 
@@ -293,6 +318,8 @@ def _values(row: list[str], columns: Sequence[_Heading], n: int) -> Iterator[flo
         value = float(cell) if NUMBER.fullmatch(cell) else math.nan
         if not math.isfinite(value):
             mixed = "; decimals take a comma or a point, not both" if "," in cell else ""
+            if ":" in cell:
+                mixed = "; a time of day is written as 2026-03-01 12:00:00.5 or 12:00:00.5"
             raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number{mixed}")
         si = column.unit.to_si(value)
         try:

@@ -229,7 +229,7 @@ UNITS: dict[str, Unit] = {
 for _unit, _prefixes, _own in (  # the µ of two: micro sign, Greek mu
     ("g", "m k", Unit(Fraction(1, 1000), (1, 0, 0, 0, 0))),
     ("m", "n u µ μ m c k", Unit(Fraction(1), (0, 1, 0, 0, 0))),
-    ("s", "u µ μ m", Unit(Fraction(1), (0, 0, 1, 0, 0))),
+    ("s", "n u µ μ m", Unit(Fraction(1), (0, 0, 1, 0, 0))),
     ("N", "m k M", Unit(Fraction(1), (1, 1, -2, 0, 0))),
     ("Nm", "k", Unit(Fraction(1), (1, 2, -2, 0, 0))),
     ("Pa", "k M G T", Unit(Fraction(1), (1, -1, -2, 0, 0))),

@@ -70,8 +70,11 @@ def _paired(case: BuiltCase, given: tuple[PosedMeasurement, ...]) -> tuple[Posed
         hz = case.model().frequencies(q, y0, count)[0]
         left = [mode for mode in range(1, count + 1) if mode not in taken]
         if len(left) < len(rows):
-            message = f"{len(rows)} frequencies at one pose, and the model has {len(left)} modes"
-            raise MechanismError("measurements", message + " for them")
+            message = (
+                f"{given[rows[0]].label}: {len(rows)} frequencies at one pose, of which the model"
+            )
+            message += f" has {len(left)} modes: give its links more elements, or leave some out"
+            raise MechanismError("measurements", message)
         ratios = [[hz[mode - 1] / given[k].hz for mode in left] for k in rows]
         wide = np.log(ratios) ** 2  # squares keep the order of those that are as far off
         for i, j in zip(*linear_sum_assignment(wide), strict=True):

@@ -46,6 +46,15 @@ def test_degrees_become_radians(tmp_path, unit):
     np.testing.assert_allclose(table.q, [[np.pi, 1.0], [-np.pi / 2, 1.0]], rtol=1e-15)
 
 
+@pytest.mark.parametrize("header", ["t (ms),a (deg),b", "t_ms,a_deg,b", "t ms,a deg,b"])
+def test_units_are_read_however_a_log_writes_them(tmp_path, header):
+    t, a, _ = header.split(",")
+    file = written(tmp_path, f"{header}\n0,9,1\n500,-9,1\n")
+    table = read_samples(file, Q, written={"time": t, "q1": a, "q2": "b"})
+    np.testing.assert_allclose(table.q[:, 0], [np.pi / 20, -np.pi / 20], rtol=1e-15)
+    np.testing.assert_array_equal(table.time_s, [0.0, 0.5])
+
+
 def test_extra_columns_are_ignored_with_a_note(tmp_path):
     table = read_samples(written(tmp_path, "time,q1,q2,torque [N m],\n0,1,2,x,\n1,1,2,,\n"), Q)
     assert table.q.shape == (2, 2)
@@ -70,8 +79,8 @@ GOOD = "time,q1,q2\n0,1,2\n"
         ("time q1 q2\n0 1 2\n", "arm.csv:1: no column time; .* separated by commas, semi"),
         ("0,1,2\n1,1,2\n", r"the first line must be a header, such as time \[s\],q1"),
         (
-            "time (s),q1 (deg)\n0,1\n",
-            r"no column time; .* if it is 'time \(s\)', call it time \[s\]",
+            "time_ms,q1\n0,1\n",
+            r"no column time; .* if it is 'time_ms', call it time \[ms\]",
         ),
         ("time,Q1,q2\n0,1,2\n", r"no column q1; .* if it is 'Q1', call it q1 \[rad\]"),
         ("time,q1,q2,q1 [deg]\n0,1,2,3\n", "arm.csv:1: column q1 appears 2 times"),
