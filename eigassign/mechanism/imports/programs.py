@@ -178,13 +178,18 @@ _DMIG = re.compile(rb"^DMIG\*?[ ,\t]*(\w+)" + _LONGER, re.MULTILINE | re.IGNOREC
 _GRID = re.compile(rb"^GRID(?:\*[^\n]*\n?(?:\*[^\n]*)?|[ ,\t][^\n]*)", re.MULTILINE | re.IGNORECASE)
 
 
+_GRDSET = re.compile(rb"^GRDSET" + _LONGER, re.MULTILINE | re.IGNORECASE)
+
+
 def read_bulk(data: bytes) -> Contents | None:
     """The matrices of DMIG cards and the places of grid points; None where neither is."""
     cards = defaultdict[str, list[bytes]](list)
     for card in _DMIG.finditer(data):
         cards[card.group(1).decode("ascii", "replace").upper()].append(card.group())
     matrices = {name: partial(_matrix, group) for name, group in cards.items()}
-    places = entries.places_of(_grid(card.group()) for card in _GRID.finditer(data))
+    others = (fields_of(card.group()) for card in _GRDSET.finditer(data))
+    moved = any(entries.wholes(np.append(f, [b""] * 6)[[1, 5]]).any() for f in others)
+    places = entries.places_of(_grid(card.group(), moved) for card in _GRID.finditer(data))
     return Contents(matrices, places) if matrices or places else None
 
 
@@ -229,11 +234,14 @@ def _matrix(cards: list[bytes]) -> Matrix:
     return entries.labelled(whole[0], whole[1], np.concatenate(values), form == 6)
 
 
-def _grid(card: bytes) -> tuple[int, Floats]:
-    """Number and place; NaN where the place or the freedoms are in a system of their own."""
+def _grid(card: bytes, moved: bool) -> tuple[int, Floats]:
+    """Number and place; NaN where the place or the freedoms are in a system of their own.
+
+    They may be where a card ``moved`` those that name none.
+    """
     fields = fields_of(card)
     node, system, *_ = entries.wholes(fields[:2]).tolist()
-    own = system or (entries.wholes(fields[5:6])[0] if len(fields) > 5 else 0)
+    own = moved or system or (entries.wholes(fields[5:6])[0] if len(fields) > 5 else 0)
     place = entries.reals(np.where(np.char.strip(fields[2:5]) == b"", b"0.", fields[2:5]))
     return node, np.full(3, np.nan) if own else place
 

@@ -84,6 +84,11 @@ class _Raw:
     sets: dict[str, set[int]] = field(default_factory=dict)
     joined: dict[str, tuple[int, bool, bool]] = field(default_factory=dict)  # by id: see `Joined`
 
+    def stand(self, node: int, place: tuple[float, ...]) -> None:
+        """A node at a place; raises UnfitError where it stands at another one."""
+        if self.nodes.setdefault(node, place) != place:
+            raise UnfitError(f"defines node {node % _OWN} twice, at different places")
+
     def add(self, name: str, nodes: Iterable[int]) -> None:
         self.sets.setdefault(name, set()).update(nodes)
 
@@ -106,7 +111,7 @@ def _read(data: bytes) -> SolidMesh:
     head = data[:100_000].upper()
     if data.lstrip().startswith(b"$MeshFormat"):
         raw, program = _gmsh(data.decode("utf-8", "replace")), "gmsh"
-    elif re.search(rb"^\s*\*(NODE|HEADING|PART)\b", head, re.MULTILINE):
+    elif re.search(rb"^\s*\*(NODE|HEADING|PART|INCLUDE)\b", head, re.MULTILINE):
         raw, program = _abaqus(data.decode("utf-8", "replace")), "Abaqus"
     elif re.search(rb"^(BEGIN\s+BULK|GRID[ *,])", head, re.MULTILINE):
         raw, program = _nastran(data.decode("utf-8", "replace")), "Nastran"
@@ -152,7 +157,7 @@ def _numbered(raw: _Raw, program: str) -> SolidMesh:
         for name, nodes in raw.sets.items()
     }
     if missing := {node for node, *_ in raw.joined.values()} - raw.nodes.keys():
-        raise UnfitError(f"couples nodes to one that it does not define, {min(missing)}")
+        raise UnfitError(f"couples nodes to one that it does not define, {min(missing) % _OWN}")
     joined = {
         name: Joined(np.array(raw.nodes[node], dtype=np.float64), *kind)
         for name, (node, *kind) in raw.joined.items()
@@ -258,7 +263,12 @@ def _gmsh_4(
 # --- Abaqus and CalculiX
 
 _ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
-_JOINED = ("TIE", "MPC", "EQUATION", "CONTACT PAIR", "CONTACT", "DISTRIBUTING COUPLING")
+_JOINED = (
+    *("TIE", "MPC", "EQUATION", "CONTACT PAIR", "CONTACT", "DISTRIBUTING COUPLING", "SPRING"),
+    *("NONSTRUCTURAL MASS", "EMBEDDED ELEMENT", "SHELL TO SOLID COUPLING", "MODEL CHANGE"),
+)
+_MADE = ("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
+_OWN = 10**10  # is added to the numbers of an assembly's nodes: parts count theirs from 1 too
 _COUPLED = ("RIGID BODY", "KINEMATIC COUPLING", "KINEMATIC", "DISTRIBUTING")
 _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
 
@@ -266,13 +276,19 @@ _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|
 def _abaqus(text: str) -> _Raw:
     raw, groups = _Raw(), _Raw()
     blocks = list(_keywords(text))
-    if sum(word == "PART" for word, _, _ in blocks) > 1:
+    words = [word for word, *_ in blocks if word in ("PART", "ELEMENT", "INSTANCE")]
+    if sum(pair == ("PART", "ELEMENT") for pair in itertools.pairwise(words)) > 1:
         raise UnfitError("holds several parts: save the one part alone")
+    if words.count("INSTANCE") > 1:
+        raise UnfitError("holds several instances of parts: save the one part alone")
     _require_one(
         {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
     )
-    coupled, couplings = dict[str, str](), list[Any]()
+    coupled, couplings, outside = dict[str, str](), list[Any](), False
     for word, options, lines in blocks:
+        if word in ("ASSEMBLY", "INSTANCE", "END INSTANCE", "END ASSEMBLY"):
+            outside = word in ("ASSEMBLY", "END INSTANCE")  # of its part
+        own_number = _OWN if outside and "INSTANCE" not in options else 0
         rows = [[entry.strip() for entry in line.split(",")] for line in lines]
         if word == "INCLUDE" or (word in ("NODE", "ELEMENT") and "INPUT" in options):
             raise UnfitError("includes other files: save the mesh in one")
@@ -280,22 +296,30 @@ def _abaqus(text: str) -> _Raw:
             raise UnfitError("moves or turns its part as an instance: save the part alone")
         if word in _JOINED:
             raise UnfitError(f"has *{word}{_ALONE}")
+        if word in _MADE or options.get("SYSTEM", "R") != "R":
+            raise UnfitError(f"has *{word} that makes or moves nodes or elements: write them out")
+        if options.get("WEIGHTING METHOD", "UNIFORM") != "UNIFORM" or "INFLUENCE RADIUS" in options:
+            raise UnfitError(f"has *{word} with weights or a radius of its own{_ALONE}")
         if word == "NODE":
             for row in rows:
-                raw.nodes[int(row[0])] = (*(float(v or 0.0) for v in row[1:4]), 0.0, 0.0)[:3]
-            raw.add(options.get("NSET", ""), (int(row[0]) for row in rows))
+                place = (*(float(v or 0.0) for v in row[1:4]), 0.0, 0.0)[:3]
+                raw.stand(int(row[0]) + own_number, place)
+            raw.add(options.get("NSET", ""), (int(row[0]) + own_number for row in rows))
         elif word == "ELEMENT":
             _abaqus_elements(raw, groups, options, rows)
         elif word in ("NSET", "ELSET"):
             target = raw if word == "NSET" else groups
-            target.add(options[word], _members(target, rows, "GENERATE" in options))
+            first = own_number if word == "NSET" else 0
+            target.add(options[word], _members(target, rows, "GENERATE" in options, first))
         elif word == "SURFACE":
             raw.add(options["NAME"], _surface(raw, groups, options, rows))
         elif word == "COUPLING":
             coupled = options
         elif word in _COUPLED:
             own = coupled if word in ("KINEMATIC", "DISTRIBUTING") else options
-            couplings.append((word, own, rows))
+            couplings.append((word, own, rows, own_number))
+    for name, ids in raw.sets.items():  # an assembly may name nodes of its only part
+        raw.sets[name] = {n if n in raw.nodes else n % _OWN for n in ids}
     for each in couplings:
         _abaqus_coupling(raw, groups, *each)
     for name, elements in groups.sets.items():  # of elements, where no set of nodes has the name
@@ -342,40 +366,44 @@ def _abaqus_elements(
 
 
 def _abaqus_coupling(
-    raw: _Raw, groups: _Raw, word: str, options: dict[str, str], rows: list[list[str]]
+    raw: _Raw, groups: _Raw, word: str, options: dict[str, str], rows: list[list[str]], first: int
 ) -> None:
     """A set that follows a node, under its constraint's name, or ``node 12`` of that node."""
-    (node,) = _members(raw, [[options["REF NODE"]]], False)
+    (node,) = _members(raw, [[options["REF NODE"]]], False, first)
     if word == "KINEMATIC COUPLING":
         own, freedoms = _members(raw, [row[:1] for row in rows], False), [row[1:] for row in rows]
     else:
         keys = ("NSET", "PIN NSET", "TIE NSET", "SURFACE")
-        own = set[int]().union(*(raw.sets.get(options.get(key, ""), ()) for key in keys))
-        for key in groups.sets.get(options.get("ELSET", ""), ()):
+        own = set[int]().union(*(raw.sets.get(options[k], ()) for k in keys if k in options))
+        for key in groups.sets[options["ELSET"]] if options.get("ELSET") in groups.sets else ():
             own.update(raw.elements.get(key, groups.elements.get(key, [])))
         freedoms = rows if word == "KINEMATIC" else []
     ends = [[int(entry) for entry in row[:2] if entry] for row in freedoms]
     held = {k for row in filter(None, ends) for k in range(row[0], row[-1] + 1)}
     if any(ends) and not held >= {1, 2, 3}:
         raise UnfitError(f"has *{word} of some directions alone{_ALONE}")
-    name = options.get("CONSTRAINT NAME", f"node {node}")
+    node = node if node in raw.nodes else node % _OWN
+    name = options.get("CONSTRAINT NAME", f"node {node % _OWN}")
     raw.add(name, own)
     raw.joined[name] = (node, word != "DISTRIBUTING", False)
 
 
-def _members(groups: _Raw, rows: list[list[str]], generate: bool) -> set[int]:
-    """Ids of a set: numbers, ranges, or other sets."""
+def _members(groups: _Raw, rows: list[list[str]], generate: bool, first_id: int = 0) -> set[int]:
+    """Ids of a set: numbers, counted from ``first_id``, ranges, or other sets."""
     found: set[int] = set()
     for row in rows:
         given = [entry for entry in row if entry]
         if generate:
             first, last, step = (*map(int, given), 1)[:3]
             _require_few((last - first) // max(step, 1))
-            found.update(range(first, last + 1, step))
+            found.update(range(first_id + first, first_id + last + 1, step))
         else:
             for entry in given:
-                known = groups.sets.get(entry.upper(), ())
-                found.update([int(entry)] if entry.lstrip("-").isdigit() else known)
+                plain = entry.upper().rpartition(".")[2]  # without the name of an instance
+                known = groups.sets.get(entry.upper(), groups.sets.get(plain, ()))
+                number = plain.lstrip("-").isdigit()
+                own = first_id if plain == entry else 0
+                found.update([int(plain) + own] if number else known)
     return found
 
 
@@ -403,6 +431,10 @@ def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[s
 
 # --- Nastran bulk data
 
+_JOINS = re.compile(  # elements and joins that are not taken, glue and contact among them
+    r"C[A-Z]|RB[AE]|RROD|RTRPLT|RSPLINE|RSSCON|RJOINT|MPC|NSM|GENEL|DMIG|BSURF|BCTSET|BGSET|BGADD"
+    r"|BCONTACT|BCBODY|BCTABLE"
+)
 _PASSED = ("CORD1R", "CORD2R", "CORD1C", "CORD2C", "CORD1S", "CORD2S")
 _NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
 _SURFACES = ("CTRIA3", "CTRIA6", "CQUAD4", "CQUAD8", "CTRIAR", "CQUADR")
@@ -415,11 +447,18 @@ def _nastran(text: str) -> _Raw:
     for name, values in _cards(bulk):
         if name == "INCLUDE":
             raise UnfitError("includes other files: save the mesh in one")
+        if name == "BEGIN":
+            raise UnfitError("holds several superelements (BEGIN SUPER): save the one part alone")
+        if name == "GRDSET" and values[1] not in ("", "0"):
+            raise UnfitError("has GRDSET with a coordinate system (CP): save nodes in 0")
         if name == "GRID":
             if values[1] not in ("", "0"):
                 raise UnfitError("has nodes in a coordinate system of their own (CP): save in 0")
-            x = [_real(value) for value in (*values[2:5], "", "", "")[:3]]
-            raw.nodes[int(values[0])] = tuple(x)
+            try:
+                x = tuple(_real(value) for value in (*values[2:5], "", "", "")[:3])
+            except ValueError:
+                raise UnfitError(f"has GRID {values[0]} at a place that is no number") from None
+            raw.stand(int(values[0]), x)
         elif name in _NASTRAN:
             nodes = [int(value) for value in values[2:] if value]
             if (name, len(nodes)) not in (("CTETRA", 4), ("CTETRA", 10), ("CHEXA", 20)):
@@ -434,7 +473,7 @@ def _nastran(text: str) -> _Raw:
             _nastran_coupling(raw, name, values)
         elif name == "PSOLID":
             materials.add(values[1])
-        elif name not in _PASSED and re.match(r"C[A-Z]|RB[AE]|RROD|RTRPLT|MPC", name):
+        elif name not in _PASSED and _JOINS.match(name):
             raise UnfitError(f"has {name[:8]}{_ALONE}")
     _require_one(materials)
     for number, entries in sets.items():
@@ -448,10 +487,11 @@ def _nastran_coupling(raw: _Raw, name: str, values: list[str]) -> None:
     if name == "RBE2":
         (node, freedoms, *rest), weights = given[1:], set[str]()
     else:
-        node, _, *rest = given[2:]
+        node, reference, *rest = given[2:]
         weights = {value for value in rest if "." in value}
         starts = [k for k, value in enumerate(rest) if "." in value]
         freedoms = min((rest[k + 1] for k in starts), key=len)
+        freedoms = freedoms if {*reference} >= {*"123456"} else ""
         rest = [v for k, v in enumerate(rest) if k - 1 not in starts and k not in starts]
     if not set(freedoms) >= set("123") or len(set(map(_real, weights))) > 1:
         raise UnfitError(f"has {name} of some directions alone, or of several weights{_ALONE}")

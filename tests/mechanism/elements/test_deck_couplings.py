@@ -1,5 +1,6 @@
 """Couplings, sets and what is missing in meshes of Nastran, Abaqus and gmsh."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,26 @@ def test_rigid_couplings_of_abaqus_are_calculix_ones(tmp_path: Path, kind: str) 
     names = tuple(n.replace("119", f"{len(part.x) + 2}") for n in names)
     (tmp_path / "bar.inp").write_text(abaqus(part, text.format("root"), text.format("tip")))
     found = frequencies(tmp_path / "bar.inp", *({"surface": name} for name in names))
+    np.testing.assert_allclose(found, PRINTED_HZ, rtol=1e-4)
+
+
+def test_reference_points_of_an_assembly_are_no_nodes_of_its_part(tmp_path: Path) -> None:
+    """As CAE writes it: both count from 1, and neither elements nor nodes have a set."""
+    part = bar((6, 2, 2), 10, SIZE)
+    body = inp(part).split("*STEP")[0].replace("*NODE, NSET=NALL", "*NODE")
+    own, text = (
+        body.partition("*NSET"),
+        "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
+    )
+    for k, (name, x) in enumerate({"root": ROOT, "tip": TIP}.items(), 1):
+        text += f"*NODE\n{point(k, x)}\n*NSET, NSET=rp{k}\n{k},\n"
+        nodes = "\n".join(f"{node + 1}," for node in part.sets[name])
+        text += f"*NSET, NSET=face{k}, INSTANCE=P-1\n{nodes}\n"
+        text += f"*SURFACE, NAME=s{k}, TYPE=NODE\nP-1.face{k}\n"
+        text += f"*COUPLING, CONSTRAINT NAME=c{k}, REF NODE=rp{k}, SURFACE=s{k}\n*KINEMATIC\n"
+    elements = re.sub(r"(\*ELEMENT, TYPE=\w+)[^\n]*", r"\1", own[0])
+    (tmp_path / "cae.inp").write_text(f"*PART, NAME=P\n{elements}*END PART\n{text}*END ASSEMBLY\n")
+    found = frequencies(tmp_path / "cae.inp", {"surface": "c1"}, {"surface": "c2"})
     np.testing.assert_allclose(found, PRINTED_HZ, rtol=1e-4)
 
 

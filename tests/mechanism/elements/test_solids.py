@@ -176,7 +176,11 @@ WRONG = {
     "wedges": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D15\n1,1\n", "wedges of type 'C3D15'"),
     "bricks": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D8R\n1,1\n", "type 'C3D8R'"),
     "none": ("*NODE\n1,0,0,0\n", "has no solid elements"),
-    "two parts": ("*PART, NAME=a\n*PART, NAME=b\n", "several parts"),
+    "two parts": (
+        "*PART, NAME=a\n*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n*PART, NAME=b\n*ELEMENT, TYPE=C3D4\n",
+        "several parts",
+    ),
+    "two instances": ("*NODE\n*INSTANCE, NAME=a\n*INSTANCE, NAME=b\n", "several instances"),
     "breaks off": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n1,1,2\n", "damaged, or breaks off"),
     "no nodes": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n", "does not define, as 2"),
     "no mesh": ("hello", "is no mesh that is known"),
@@ -201,6 +205,19 @@ WRONG = {
     "two metals of Nastran": ("BEGIN BULK\nPSOLID,1,1\nPSOLID,2,7\n", "is of 2 materials"),
     "heavy point": ("BEGIN BULK\nCONM2,1,1,0,5.0\n", "has CONM2, which is not read"),
     "joined": ("BEGIN BULK\nRBAR,1,1,2,123\n", "has RBAR, which is not read"),
+    "own axes by default": ("BEGIN BULK\nGRDSET,,5\nGRID,1,,0.,0.,0.\n", "GRDSET with a coord"),
+    "own axes of Abaqus": ("*NODE, SYSTEM=C\n1,0,0,0\n", "NODE that makes or moves"),
+    "generated": ("*NODE\n1,0,0,0\n*NGEN\n1,5,1\n", "NGEN that makes or moves"),
+    "more mass": ("*NODE\n1,0,0,0\n*NONSTRUCTURAL MASS\n5.\n", "NONSTRUCTURAL MASS, which is not"),
+    "a radius": ("*NODE\n1,0,0,0\n*COUPLING, INFLUENCE RADIUS=1.\n", "a radius of its own"),
+    "glued": ("BEGIN BULK\nBSURFS,1,,,,1\n", "has BSURFS, which is not read"),
+    "two superelements": ("BEGIN BULK\nGRID,1,,0.,0.,0.\nBEGIN SUPER=1\n", "several superelements"),
+    "twice": ("BEGIN BULK\nGRID,7,,0.,0.,0.\nGRID,7,,1.,0.,0.\n", "defines node 7 twice"),
+    "no number": ("BEGIN BULK\nGRID,7,,0.,.,0.\n", "GRID 7 at a place that is no number"),
+    "free turns": (
+        "BEGIN BULK\nGRID,9,,0.,0.,0.\nRBE3,1,,9,123,1.0,123,1\n",
+        "RBE3 of some directions alone",
+    ),
     "huge set": ("*NODE\n1,0,0,0\n*NSET, NSET=a, GENERATE\n1,99999999999\n", "more than it can"),
 }
 
