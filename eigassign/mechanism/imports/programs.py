@@ -266,6 +266,12 @@ _MAPPED = re.compile(rb"^[ \t]*(\d+)[ \t]+(\d+)[ \t]+(U[XYZ]|ROT[XYZ])[ \t]*\r?$
 _NODES = re.compile(rb"^\*NODE\b(?! *(?:FILE|PRINT|OUTPUT))[^\n]*\n([^*]*)", re.M | re.I)
 
 
+_MOVED = re.compile(
+    rb"^\*(SYSTEM|INCLUDE|NCOPY|NGEN|NFILL|NMAP|TRANSFORM|NODE\b[^\n]*SYSTEM *= *[CS])\b",
+    re.MULTILINE | re.IGNORECASE,
+)
+
+
 def read_entries(data: bytes) -> Contents | None:
     """The one matrix of a list of entries, whose nodes are named or its rows counted from 1."""
     if _LABELS.match(data):
@@ -337,6 +343,11 @@ def read_nodes(data: bytes) -> Contents | None:
     blocks = list(_NODES.finditer(data))
     if blocks and re.search(rb"^\*INSTANCE\b", data, re.M | re.I):
         raise UnfitError("moves parts (*INSTANCE): write an input file without parts, or a CSV")
+    if blocks and (moved := _MOVED.search(data)):
+        word = moved.group(1).decode().upper()
+        raise UnfitError(
+            f"has *{word}, which is not read: write nodes out, in the axes of the part"
+        )
     lines = (line.replace(b",", b" ").split() for b in blocks for line in b.group(1).split(b"\n"))
     places = entries.places_of(
         (int(words[0]), np.array([*map(float, words[1:4]), *[0.0] * (4 - len(words))]))

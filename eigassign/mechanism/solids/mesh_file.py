@@ -266,8 +266,20 @@ _ABAQUS = {"C3D4": 4, "C3D10": 10, "C3D20": 20}
 _JOINED = (
     *("TIE", "MPC", "EQUATION", "CONTACT PAIR", "CONTACT", "DISTRIBUTING COUPLING", "SPRING"),
     *("NONSTRUCTURAL MASS", "EMBEDDED ELEMENT", "SHELL TO SOLID COUPLING", "MODEL CHANGE"),
+    *(
+        "FOUNDATION",
+        "MATRIX INPUT",
+        "MATRIX ASSEMBLE",
+        "REBAR",
+        "SUBSTRUCTURE PROPERTY",
+        "FASTENER",
+    ),
+    *("SURFACE SECTION", "PRE-TENSION SECTION", "CYCLIC SYMMETRY MODEL", "CONNECTOR SECTION"),
 )
-_MADE = ("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
+_MADE = (
+    *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "ADJUST", "IMPERFECTION"),
+    *("IMPORT", "SYMMETRIC MODEL GENERATION"),
+)
 _OWN = 10**10  # is added to the numbers of an assembly's nodes: parts count theirs from 1 too
 _COUPLED = ("RIGID BODY", "KINEMATIC COUPLING", "KINEMATIC", "DISTRIBUTING")
 _FLAT = re.compile(r"(CPS|CPE|CAX|S[3468]|STRI|M3D|SFM3D|T2D|T3D|B[23]|R3D|DC2D|AC2D)")
@@ -285,6 +297,7 @@ def _abaqus(text: str) -> _Raw:
         {options.get("MATERIAL") for word, options, _ in blocks if word == "SOLID SECTION"}
     )
     coupled, couplings, outside = dict[str, str](), list[Any](), False
+    scopes = dict[tuple[str, str], bool]()
     for word, options, lines in blocks:
         if word in ("ASSEMBLY", "INSTANCE", "END INSTANCE", "END ASSEMBLY"):
             outside = word in ("ASSEMBLY", "END INSTANCE")  # of its part
@@ -294,6 +307,9 @@ def _abaqus(text: str) -> _Raw:
             raise UnfitError("includes other files: save the mesh in one")
         if word == "INSTANCE" and any(float(entry or 0.0) for entry in itertools.chain(*rows)):
             raise UnfitError("moves or turns its part as an instance: save the part alone")
+        for key in ("NSET", "ELSET", "NAME") if word in ("NSET", "ELSET", "SURFACE") else ():
+            if key in options and scopes.setdefault((key, options[key]), outside) != outside:
+                raise UnfitError("has a set of one name in its part and its assembly: rename one")
         if word in _JOINED:
             raise UnfitError(f"has *{word}{_ALONE}")
         if word in _MADE or options.get("SYSTEM", "R") != "R":
@@ -374,13 +390,17 @@ def _abaqus_coupling(
         own, freedoms = _members(raw, [row[:1] for row in rows], False), [row[1:] for row in rows]
     else:
         keys = ("NSET", "PIN NSET", "TIE NSET", "SURFACE")
-        own = set[int]().union(*(raw.sets.get(options[k], ()) for k in keys if k in options))
+        named = (options[k] for k in keys if k in options)
+        sets = (raw.sets.get(n, raw.sets.get(n.rpartition(".")[2], ())) for n in named)
+        own = set[int]().union(*sets)
         for key in groups.sets[options["ELSET"]] if options.get("ELSET") in groups.sets else ():
             own.update(raw.elements.get(key, groups.elements.get(key, [])))
-        freedoms = rows if word == "KINEMATIC" else []
+        freedoms = rows if word in ("KINEMATIC", "DISTRIBUTING") else []
     ends = [[int(entry) for entry in row[:2] if entry] for row in freedoms]
     held = {k for row in filter(None, ends) for k in range(row[0], row[-1] + 1)}
-    if any(ends) and not held >= {1, 2, 3}:
+    if not own:
+        raise UnfitError(f"has *{word} of a set that it does not define")
+    if any(ends) and not held >= ({1, 2, 3, 4, 5, 6} if word == "DISTRIBUTING" else {1, 2, 3}):
         raise UnfitError(f"has *{word} of some directions alone{_ALONE}")
     node = node if node in raw.nodes else node % _OWN
     name = options.get("CONSTRAINT NAME", f"node {node % _OWN}")
@@ -433,7 +453,7 @@ def _surface(raw: _Raw, groups: _Raw, options: dict[str, str], rows: list[list[s
 
 _JOINS = re.compile(  # elements and joins that are not taken, glue and contact among them
     r"C[A-Z]|RB[AE]|RROD|RTRPLT|RSPLINE|RSSCON|RJOINT|MPC|NSM|GENEL|DMIG|BSURF|BCTSET|BGSET|BGADD"
-    r"|BCONTACT|BCBODY|BCTABLE"
+    r"|BCONTACT|BCONP|BCBODY|BCTABLE|BCPROP|BCTADD|BEDGE|BFRIC"
 )
 _PASSED = ("CORD1R", "CORD2R", "CORD1C", "CORD2C", "CORD1S", "CORD2S")
 _NASTRAN = {"CTETRA": 4, "CHEXA": 8, "CPENTA": 6, "CPYRAM": 5, "CPYRA": 5}
