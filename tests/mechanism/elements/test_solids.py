@@ -210,6 +210,19 @@ WRONG = {
     "generated": ("*NODE\n1,0,0,0\n*NGEN\n1,5,1\n", "NGEN that makes or moves"),
     "more mass": ("*NODE\n1,0,0,0\n*NONSTRUCTURAL MASS\n5.\n", "NONSTRUCTURAL MASS, which is not"),
     "a radius": ("*NODE\n1,0,0,0\n*COUPLING, INFLUENCE RADIUS=1.\n", "a radius of its own"),
+    "one name": (
+        "*PART\n*NODE\n1,0,0,0\n*NSET, NSET=a\n1\n*END PART\n*ASSEMBLY\n*NSET, NSET=a\n1\n",
+        "a set of one name",
+    ),
+    "coupled to nothing": (
+        "*NODE\n1,0,0,0\n*KINEMATIC COUPLING, REF NODE=1\n",
+        "of a set that it does not define",
+    ),
+    "free turns of Abaqus": (
+        "*NODE, NSET=n\n1,0,0,0\n*SURFACE, TYPE=NODE, NAME=s\nn\n*COUPLING, REF NODE=1, SURFACE=s\n"
+        "*DISTRIBUTING\n1,3\n",
+        "DISTRIBUTING of some directions alone",
+    ),
     "glued": ("BEGIN BULK\nBSURFS,1,,,,1\n", "has BSURFS, which is not read"),
     "two superelements": ("BEGIN BULK\nGRID,1,,0.,0.,0.\nBEGIN SUPER=1\n", "several superelements"),
     "twice": ("BEGIN BULK\nGRID,7,,0.,0.,0.\nGRID,7,,1.,0.,0.\n", "defines node 7 twice"),
