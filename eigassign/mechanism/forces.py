@@ -29,7 +29,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import drive_value, gravity, local_links, rigid_links
 from eigassign.mechanism.assembly.congruence import inertia, pulled, scattered
 from eigassign.mechanism.assembly.dynamics.velocity_terms import IMAGINARY
-from eigassign.mechanism.assembly.node_motion import MotionRow, SpringEnds, combined
+from eigassign.mechanism.assembly.node_motion import MotionRow, SpringEnds, along, combined
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.joints import DOFS, multiply
 from eigassign.mechanism.kinematics.loop_closure import all_moving
@@ -82,7 +82,7 @@ def forces(
     rows: list[MotionRow] = []
     for node, directions in nodes.items():
         moved = ends.in_world(split(node))
-        rows += [_along(moved, direction) for direction in directions]
+        rows += [along(moved, direction) for direction in directions]
     g = gravity(case)
     if weight and g is not None:
         total: dict[int, Scalar] = {}
@@ -95,15 +95,6 @@ def forces(
     arrays = [np.array(list(row.values()), dtype=object) for row in rows]
     unknowns = [np.array(list(row), dtype=np.intp) for row in rows]
     return Forces(unknowns, parameters.compiled(*arrays), parameters)
-
-
-def _along(moved: Sequence[MotionRow], direction: Sequence[float]) -> MotionRow:
-    """n·v for n of unit length."""
-    n = np.array(direction) / np.linalg.norm(direction)
-    row: MotionRow = {}
-    for own, share in zip(moved, n.tolist(), strict=False):
-        row = combined(row, own, share) if share else row
-    return row
 
 
 BLOCK = 1_000_000  # complex numbers evaluated together: 16 MB

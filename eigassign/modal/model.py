@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from eigassign.mechanism.assembly.dynamics.under_load import (
     StiffnessUnderLoad,
     stiffness_under_load,
 )
+from eigassign.mechanism.assembly.held import Held
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, TotalMass, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.links import LinkMesh
@@ -71,6 +72,7 @@ class Model:
     y_names: tuple[str, ...]
     meshes: Mapping[str, LinkMesh]  # of each link, reduced where that is asked for
     solids: SolidLinks | None = None
+    held: Held | None = None  # of the pencil
 
     def __repr__(self) -> str:
         return (
@@ -141,7 +143,16 @@ class Model:
 
     def _rebuilt(self, case: CaseFile, known: Mapping[str, LinkMesh], bent: bool = False) -> Pencil:
         given = case, self.poses.parameters, self.motion
-        return build_pencil(*given, local_links(*given, known), bent)
+        return build_pencil(*given, local_links(*given, known), bent, self.held)
+
+    def holding(self, node: str, direction: Sequence[float]) -> Model:
+        """The mechanism with a node ``link.node`` held along a direction of the ground.
+
+        Its modes are the antiresonances of that node's response to a force along it. Raises
+        MechanismError where a coordinate is free, or nothing gives way there.
+        """
+        own = replace(self, held=Held(node, tuple(map(float, direction))))
+        return replace(own, pencil=own._rebuilt(self.poses.case, self.meshes))
 
     @cached_property
     def under_load(self) -> StiffnessUnderLoad:

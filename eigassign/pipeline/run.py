@@ -199,7 +199,7 @@ def _moving(
     if target is not None:
         name, first = target.asked.curve_name, target.asked.mode * ones
         for row in target.followed[:1]:
-            first[target.asked.rows] = row.exact_numbers
+            first[target.asked.rows] = np.maximum(row.exact_numbers, 1)
     numbers = {name: first, **numbers} | {name: first}
     return tuple(motions(scene.file, scene.model, scene.path, y, numbers))
 

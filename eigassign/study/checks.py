@@ -355,21 +355,26 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
 
 
 def model_errors(
-    scene: Scene, judged: MeshError | None, y: Floats, modes: Collection[int]
+    scene: Scene,
+    judged: MeshError | None,
+    y: Floats,
+    modes: Collection[int],
+    held: Model | None = None,
 ) -> dict[int, float]:
     """By how much mesh and reduced links raise each mode at design y (n_y,), about, relative.
 
-    The mesh's part of some modes was ``judged`` before. Infinite where nothing is known.
+    Of the scene's model, or of that with a node ``held``, whose modes are antiresonances. The
+    mesh's part of some modes was ``judged`` before. Infinite where nothing is known.
     """
     if not modes:
         return {}
-    wanted, q = sorted(modes), poses_at(scene.path, y)
+    wanted, q, model = sorted(modes), poses_at(scene.path, y), held or scene.model
     known = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
     if unknown := [mode for mode in wanted if mode not in known]:
-        mesh = scene.model.discretisation_error(judged_poses(scene.model, q), y, unknown)
+        mesh = model.discretisation_error(judged_poses(model, q), y, unknown)
         known |= dict(zip(unknown, mesh.max(axis=0).tolist(), strict=True))
-    worst = worst_poses(scene.model, q, y, wanted[-1])
-    links = scene.model.truncation_error(worst, y, wanted).max(axis=0)
+    worst = worst_poses(model, q, y, wanted[-1])
+    links = model.truncation_error(worst, y, wanted).max(axis=0)
     return {
         mode: (1.0 + known[mode]) * (1.0 + float(share)) - 1.0
         for mode, share in zip(wanted, links, strict=True)

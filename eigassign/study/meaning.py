@@ -41,7 +41,7 @@ from eigassign.modal.model import Model
 from eigassign.study.built_case import build_model
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.followed import solve_design
+from eigassign.study.design.followed import Rest, followers, solve_design
 from eigassign.study.design.search.optimum import Choices
 from eigassign.study.design.search.response import Designs, corners, effects
 from eigassign.study.design.search.variants import PosedProblem, Task, variant_of
@@ -367,6 +367,7 @@ def levers(model: Model, q: Floats, y: Floats, numbers: Mapping[str, Ints]) -> I
     except EigassignError:
         every = case.with_design(y).with_every_property(places=False)
         made = build_model(every)
+    made = made if model.held is None else made.holding(*model.held)
     x = made.x(q, np.array([every.value_at(path) for path in made.y_names]))
     wanted = np.arange(x.shape[1]) >= made.pencil.n_joints
     count = max(int(own.max()) for own in numbers.values())
@@ -399,6 +400,12 @@ def _of_missed(
         if one.followed:
             shapes = zip(one.followed, one.followed_numbers, strict=True)
             named = {mode.name: exact.numbers[:, k] for mode, k in shapes}
+            for rest in followers(scene, [one]):
+                if isinstance(rest, Rest) and rest.mode.name in named:
+                    q, name = scene.path.at(y)[0][samples], rest.mode.name
+                    own = rest.of.counted(scene.model.x(q, y), rest.mode.number)[1][:, -1]
+                    yield from levers(rest.of.held, q, y, {name: own + 1})
+                    del named[name]
         for name, own in named.items():
             known = numbers.setdefault(name, np.zeros(len(exact.hz), dtype=np.intp))
             known[one.rows] = own[one.rows]

@@ -425,7 +425,7 @@ class TargetStudy(Brief):
     def numbers(self) -> set[int]:
         """The modes that it names, and those that followed ones are with the answer."""
         followed = (row.exact_numbers.tolist() for row in self.followed)
-        return {mode for mode in self.asked.modes if mode > 0}.union(*followed)
+        return {mode for mode in {*self.asked.modes}.union(*followed) if mode > 0}
 
     @property
     def judged(self) -> set[int]:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.program import Floats, LinearConstraint, frozen
 from eigassign.brief import Brief
-from eigassign.case.schema.targets import AnyTarget, FollowedMode
+from eigassign.case.schema.targets import AnyTarget, NamedMode
 from eigassign.errors import UsageError
 from eigassign.facts import Fact, Unwritten, told
 
@@ -158,10 +158,10 @@ class Requirement(Brief):
     """One target on one mode, or limit of a quantity, at those ``rows`` of all samples; edges (n,).
 
     A gap is on two modes, a band on all the ``modes`` it names, or without any on all there are.
-    Modes are numbered from 1; those followed by their shape −1, −2, …, the last of them named being
-    −1: they are in ``terms``, and in ``modes`` that of a band alone. ``along`` has each
-    trajectory's part of the requirement's own arrays. Edges are in Hz, or in the SI unit of the
-    quantity. Raises UsageError for a weight that is not finite and above 0.
+    Modes are numbered from 1; those followed by their shape, and antiresonances, −1, −2, …, the
+    last of them named being −1: they are in ``terms``, and in ``modes`` that of a band alone.
+    ``along`` has each trajectory's part of the requirement's own arrays. Edges are in Hz, or in the
+    SI unit of the quantity. Raises UsageError for a weight that is not finite and above 0.
     """
 
     form: ClassVar[type[AnyTarget]]  # of the case file
@@ -180,7 +180,7 @@ class Requirement(Brief):
     trajectory: Annotated[str | None, Fact("the only one on which it holds", optional=True)] = None
     # ω (n,) of the integral over its own part; None: of all samples
     seconds: Unwritten[Floats | None] = None
-    followed: Unwritten[tuple[FollowedMode, ...]] = ()
+    followed: Unwritten[tuple[NamedMode, ...]] = ()
     part_of: Unwritten[str] = ""  # the label of the whole, where it is a part of a band
 
     def __post_init__(self) -> None:

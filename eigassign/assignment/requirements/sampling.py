@@ -27,8 +27,8 @@ from eigassign.case.reader import dotted
 from eigassign.case.schema.targets import (
     AnyMode,
     AnyTarget,
-    FollowedMode,
     FrequencyProfile,
+    NamedMode,
     StaticTarget,
 )
 from eigassign.errors import CaseError
@@ -54,8 +54,11 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
     )
 
 
-def followed_modes(file: CaseFile) -> tuple[FollowedMode, ...]:
-    """The modes that targets follow by their shape, each once, in the order of the file."""
+def followed_modes(file: CaseFile) -> tuple[NamedMode, ...]:
+    """What targets name but by a mode's number, each once, in the order of the file.
+
+    Modes that are followed by their shape, and antiresonances.
+    """
     return tuple(dict.fromkeys(mode for target in file.targets for mode in target.followed))
 
 
@@ -153,7 +156,7 @@ def _of_target(
     lower, upper = (np.broadcast_to(edge, rows.stop - rows.start) for edge in edges)
     own = followed_modes(file)
     for named in target.named:
-        followed = tuple(mode for mode in named if isinstance(mode, FollowedMode))
+        followed = tuple(mode for mode in named if not isinstance(mode, int))
         modes = tuple(m if isinstance(m, int) else own.index(m) - len(own) for m in named)
         terms = terms_of(target, modes)
         yield KINDS[target.kind](
@@ -175,7 +178,7 @@ def _of_target(
 def _who(modes: tuple[AnyMode, ...]) -> str:
     if not modes:
         return "every mode"
-    if any(isinstance(mode, FollowedMode) for mode in modes):
+    if not all(isinstance(mode, int) for mode in modes):
         return " and ".join(f"mode {m}" if isinstance(m, int) else m.name for m in modes)
     *first, last = map(str, modes)
     return f"modes {', '.join(first)} and {last}" if first else f"mode {last}"

@@ -26,7 +26,13 @@ from eigassign.case.schema.design import Choices
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.mechanism import Mechanism, RevoluteJoint
 from eigassign.case.schema.study import Highest, HighestMode
-from eigassign.case.schema.targets import FrequencyTarget, GapTarget, KeepOutTarget, SagTarget
+from eigassign.case.schema.targets import (
+    Antiresonance,
+    FrequencyTarget,
+    GapTarget,
+    KeepOutTarget,
+    SagTarget,
+)
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
     TipTrajectory,
@@ -210,6 +216,8 @@ def times_are_of_trajectories(document: Document) -> Iterator[Finding]:
     for k, target in enumerate(document.targets):
         asked.append((("targets", k), target.trajectory, "during", target.during))
     for path, mode in followed_modes(document):
+        if isinstance(mode, Antiresonance):
+            continue
         asked.append(((*path, "at"), mode.at.trajectory, "time", mode.at.time))
     for k, each in enumerate(m if isinstance(m := document.measurements, tuple) else ()):
         asked.append((("measurements", k), each.trajectory, "time", each.time))
@@ -287,7 +295,7 @@ def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
         if not target.is_goal:
             yield ("targets", k, target.kind), f"is not a wanted frequency: {instead}"
     for path, _ in followed_modes(document):
-        yield path, f"is followed by its shape: {instead}"
+        yield path, f"is no numbered mode: {instead}"
     if design.mass is not None:
         yield ("design", "mass"), f"limits or prices the mass: {instead}"
     if "torque" in design.model_fields_set:
@@ -316,7 +324,15 @@ def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
         yield ("assignment", "objective"), "widest needs a target with keep_out or gap"
     for place, _ in followed_modes(document) if name == "widest" else ():
         if wide[int(place[1])]:
-            yield place, "is followed by its shape: widest takes numbered modes only"
+            yield place, "is no numbered mode: widest takes these only"
+
+
+def antiresonances_are_held(document: Document) -> Iterator[Finding]:
+    """A drive holds every coordinate where antiresonances are asked for, or it is locked."""
+    free = [name for name, own in document.coordinates.items() if own.moves == "free"]
+    for path, mode in followed_modes(document) if free else ():
+        if isinstance(mode, Antiresonance):
+            yield path, f"needs what holds {listed(free)}: give a drive stiffness, or lock it"
 
 
 def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
@@ -354,6 +370,7 @@ RULES: tuple[Rule, ...] = (
     a_mode_has_one_frequency_at_a_time,
     one_shot_has_a_quadratic_program,
     objectives_have_what_they_take,
+    antiresonances_are_held,
     robust_designs_have_tolerances,
 )
 LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right

@@ -120,7 +120,7 @@ def names_mean_parts(document: Document) -> Iterator[Finding]:
             case (
                 ("mechanism", "bodies", _, "at")
                 | ("trajectory", *_, "tip")
-                | ("targets", _, _, "at")
+                | ("targets", _, *_, "at")
             ):
                 problem = node_problem(mechanism, name)
         if problem:

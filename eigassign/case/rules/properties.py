@@ -19,7 +19,7 @@ from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import RigidLink, SolidLink
 from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism, NutJoint
 from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, Written, quantity
-from eigassign.case.schema.targets import FREQUENCY, FollowedMode
+from eigassign.case.schema.targets import FREQUENCY, Antiresonance, FollowedMode, NamedMode
 from eigassign.case.schema.trajectory import Added, named_trajectories
 from eigassign.case.units import DIMENSIONS, SI, QuantityError, read_quantity, read_rate, written
 
@@ -224,10 +224,10 @@ def _walk(part: object, path: KeyPath, found: list[tuple[KeyPath, object]]) -> N
                 _walk(each, (*path, k), found)
 
 
-def followed_modes(document: Document) -> list[tuple[KeyPath, FollowedMode]]:
-    """Key path and content of every mode that is named by its shape."""
+def followed_modes(document: Document) -> list[tuple[KeyPath, NamedMode]]:
+    """Key path and content of every mode named by its shape, and of every antiresonance."""
     found = walk(document.targets, ("targets",))
-    return [(path, mode) for path, mode in found if isinstance(mode, FollowedMode)]
+    return [(path, mode) for path, mode in found if isinstance(mode, FollowedMode | Antiresonance)]
 
 
 def coordinate_lists(document: Any) -> Iterator[tuple[KeyPath, Sequence[float]]]:

@@ -118,7 +118,48 @@ class FollowedMode(Part):
         return f"the mode like mode {self.like} ({where})"
 
 
-AnyMode: TypeAlias = int | FollowedMode
+class Antiresonance(Part):
+    """A frequency at which a force on a node leaves that node at rest along it.
+
+    Keys:
+        at: the node, `<link>.<node>`
+        direction: in the axes of the ground
+        number: 1 is the lowest; modes that the force does not see are not counted
+    """
+
+    at: str
+    direction: Direction
+    number: Mode = 1
+
+    @property
+    def like(self) -> int:
+        """Its number."""
+        return self.number
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        along = ", ".join(f"{each:g}" for each in self.direction)
+        return f"antiresonance {self.number} of {self.at} along [{along}]"
+
+
+class NamedAntiresonance(Part):
+    """An antiresonance beside a mode.
+
+    Keys:
+        antiresonance: which
+    """
+
+    antiresonance: Antiresonance
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        return self.antiresonance.name
+
+
+NamedMode: TypeAlias = FollowedMode | Antiresonance  # not by the number of a mode alone
+AnyMode: TypeAlias = int | NamedMode
 
 # --- Targets
 
@@ -150,16 +191,16 @@ class AnyTarget(Part):
         return ()
 
     @property
-    def followed(self) -> tuple[FollowedMode, ...]:
-        """The modes that it follows by their shapes."""
+    def followed(self) -> tuple[NamedMode, ...]:
+        """The modes that it follows by their shapes, and antiresonances."""
         each = (mode for modes in self.named for mode in modes)
-        return tuple(mode for mode in each if isinstance(mode, FollowedMode))
+        return tuple(mode for mode in each if not isinstance(mode, int))
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """The numbers of all modes that it names, of followed ones where they are named."""
         each = (mode for modes in self.named for mode in modes)
-        return tuple(mode.like if isinstance(mode, FollowedMode) else mode for mode in each)
+        return tuple(mode if isinstance(mode, int) else mode.like for mode in each)
 
     @classmethod
     def curve_of(cls, mode: str) -> str:
@@ -178,7 +219,13 @@ class SomeModes(AnyTarget):
 
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
-    one_at_most = ("mode", "modes")
+    antiresonance: Antiresonance | None = None
+    one_at_most = ("mode", "modes", "antiresonance")
+
+    @property
+    def one(self) -> AnyMode | None:
+        """The only one that is meant."""
+        return self.mode if self.antiresonance is None else self.antiresonance
 
 
 class ModeTarget(SomeModes):
@@ -187,9 +234,10 @@ class ModeTarget(SomeModes):
     Keys:
         mode: number of the elastic mode, 1 is the lowest; or a mode followed by its shape
         modes: several numbers, or `all`
+        antiresonance: or an antiresonance of a node
     """
 
-    model_config = needs_one_of(("mode",), ("modes",))
+    model_config = needs_one_of(("mode",), ("modes",), ("antiresonance",))
 
     never_all: ClassVar[str] = ""  # why `modes: all` cannot be meant
 
@@ -208,12 +256,12 @@ class ModeTarget(SomeModes):
     def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """One mode each; all modes are at least f if and only if mode 1 is."""
         if self.modes is None:
-            return ((self.mode or 1,),)
+            return ((self.one or 1,),)
         return ((1,),) if self.modes == "all" else tuple((mode,) for mode in self.modes)
 
     def _mistakes(self, space: str | None) -> Mistakes:
         yield from super()._mistakes(space)
-        if self.mode is None and self.modes is None:
+        if self.one is None and self.modes is None:
             yield wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
         if self.modes == "all" and self.never_all:
             yield wrong(self.never_all, "modes")
@@ -262,6 +310,7 @@ class KeepOutTarget(SomeModes):
         keep_out: the band, or one about a harmonic
         mode: number of the only mode that keeps out, or one followed by its shape
         modes: several numbers; `all` unless given
+        antiresonance: or an antiresonance of a node
     """
 
     kind = "keep_out"
@@ -277,7 +326,7 @@ class KeepOutTarget(SomeModes):
     @property
     def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """The modes of all of them together."""
-        modes: tuple[AnyMode, ...] = () if self.mode is None else (self.mode,)
+        modes: tuple[AnyMode, ...] = () if self.one is None else (self.one,)
         return (modes if self.modes is None else () if self.modes == "all" else self.modes,)
 
     @field_validator("keep_out", mode="before")
@@ -297,21 +346,27 @@ class KeepOutTarget(SomeModes):
             yield wrong(f"the band must go upwards, got [{both}]", "keep_out")
 
 
+GapEnd: TypeAlias = Annotated[
+    Mode | FollowedMode | NamedAntiresonance,
+    Told(lambda value: 1 + ("antiresonance" in value) if isinstance(value, Mapping) else 0),
+]
+
+
 class Gap(Part):
     """At least so many Hz between two modes.
 
     Keys:
-        between: their numbers, the lower first; or modes followed by their shapes
+        between: their numbers, the lower first; or modes followed by their shapes, antiresonances
         at_least: how far the second is above the first
     """
 
-    between: tuple[ValueOr[Mode, FollowedMode], ValueOr[Mode, FollowedMode]]
+    between: tuple[GapEnd, GapEnd]
     at_least: Frequency
 
     def _mistakes(self, space: str | None) -> Mistakes:
         low, high = self.between
         if low == high:
-            name = low.name if isinstance(low, FollowedMode) else low
+            name = low if isinstance(low, int) else low.name
             yield wrong(f"a gap is between two modes, got {name} twice", "between")
         if isinstance(low, int) and isinstance(high, int) and low > high:
             yield wrong(f"the lower mode comes first: [{high}, {low}]", "between")
@@ -335,7 +390,8 @@ class GapTarget(AnyTarget):
     @property
     def named(self) -> tuple[tuple[AnyMode, ...], ...]:
         """The pair."""
-        return (self.gap.between,)
+        ends = self.gap.between
+        return (tuple(e.antiresonance if isinstance(e, NamedAntiresonance) else e for e in ends),)
 
 
 class HighestTarget(AnyTarget):

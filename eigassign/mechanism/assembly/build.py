@@ -13,6 +13,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
+from eigassign.mechanism.assembly.held import Held, substitution
 from eigassign.mechanism.assembly.loads.statics import Loaded
 from eigassign.mechanism.assembly.loads.weight import add_weight
 from eigassign.mechanism.assembly.node_motion import NodeMotions, add_springs, close_rigid_loops
@@ -22,6 +23,7 @@ from eigassign.mechanism.assembly.pencil import (
     Ints,
     Pencil,
     Weight,
+    joined,
     pattern,
 )
 from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, separated, swinging
@@ -82,10 +84,12 @@ def build_pencil(
     motion: Kinematics,
     local: LocalLinks | None = None,
     bent: bool = False,
+    held: Held | None = None,
 ) -> Pencil:
     """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong.
 
-    ``local`` is what `local_links` gave, where that is known already; ``bent`` as in `Loaded`.
+    ``local`` is what `local_links` gave, where that is known already; ``bent`` as in `Loaded`;
+    ``held`` is a node that cannot move along a direction.
     """
     links, nodes = local_links(case, parameters, motion) if local is None else local
     stiffness, mass = AffineEntries(), AffineEntries()
@@ -107,7 +111,13 @@ def build_pencil(
         n_dof = nodes.count + len(motion.columns)
         rigid = [nodes.count + k for k in motion.rigid]
         K_g = apart_from_rigid(weight.finish(nodes.count), M, case, known, rigid, n_dof)
-    return _compile(K, M, K_g, case, parameters, motion, nodes.count)
+    n_u = nodes.count
+    if held is not None:
+        staying = substitution(held, case, parameters, motion, nodes)
+        K = K if K_g is None else joined(K, K_g)
+        K, M, K_g = staying.entries(K, parameters), staying.entries(M, parameters), None
+        n_u -= 1
+    return _compile(K, M, K_g, case, parameters, motion, n_u)
 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
@@ -347,7 +357,9 @@ def _compile(
         n_loads=len(parameters.loads),
         limits=property_limits(case),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
-        weight=_weight((rows, columns), weights, case, parameters, motion, n_u),
+        weight=(
+            _weight((rows, columns), weights, case, parameters, motion, n_u) if weight else None
+        ),
     )
 
 

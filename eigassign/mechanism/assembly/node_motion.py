@@ -139,6 +139,15 @@ def combined(row: MotionRow, other: MotionRow, factor: Scalar) -> MotionRow:
     return out
 
 
+def along(moved: Sequence[MotionRow], direction: Sequence[float] | Floats) -> MotionRow:
+    """n·v for n of unit length."""
+    n = np.array(direction) / np.linalg.norm(direction)
+    row: MotionRow = {}
+    for own, share in zip(moved, n.tolist(), strict=False):
+        row = combined(row, own, share) if share else row
+    return row
+
+
 def apply(X: Objects, rows: MotionRows) -> MotionRows:
     """A (6, 6) map of rows: Σ_b X_ab row_b."""
     out: MotionRows = []

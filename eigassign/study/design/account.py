@@ -29,7 +29,7 @@ from eigassign.study.checks import (
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import LIMIT, check_band, lowest_room
 from eigassign.study.design.conclusions import Conflict, aim_row, extreme
-from eigassign.study.design.followed import followers
+from eigassign.study.design.followed import Rest, followers
 from eigassign.study.design.judgement import Facts, SolvedDesigns, judged_modes, verdict
 from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found
@@ -185,6 +185,10 @@ def _of_mesh(
     exact, at_stake, undecided = own.solved.exact, [(accepted, "")], dict[str, str]()
     for target in own.targets:
         too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
+        for rest in followers(scene, [target.asked]) if target.followed else ():
+            if isinstance(rest, Rest) and rest.needed.any():
+                errors = model_errors(scene, None, own.answer.y, {rest.mode.number}, rest.of.held)
+                too_high = max(too_high, *errors.values())
         if not too_high > 0.0 or not target.asked.terms:
             continue
         how = f"mesh and reduced links raise the frequencies {raised_by(too_high)}"

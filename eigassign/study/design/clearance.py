@@ -36,7 +36,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.checks import judged_poses
-from eigassign.study.design.followed import Follower, follow_all, unfollowed
+from eigassign.study.design.followed import Named, follow_all, unfollowed
 from eigassign.study.results import ClearanceRow
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def check_band(
     band: ForbiddenBand,
     below: int,
     y: Floats,
-    own: Sequence[Follower] = (),
+    own: Sequence[Named] = (),
     raised: float | None = None,
     within: float | None = None,
 ) -> ClearanceRow:
@@ -90,7 +90,7 @@ def check_band(
 def _raised(
     model: Model,
     path: Trajectories,
-    own: Sequence[Follower],
+    own: Sequence[Named],
     band: ForbiddenBand,
     above: int | None,
     q: Floats,
@@ -150,7 +150,7 @@ def _solved(
     path: Trajectories,
     parts: Sequence[Requirement],
     y: Floats,
-    own: Sequence[Follower] = (),
+    own: Sequence[Named] = (),
 ) -> Callable[[Floats], Solved]:
     """The modes that parts are on, solved at places along their rows; ``own`` are followed."""
     rows, top, named = parts[0].rows, max(one.top for one in parts), parts[0].followed
@@ -265,7 +265,7 @@ def lowest_room(
     asked: Requirement,
     path: Trajectories,
     y: Floats,
-    own: Sequence[Follower] = (),
+    own: Sequence[Named] = (),
 ) -> Lowest:
     """The least room that a target leaves along its trajectories, relative, and the place of it.
 

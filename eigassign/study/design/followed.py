@@ -1,4 +1,4 @@
-"""Modes that targets follow by their shape, at the samples of the trajectories and any design.
+"""Modes that targets follow by their shape, and antiresonances, at samples and any design.
 
 From the pose that names a mode, the design of the file changes first, in a straight line and at
 that pose. Then the shape goes from sample to sample: from the pose's time to both ends of its own
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,15 @@ from eigassign.assignment.program import frozen
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.targets import FollowedMode
+from eigassign.case.schema.targets import Antiresonance, FollowedMode
 from eigassign.case.units import shown_point
 from eigassign.errors import LostModeError
+from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.antiresonances import Antiresonances
 from eigassign.modal.exact.dense import Modes
+from eigassign.modal.exact.solver import mode_slopes
 from eigassign.modal.exact.tracking import (
     EXTRA,
     FollowedShape,
@@ -137,6 +141,19 @@ class Follower:
         yield tuple(range(nearest + 1, last + 1)), nearest
 
 
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """An antiresonance that targets name, and at which samples of the path it is needed."""
+
+    mode: Antiresonance
+    of: Antiresonances
+    path: Trajectories
+    needed: NDArray[np.bool_]  # (n_t,)
+
+
+Named: TypeAlias = Follower | Rest
+
+
 def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories, y: Floats) -> Floats:
     """q (n_q,) at which it has that shape, of design y where coordinates follow the design.
 
@@ -148,14 +165,18 @@ def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories, y: Fl
     return frozen(path.whole.pose(pose.time, pose.trajectory, y))
 
 
-def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ...]:
-    """One for each mode that the case's targets follow, needed where ``wanted`` ask for it."""
-    file, path, found = scene.file, scene.path, []
+def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Named, ...]:
+    """One for each of `followed_modes`, needed where ``wanted`` ask for it."""
+    file, path, found = scene.file, scene.path, list[Named]()
     for mode in followed_modes(file):
         needed = np.zeros(len(path.q), dtype=np.bool_)
         for one in wanted:
             if mode in one.followed:
                 needed[one.rows] = True
+        if isinstance(mode, Antiresonance):
+            own = Antiresonances.of(scene.model, mode.at, mode.direction)
+            found.append(Rest(mode, own, path, needed))
+            continue
         y = frozen(initial_design(file))
         pose = partial(named_pose, file, mode, path)
         found.append(Follower(mode, scene.model, path, y, pose, needed))
@@ -164,8 +185,13 @@ def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ..
 
 def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[str]:
     """Say which frequency each followed mode has where it is named."""
+    y = initial_design(file)
     for mode in followed_modes(file):
-        y = initial_design(file)
+        if isinstance(mode, Antiresonance):
+            own = Antiresonances.of(model, mode.at, mode.direction)
+            hz = own.frequencies(path.q[0], y, mode.number)[0, -1]
+            yield f"{mode.name} has {hz:.6g} Hz in the first pose"
+            continue
         hz = model.frequencies(named_pose(file, mode, path, y), y, mode.like)[0, -1]
         yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
 
@@ -175,12 +201,13 @@ def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[st
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Modes at samples x (n, n_x): the lowest, and those followed."""
+    """Modes at samples x (n, n_x): the lowest, and what is named but by a number."""
 
     x: Floats
     modes: Modes  # (n, count)
+    named: Sequence[Named]
     followed: Modes  # (n, n_followed); NaN, and 0 for φ, where they are not needed
-    numbers: Ints  # (n, n_followed): which mode from the lowest each is; 0 where not needed
+    numbers: Ints  # (n, n_followed): which mode from the lowest each is; 0 of antiresonances
 
     @property
     def solved(self) -> Solved:
@@ -188,31 +215,43 @@ class Spectrum:
         hz, followed = (np.sqrt(own.lam) / (2.0 * np.pi) for own in (self.modes, self.followed))
         return Solved(hz, followed, self.numbers)
 
+    def slopes(self, pencil: Pencil, wanted: NDArray[np.bool_]) -> Floats:
+        """∂λ/∂x (n, n_followed, n_x) of those that are named; NaN where they are not needed."""
+        slopes = mode_slopes(pencil, self.x, self.followed, wanted)[0]
+        for k, each in enumerate(self.named):
+            if isinstance(each, Rest):
+                at = self.x[each.needed]
+                slopes[each.needed, k] = each.of.slopes(at, each.mode.number, wanted)[1]
+        return slopes
+
 
 def follow_all(
-    model: Model, path: Trajectories, own: Sequence[Follower], y: Floats, least: int
+    model: Model, path: Trajectories, own: Sequence[Named], y: Floats, least: int
 ) -> Spectrum:
     """At least ``least`` modes at all samples of design y, and the followed ones among them.
 
     Raises what exact solves raise, TrajectoryError where the design has no pose, LostModeError.
     """
     x = model.x(path.at(y)[0], y)
-    extra = EXTRA + max(0, *(each.mode.like - least for each in own))
+    shaped = {k: each for k, each in enumerate(own) if isinstance(each, Follower)}
+    extra = (EXTRA if shaped else 1) + max(0, 0, *(e.mode.like - least for e in shaped.values()))
     while True:
         samples = places(model.pencil, x, least, extra)
         try:
-            shapes = [each.along(y, samples) for each in own]
+            shapes = {k: each.along(y, samples) for k, each in shaped.items()}
             break
         except MoreModesError:
             extra += len(samples[0].lam)
     found = Modes(*(np.array([getattr(each, of) for each in samples]) for of in ("lam", "phi")))
     lam, phi = np.full((len(x), len(own)), np.nan), np.zeros((len(x), model.n_dof, len(own)))
     numbers = np.zeros((len(x), len(own)), dtype=np.intp)
-    for column, each in enumerate(shapes):
-        for k, shape in each.items():
+    for column, one in enumerate(own):
+        if isinstance(one, Rest):
+            lam[one.needed, column] = one.of.counted(x[one.needed], one.mode.number)[0][:, -1]
+        for k, shape in shapes.get(column, {}).items():
             lam[k, column], phi[k, :, column] = shape.lam, shape.phi
             numbers[k, column] = shape.number
-    return Spectrum(x, found, Modes(lam, phi), numbers)
+    return Spectrum(x, found, own, Modes(lam, phi), numbers)
 
 
 # --- Exact frequencies of a design
@@ -220,7 +259,7 @@ def follow_all(
 
 def solve_design(
     scene: Scene,
-    own: Sequence[Follower],
+    own: Sequence[Named],
     y: Floats,
     count: int | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
@@ -229,7 +268,7 @@ def solve_design(
     return with_followed(scene, own, y, scene.exact(y, count, progress))
 
 
-def with_followed(scene: Scene, own: Sequence[Follower], y: Floats, hz: Floats) -> Solved:
+def with_followed(scene: Scene, own: Sequence[Named], y: Floats, hz: Floats) -> Solved:
     """Frequencies (n_t, n_modes) of a design (n_y,) with those of the modes that are followed."""
     if not own:
         return unfollowed(hz)

@@ -39,7 +39,7 @@ from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.study.design.followed import Follower, follow_all, followers, with_followed
+from eigassign.study.design.followed import Named, follow_all, followers, with_followed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class DesignResponse:
     path: Trajectories
     wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
     count: int
-    followers: tuple[Follower, ...] = ()
+    followers: tuple[Named, ...] = ()
     models: ReducedModels | None = None
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
@@ -93,8 +93,7 @@ class DesignResponse:
                 *(each[..., : self.count + 1] for each in (found.modes.lam, found.modes.phi))
             )
             slopes, mixed = mode_slopes(pencil, found.x, own, wanted, mixed=True)
-            of_followed = mode_slopes(pencil, found.x, found.followed, wanted)[0]
-            slopes = np.concatenate([slopes, of_followed], axis=1)
+            slopes = np.concatenate([slopes, found.slopes(pencil, wanted)], axis=1)
             lam = np.hstack([own.lam, found.followed.lam])
         else:
             lam, slopes, mixed = exact_slopes(pencil, self.model.x(q, y), self.count, wanted, 1)
@@ -107,7 +106,7 @@ class DesignResponse:
 def response_of(
     scene: Scene,
     count: int,
-    followers: tuple[Follower, ...] = (),
+    followers: tuple[Named, ...] = (),
     models: ReducedModels | None = None,
 ) -> DesignResponse:
     """The response at all samples of the scene's trajectory."""
@@ -211,7 +210,7 @@ class Outlook(NamedTuple):
 def outlook_of(
     scene: Scene,
     requirements: Requirements,
-    followers: tuple[Follower, ...],
+    followers: tuple[Named, ...],
     glances: dict[int, Glances],
 ) -> Outlook | None:
     """The outlook of requirements, ``glances`` by the number of modes; None of followed ones."""
@@ -418,7 +417,7 @@ class Designs:
 
 
 def solved_below(
-    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Follower, ...], y: Floats
+    scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Named, ...], y: Floats
 ) -> Solved:
     """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass.
 

@@ -50,7 +50,7 @@ from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import mode_above
-from eigassign.study.design.followed import Follower, followers
+from eigassign.study.design.followed import Named, followers
 from eigassign.study.design.lists import catalogues, price_of_one
 from eigassign.study.design.search.response import (
     DesignResponse,
@@ -115,7 +115,7 @@ class Task:
         return {}
 
     @cached_property
-    def followers(self) -> tuple[Follower, ...]:
+    def followers(self) -> tuple[Named, ...]:
         """The followers of every mode that targets follow by its shape."""
         return followers(self.scene, self.wanted)
 
