@@ -403,8 +403,7 @@ def _of_missed(
             for rest in followers(scene, [one]):
                 if isinstance(rest, Rest) and rest.mode.name in named:
                     q, name = scene.path.at(y)[0][samples], rest.mode.name
-                    own = rest.of.counted(scene.model.x(q, y), rest.mode.number)[1][:, -1]
-                    yield from levers(rest.of.held, q, y, {name: own + 1})
+                    yield from levers(rest.of.held, q, y, {name: rest.numbers(q, y)})
                     del named[name]
         for name, own in named.items():
             known = numbers.setdefault(name, np.zeros(len(exact.hz), dtype=np.intp))

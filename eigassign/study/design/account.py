@@ -187,7 +187,9 @@ def _of_mesh(
         too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
         for rest in followers(scene, [target.asked]) if target.followed else ():
             if isinstance(rest, Rest) and rest.needed.any():
-                errors = model_errors(scene, None, own.answer.y, {rest.mode.number}, rest.of.held)
+                y = own.answer.y
+                modes = set(rest.numbers(scene.path.at(y)[0][target.asked.rows], y).tolist())
+                errors = model_errors(scene, None, y, modes, rest.of.held)
                 too_high = max(too_high, *errors.values())
         if not too_high > 0.0 or not target.asked.terms:
             continue

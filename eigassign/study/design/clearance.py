@@ -36,7 +36,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.checks import judged_poses
-from eigassign.study.design.followed import Named, follow_all, unfollowed
+from eigassign.study.design.followed import Named, Rest, follow_all, unfollowed
 from eigassign.study.results import ClearanceRow
 
 Floats = NDArray[np.float64]
@@ -102,7 +102,9 @@ def _raised(
     if above is None:
         return float(np.inf)
     modes: tuple[int, ...] = (above,)
-    if above < 0:
+    if above < 0 and isinstance(rest := own[above], Rest):
+        model, modes = rest.of.held, tuple(set(rest.numbers(q, y).tolist()))
+    elif above < 0:
         solved = _solved(model, path, [band], y, own)(np.arange(len(q), dtype=np.float64))
         modes = tuple(set(solved.numbers[:, above].tolist()))
     poses = judged_poses(model, q)

@@ -150,6 +150,10 @@ class Rest:
     path: Trajectories
     needed: NDArray[np.bool_]  # (n_t,)
 
+    def numbers(self, q: Floats, y: Floats) -> Ints:
+        """Which modes (n,) of the held mechanism it is at poses (n, n_q) of a design, from 1."""
+        return self.of.counted(self.of.model.x(q, y), self.mode.number)[1][:, -1] + 1
+
 
 Named: TypeAlias = Follower | Rest
 
@@ -219,7 +223,7 @@ class Spectrum:
         """∂λ/∂x (n, n_followed, n_x) of those that are named; NaN where they are not needed."""
         slopes = mode_slopes(pencil, self.x, self.followed, wanted)[0]
         for k, each in enumerate(self.named):
-            if isinstance(each, Rest):
+            if isinstance(each, Rest) and each.needed.any():
                 at = self.x[each.needed]
                 slopes[each.needed, k] = each.of.slopes(at, each.mode.number, wanted)[1]
         return slopes
@@ -246,7 +250,7 @@ def follow_all(
     lam, phi = np.full((len(x), len(own)), np.nan), np.zeros((len(x), model.n_dof, len(own)))
     numbers = np.zeros((len(x), len(own)), dtype=np.intp)
     for column, one in enumerate(own):
-        if isinstance(one, Rest):
+        if isinstance(one, Rest) and one.needed.any():
             lam[one.needed, column] = one.of.counted(x[one.needed], one.mode.number)[0][:, -1]
         for k, shape in shapes.get(column, {}).items():
             lam[k, column], phi[k, :, column] = shape.lam, shape.phi
