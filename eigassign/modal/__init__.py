@@ -9,6 +9,7 @@ In reading order:
     expansion       the Taylor polynomial of eigenvalues (eqs. (7)-(9)), and as plain arrays
     mesh_error      what meshes of beams and solids leave out
     model           the model of a case, as notebooks meet it
+    antiresonances  frequencies at which a force leaves its node at rest
     under_load      what the weight does to frequencies, and what gives way under forces
     slow_motion     how much the neglected motion would move the frequencies
     adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
@@ -19,6 +20,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
+        "antiresonances": "Antiresonances",
         "adaptive_order": "MARGIN raise_order",
         "exact.inertia": "count_below",
         "exact.solver": "clusters eigenvalues exact_slopes lowest_modes modes rounding_error",

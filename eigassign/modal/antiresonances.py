@@ -3,7 +3,8 @@
 The response of a node along n to a force there along n is H = Σ (b·φ_i)²/(λ_i − λ), b·φ its motion
 in mode i. Its zeros z_k are the modes of the mechanism with the node held (`mechanism.held`), and
 lie between its poles: λ_k ≤ z_k ≤ λ_{k+1}. A mode that the force does not see, b·φ_i = 0, is pole
-and zero at once, and leaves H as it is: such pairs are told apart by z = λ, and not counted.
+and zero at once, and leaves H as it is: such pairs are told by z = λ, one zero for each pole, and not
+counted.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class Antiresonances:
         while True:
             tried = min(tried + EXTRA, len(self.held.pencil.elastic))
             lam, poles = _lowest(self.held, x, tried), _lowest(self.model, x, tried + 1)
-            apart = np.abs(lam[:, :, None] / poles[:, None] - 1.0).min(axis=2) > SAME
+            equal = np.tril(_same(lam, lam)).sum(axis=2)  # 2 of the second of two that are alike
+            apart = equal > _same(lam, poles).sum(axis=2)
             there = int(apart.sum(axis=1).min())
             if there >= count:
                 break
@@ -66,6 +68,11 @@ class Antiresonances:
         own = order[:, -1]
         steep = exact_slopes(self.held.pencil, x, int(own.max()) + 1, wanted)[1]
         return lam[:, -1], steep[np.arange(len(x)), own]
+
+
+def _same(a: Floats, b: Floats) -> NDArray[np.bool_]:
+    """(n, j, k): whether a_j and b_k are one."""
+    return np.asarray(np.abs(a[:, :, None] / b[:, None] - 1.0) <= SAME)
 
 
 def _lowest(model: Model, x: Floats, count: int) -> Floats:

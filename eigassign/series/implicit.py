@@ -62,7 +62,7 @@ class ImplicitFunction:
     shown: Callable[[Floats], str] | None = field(default=None, compare=False)
 
     @cached_property
-    def found(self) -> dict[bytes, Floats]:
+    def found(self) -> dict[tuple[int, bytes], Floats]:
         """The last `KEPT` solutions, by their arguments; nothing that is stored with the rest."""
         return {}
 
@@ -89,7 +89,7 @@ class ImplicitFunction:
                 for old in list(self.found)[: 1 - KEPT]:
                     self.found.pop(old, None)
                 p.setflags(write=False)
-                self.found[a.tobytes()] = p
+                self.found[a.shape[1], a.tobytes()] = p
                 return p
         asked, met = a[:, left[0]], reached[:, 0]
         message = f"{self.title} cannot be closed, or is at a dead point, at {self._named(met)}"
@@ -167,7 +167,7 @@ class ImplicitFunction:
         """p (size, …) with its derivatives −(∂F/∂p)⁺ ∂F/∂a a'."""
         n = algebra.samples
         at = a[:, :n].real
-        p = self.found.get(at.tobytes())
+        p = self.found.get((n, at.tobytes()))
         p = self.samples(at) if p is None else p
         if np.iscomplexobj(a):  # a rate along the imaginary axis: one step has it exactly
             F, _, J = self.equations(a[:, :n], p)

@@ -95,7 +95,9 @@ def substitution(
     axes = np.vstack([n, np.linalg.svd(n[None])[2][1:]])  # N
     b = along(ends.in_world(split(held.node)), n)
     z = reference(case, parameters)
-    beside = z + 0.1 * np.sin(1.0 + np.arange(len(z))) * (np.arange(len(z)) < len(case.coordinates))
+    beside = z + 0.01 * np.sin(1.0 + np.arange(len(z))) * (
+        np.arange(len(z)) < len(case.coordinates)
+    )
 
     def numbers(*rows: MotionRow) -> list[Floats]:
         arrays = (np.array([*row.values()], dtype=object) for row in rows)

@@ -311,7 +311,8 @@ class SpringEnds:
         return SpringMotion(start, end, stiffness, apply(seen, here), apply(seen, there), R, arm)
 
     def _local(self, node: NodeName) -> Objects:
-        return node_position(self.case, self.parameters, self.motion.tree, node)
+        known = self.parameters.with_passive(self.motion.passive)
+        return node_position(self.case, known, self.motion.tree, node)
 
     def in_world(self, node: NodeName) -> MotionRows:
         """Full motion of a node in world axes: elastic rows and N T columns."""
