@@ -73,6 +73,7 @@ from eigassign.case.schema.mechanism import Coordinate, Mechanism, freedom_of
 from eigassign.case.schema.parts import FrozenDict, Part, Quantity
 from eigassign.case.schema.study import (
     AssignmentKeys,
+    DampingForm,
     ExpansionKeys,
     Measurements,
     Sweep,
@@ -175,6 +176,7 @@ class CaseFile:
     reference: str | None
     mechanism: Mechanism
     coordinates: Mapping[str, Coordinate]
+    damping: DampingForm | None
     trajectory: TrajectoryForm | tuple[TrajectoryForm, ...] | None
     design: Design
     expansion: ExpansionKeys

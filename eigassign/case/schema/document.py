@@ -19,6 +19,7 @@ from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import TAG, FrozenDict, Named, Part, must
 from eigassign.case.schema.study import (
     AssignmentKeys,
+    DampingForm,
     ExpansionKeys,
     Measurements,
     Sweep,
@@ -41,6 +42,7 @@ class Document(Part):
         reference: source of the case
         mechanism: materials, sections, links, joints, bodies and springs
         coordinates: which joints make up q, in this order, and how each is held
+        damping: ratios of modes, for responses; loss factors stand with materials and drives
         trajectory: q over time; one, or a list of them
         design: the design parameters y, in this order, and limits that they share
         expansion: the power series
@@ -56,6 +58,7 @@ class Document(Part):
     reference: Annotated[str, Field(max_length=1000), _ONE_LINE] | None = None
     mechanism: Mechanism
     coordinates: Named[Coordinate] = FrozenDict()
+    damping: DampingForm | None = None
     trajectory: TrajectoryForms | None = None
     design: Design = Design.model_construct()
     expansion: ExpansionKeys = ExpansionKeys.model_construct()

@@ -29,6 +29,7 @@ from eigassign.case.schema.parts import (
     OneOrMoreNamed,
     Part,
     Quantity,
+    ShareOrRange,
     Told,
     ValueOr,
     Vector,
@@ -52,12 +53,14 @@ class Material(Part):
         density: ρ
         poissons_ratio: ν, for spatial beams, `shear: true` and solids
         shear_modulus: G, instead of Poisson's ratio, G = E / (2 (1 + ν))
+        loss_factor: η of its complex moduli, E (1 + iη); or the least and the most, for responses
     """
 
     youngs_modulus: Annotated[float, MODULUS]
     density: Annotated[float, quantity("density", at_least=0)]
     poissons_ratio: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
     shear_modulus: Annotated[float, MODULUS] | None = None
+    loss_factor: ShareOrRange | None = None
     one_at_most = ("poissons_ratio", "shear_modulus")
 
 

@@ -32,6 +32,7 @@ from eigassign.case.schema.parts import (
     Part,
     Placed,
     Quantity,
+    ShareOrRange,
     ValueOr,
     Vector,
     kinds,
@@ -298,6 +299,7 @@ class Drive(Part):
         inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint
         motor_inertia: J_m of the motor's data sheet, instead of `inertia`
         ratio: N of the gear; 1 unless given; of a joint that slides 2π over the lead
+        loss_factor: η of its complex stiffness; or the least and the most, for responses
     """
 
     stiffness: (
@@ -320,7 +322,11 @@ class Drive(Part):
         | None
     ) = None
 
+    loss_factor: ShareOrRange | None = None
+
     def _mistakes(self, space: str | None) -> Mistakes:
+        if self.loss_factor is not None and self.stiffness is None:
+            yield wrong("has no effect without a stiffness", "loss_factor")
         if self.inertia is not None and self.motor_inertia is not None:
             message = "is reflected through the gear to motor_inertia ratio²: give it or inertia"
             yield wrong(f"{message}, not both", "motor_inertia")

@@ -372,6 +372,14 @@ NumberOr: TypeAlias = Annotated[  # a number or a word, such as auto
 ValueOr: TypeAlias = Annotated[T | L, Told(lambda value: isinstance(value, Mapping))]
 
 
+# A share of 1, such as a damping ratio, or the least and the most that it may be
+Share: TypeAlias = Annotated[float, Quantity(DIMENSIONS["fraction"], at_least=0, below=1)]
+ShareOrRange: TypeAlias = OneOrList[
+    Share,
+    Annotated[tuple[Share, Share], must(lambda ends: ends[0] <= ends[1], "is least, then most")],
+]
+
+
 def mapping(value: object) -> Mapping[str, object]:
     """``value``, or the error that it is no mapping."""
     if isinstance(value, Mapping):

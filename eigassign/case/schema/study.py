@@ -24,6 +24,9 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     Quantity,
+    Share,
+    ShareOrRange,
+    Told,
     ValueOr,
     quantity,
     wrong,
@@ -36,6 +39,24 @@ Auto: TypeAlias = Literal["auto"]
 MaxError: TypeAlias = Annotated[float, Quantity(PLAIN, above=0, at_most=1)]  # 2 is meant as 2 %
 Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
 MOST_MEASUREMENTS = 10_000  # of one case
+
+
+class Damping(Part):
+    """Damping ratios of modes.
+
+    Keys:
+        ratio: ζ of every mode that `modes` does not list; or the least and the most
+        modes: those of modes 1, 2, …
+    """
+
+    ratio: ShareOrRange
+    modes: Annotated[tuple[ShareOrRange, ...], Field(min_length=1)] | None = None
+
+
+DampingForm: TypeAlias = Annotated[
+    Share | tuple[Share, Share] | Damping,
+    Told(lambda v: 2 if isinstance(v, Mapping) else int(isinstance(v, (list, tuple)))),
+]
 
 
 class HighestMode(Part):

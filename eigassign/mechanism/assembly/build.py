@@ -11,6 +11,7 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
+from eigassign.case.schema.parts import FrozenDict
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.held import Held, substitution
@@ -30,6 +31,7 @@ from eigassign.mechanism.assembly.rigid_body_modes import apart_from_rigid, sepa
 from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import (
     LinkMesh,
+    Term,
     beam_mesh,
     copies_of,
     frame_mesh,
@@ -49,6 +51,7 @@ from eigassign.mechanism.kinematics.topology import Topology, build_tree, coordi
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Scalar
 
+SMALLEST = 1e-12  # η of a material without, in a frame where others have some: not 0/0
 LOWEST = 1e-9  # Hz: no part has a mode below, so that it keeps its nodes alone
 LocalLinks: TypeAlias = tuple[list[LocalLink], NodeMotions]
 
@@ -291,6 +294,51 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
         carried=carried,
         reduction=mesh.reduction,
     )
+
+
+def loss_pencil(
+    case: CaseFile,
+    parameters: ModelParameters,
+    motion: Kinematics,
+    meshes: Mapping[str, LinkMesh],
+    factor: Callable[[Any], float],
+) -> Pencil:
+    """K_loss = Σ η_c K_c as the K of a pencil in the same unknowns, of links as they are meshed.
+
+    K is linear in the stiffness K_c of each material and drive, whose η_c ``factor`` tells. Raises
+    MechanismError for a reduced frame with several.
+    """
+    mechanism, numbers = case.mechanism, dict(parameters.by_path)
+
+    def lose(path: str, part: Any, key: str, eta: float) -> None:
+        given = getattr(part, key, None)
+        if given is not None:
+            numbers[f"{path}.{key}"] = parameters.number(f"{path}.{key}", given) * eta
+
+    for name, own in case.coordinates.items():
+        lose(f"coordinates.{name}.drive", own.drive, "stiffness", factor(own.drive))
+    for name, material in mechanism.materials.items():
+        for key in ("youngs_modulus", "shear_modulus"):
+            lose(f"materials.{name}", material, key, max(factor(material), SMALLEST))
+    given = replace(parameters, by_path=numbers)
+    lossy = {}
+    for name, mesh in meshes.items():
+        link: Any = mechanism.links[name]
+        parts = link.beams.values() if hasattr(link, "beams") else [link]
+        names = {part.material for part in parts if hasattr(part, "material")}
+        each = {factor(mechanism.materials[material]) for material in names} or {0.0}
+        if len(each) == 1:
+            (eta,) = each
+            terms = [Term(term.coefficient * eta, term.matrix) for term in mesh.stiffness]
+            lossy[name] = mesh._replace(stiffness=terms)
+        elif mesh.reduction:
+            message = "its materials have several loss factors: leave reduce_to out"
+            raise MechanismError(f"mechanism.links.{name}.reduce_to", message)
+        else:
+            lossy[name] = _link_mesh(case, given, motion.tree, name)
+    alone = mechanism.model_copy(update={"springs": FrozenDict(), "gravity": None})
+    case = replace(case, mechanism=alone)
+    return build_pencil(case, given, motion, local_links(case, given, motion, lossy))
 
 
 def add_drives(
