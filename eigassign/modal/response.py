@@ -29,7 +29,7 @@ is at rest is a mode with λ → ∞ in it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -170,6 +170,8 @@ class ModalResponse:
     def slopes(self, omega: Floats, wanted: NDArray[np.bool_]) -> Numbers:
         """∂H/∂x (n, k, n_x) of the first force at itself, where ``wanted`` (n_x,)."""
         along, every, pencil = np.flatnonzero(wanted), np.arange(len(self.x)), self.model.pencil
+        if not len(along):
+            return np.zeros((*omega.shape, self.x.shape[1]))
         g = self._shares(omega, every)
         u = np.einsum("ndr,nkr,nr->ndk", self.psi, g, self.gamma[..., 0]) + self.rest[..., :1]
         found = np.zeros((*omega.shape, self.x.shape[1]), dtype=complex)
@@ -294,3 +296,82 @@ def _changed(
             "pkt,dtp->pkd", forms, rates[:, moving][:, :, k]
         )
     return found
+
+
+# --- The largest |H| in parts of a range of frequencies
+
+SCAN, ROUNDS, FINER = (
+    7,
+    5,
+    5,
+)  # frequencies in a part at first; rounds about the largest, and in each
+
+
+@dataclass(frozen=True, eq=False)
+class Shaken:
+    """The largest |H| of a node, in parts of a range of frequencies with these ``ends`` (rad/s)."""
+
+    model: Model
+    node: str
+    direction: Sequence[float]
+    ends: Floats
+    dampings: tuple[Damping, ...]
+
+    @classmethod
+    def of(
+        cls, model: Model, node: str, direction: Sequence[float], ends: Floats, finer: bool = False
+    ) -> Shaken:
+        """Of a model, or of a mesh of twice the elements."""
+        if finer:
+            case, pencil = model.refined()
+            same = {name: mesh for name, mesh in model.meshes.items() if not mesh.whole.strands}
+            frames = replace(model.poses, case=case)
+            model = replace(model, pencil=pencil, poses=frames, meshes=same)
+        return cls(model, node, direction, ends, dampings(model))
+
+    def at(self, x: Floats, wanted: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        """|H| (n, m) in m/N at x (n, n_x), of m parts and dampings, slopes (n, m, n_x) in those
+        ``wanted``; the frequency of a maximum does not move it.
+        """
+        values, slopes = [], []
+        for damping in self.dampings:
+            nodes = {self.node: [self.direction]}
+            found = modal_response(self.model, damping, nodes, x, float(self.ends[-1]))
+            omega = self._largest(found)
+            H = found.at(omega)
+            values.append(np.abs(H))
+            turned = (H.conj() / np.maximum(np.abs(H), np.finfo(float).tiny))[..., None]
+            steep = (
+                found.slopes(omega, wanted) if wanted.any() else np.zeros((*H.shape, len(wanted)))
+            )
+            slopes.append((turned * steep).real)
+        return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)
+
+    def _largest(self, found: ModalResponse) -> Floats:
+        """ω (n, m) of the largest |H| in each part: by a scan with peaks in it, and finer ones."""
+        low, high, n = self.ends[:-1], self.ends[1:], len(found.x)
+        own, width = (
+            np.sqrt(found.mu.real),
+            1.0 + found.zeta[..., None] * [-1.0, -0.5, 0.0, 0.5, 1.0],
+        )
+        there = (own > 0.5 * low[0]) & (own < 2.0 * high[-1])
+        near = (own[..., None] * width)[:, there.any(axis=0)].reshape(n, -1)
+        scan = np.linspace(low, high, SCAN).T.ravel()
+        omega = np.sort(np.hstack([np.tile(scan, (n, 1)), np.clip(near, low[0], high[-1])]), axis=1)
+        size, every = np.abs(found.at(omega)), np.arange(n)[:, None]
+        inside = (omega[:, None] >= low[:, None]) & (omega[:, None] <= high[:, None])
+        best = np.where(inside, size[:, None], -1.0).argmax(axis=2)
+        beside = [np.clip(best + k, 0, omega.shape[1] - 1) for k in (-1, 1)]
+        start, end = (np.clip(omega[every, k], low, high) for k in beside)
+        for _ in range(ROUNDS):
+            omega = np.linspace(start, end, FINER, axis=2)
+            best = (
+                np.abs(found.at(omega.reshape(n, -1)))
+                .reshape(omega.shape)
+                .argmax(axis=2)[..., None]
+            )
+            start, end, top = (
+                np.take_along_axis(omega, np.clip(best + k, 0, FINER - 1), axis=2)[..., 0]
+                for k in (-1, 1, 0)
+            )
+        return np.asarray(top)

@@ -2,7 +2,8 @@
 
 The way that a node gives under a force along a direction, or under the weight, has a row w ≤ limit
 at every sample, and of a stiffness 1/w ≥ k those of w ≤ 1/k. With a force that no parameter changes
-w = bᵀK⁻¹b is convex in K.
+w = bᵀK⁻¹b is convex in K. A dynamic stiffness is limited likewise, by |H| ≤ 1/k in each of `PARTS`
+parts of the frequencies, so that two peaks in balance are two rows.
 """
 
 from __future__ import annotations
@@ -25,17 +26,19 @@ from eigassign.assignment.requirements.requirement import (
     Solved,
 )
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.targets import PushedNode, StaticTarget
+from eigassign.case.schema.targets import PushedNode, ShakenNode, StaticTarget
 from eigassign.case.units import SI, handy
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
+from eigassign.modal.response import Shaken
 from eigassign.modal.under_load import Flexibility, compliances, sags
 
 # Number and target, its rows, those of them along each trajectory, and the words for these
 Placed = tuple[int, StaticTarget, slice, tuple[tuple[str, slice], ...], str]
-UNITS = {"stiffness": "N/m", "compliance": "m/N", "sag": "m"}
+UNITS = {"stiffness": "N/m", "response": "N/m", "compliance": "m/N", "sag": "m"}
+PARTS = 6  # of the frequencies of a response
 RIGID = 1e-24  # m/N or m: what no case can ask for, and round-off of a node that cannot move
 _NO_MODES = Frequencies(np.zeros((1, 0)), np.zeros((1, 0, 0)))
 
@@ -251,7 +254,7 @@ class Way:
     path: Trajectories
     rows: slice
     columns: slice
-    by: Callable[[bool], Flexibility]
+    by: Callable[[bool], Any]
     found: Callable[[bytes], tuple[Floats, Floats]]
 
     def __call__(self, y: Floats) -> tuple[Floats, Floats]:
@@ -285,8 +288,29 @@ class Way:
         return fixed and isinstance(self.target.place, PushedNode) and self.model.pencil.is_affine
 
 
+class Peaks(Way):
+    """The largest |H| of a shaken node in m parts of its frequencies, (n · m,) in m/N, sample by
+    sample; ``by`` are `modal.response.Shaken`.
+    """
+
+    def at(self, q: Floats, y: Floats, finer: bool = False) -> Floats:
+        """The largest of all frequencies (n,) at any poses q (n, n_q), or by a ``finer`` mesh."""
+        return np.asarray(super().at(q, y, finer).reshape(len(q), -1).max(axis=1))
+
+    def _length(self, w: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+        return w.ravel(), slopes.reshape(w.size, -1)
+
+    @property
+    def is_convex(self) -> bool:
+        """False: of |H| nothing is known."""
+        return False
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class StaticLimit(LimitedQuantity):
     """The limit of what a static target asks of a node; its amount is the worst of all samples."""
+
+    each: int = 1  # rows at each sample
 
     @property
     def way(self) -> Way:
@@ -297,11 +321,14 @@ class StaticLimit(LimitedQuantity):
     def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
         """Yield the rows of the way; the upper edge of that is the lower one of a stiffness."""
         side = "lower" if self.way.target.limit == "at_least" else "upper"
-        yield from (replace(rows, side=side) for rows in super().edge_rows(factor))
+        for rows in super().edge_rows(factor):
+            edge, scale = (np.repeat(each, self.each) for each in (rows.edge, rows.scale))
+            yield replace(rows, side=side, edge=edge, scale=scale)
 
     def curve_of(self, y: Floats) -> Floats:
         """The stiffness, compliance or sag (n,) at its samples; NaN where nothing gives way."""
-        return np.array([self.amount_of(float(w))[0] for w in self.way(y)[0]])
+        worst = self.way(y)[0].reshape(-1, self.each).max(axis=1)
+        return np.array([self.amount_of(float(w))[0] for w in worst])
 
     def amount_of(self, value: float) -> tuple[float, float]:
         """The stiffness, compliance or sag of a way, and its slope."""
@@ -317,23 +344,30 @@ def static_limits(
 
     Raises MechanismError at a target where nothing gives way, or a free joint does.
     """
-    pushed = [each[1].place for each in asked if isinstance(each[1].place, PushedNode)]
+    pushed = [place for each in asked if type(place := each[1].place) is PushedNode]
     nodes = {place.at: [p.direction for p in pushed if p.at == place.at] for place in pushed}
     columns = [(node, direction) for node, own in nodes.items() for direction in own]
     together = _found(model, path, partial(compliances, model, nodes))
     for k, target, rows, along, where in asked:
-        place, some, (by, found), towards = target.place, slice(None), together, ""
-        if isinstance(place, PushedNode):
+        place, some, (by, found) = target.place, slice(None), together
+        if isinstance(place, ShakenNode):
+            ends = 2.0 * np.pi * np.geomspace(place.lowest, place.highest, PARTS + 1)
+            by, found = _found(
+                model, path, partial(Shaken.of, model, place.at, place.direction, ends)
+            )
+        elif isinstance(place, PushedNode):
             first = columns.index((place.at, place.direction))
             some = slice(first, first + 1)
-            towards = f" along [{', '.join(f'{v:g}' for v in place.direction)}]"
         else:
             by, found = _found(model, path, partial(sags, model, place.at))
-        way = Way(target, f"targets[{k}].{target.kind}", model, path, rows, some, by, found)
-        if way(initial_design(file))[0].max() <= RIGID:
+        kind = Peaks if isinstance(place, ShakenNode) else Way
+        way = kind(target, f"targets[{k}].{target.kind}", model, path, rows, some, by, found)
+        first_way = way(initial_design(file))[0]
+        if first_way.max() <= RIGID:
             message = f"nothing gives way at {place.at} in any pose: all is rigid and locked"
             raise MechanismError(way.place, message)
-        noun, edge = f"{target.kind} of {place.at}{towards}", target.edge
+        each = len(first_way) // (rows.stop - rows.start)
+        noun, edge = f"{target.noun or target.kind} of {place.name}", target.edge
         unit = SI(UNITS[target.kind], edge)
         is_least = target.limit == "at_least"
         upper = np.full(rows.stop - rows.start, 1.0 / edge if is_least else edge)
@@ -351,17 +385,18 @@ def static_limits(
             allowed=(edge, np.inf) if is_least else (-np.inf, edge),
             is_affine=False,  # the inverse of K is not
             is_decided=way.is_convex,
-            row_place=partial(_sample_place, path, rows),
+            row_place=partial(_sample_place, path, rows, each),
+            each=each,
         )
 
 
-def _sample_place(path: Trajectories, rows: slice, y: Floats, row: int) -> str:
-    return path.where(rows.start + row)
+def _sample_place(path: Trajectories, rows: slice, each: int, y: Floats, row: int) -> str:
+    return path.where(rows.start + row // each)
 
 
 def _found(
-    model: Model, path: Trajectories, made: Callable[[bool], Flexibility]
-) -> tuple[Callable[[bool], Flexibility], Callable[[bytes], tuple[Floats, Floats]]]:
+    model: Model, path: Trajectories, made: Callable[[bool], Flexibility | Shaken]
+) -> tuple[Callable[[bool], Flexibility | Shaken], Callable[[bytes], tuple[Floats, Floats]]]:
     """What is made, once for each mesh, and with it the ways (n, m) and slopes of a design."""
     by = lru_cache(maxsize=2)(made)
 

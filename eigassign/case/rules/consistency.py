@@ -31,6 +31,7 @@ from eigassign.case.schema.targets import (
     FrequencyTarget,
     GapTarget,
     KeepOutTarget,
+    ResponseTarget,
     SagTarget,
 )
 from eigassign.case.schema.trajectory import (
@@ -335,6 +336,27 @@ def antiresonances_are_held(document: Document) -> Iterator[Finding]:
             yield path, f"needs what holds {listed(free)}: give a drive stiffness, or lock it"
 
 
+def damping_is_stated_once(document: Document) -> Iterator[Finding]:
+    """By ratios or by loss factors; and a drive holds every coordinate of what is shaken."""
+    parts = [(("mechanism", "materials", n), m) for n, m in document.mechanism.materials.items()]
+    drives = document.coordinates.items()
+    lossy = [
+        (*path, "loss_factor")
+        for path, part in [*parts, *((("coordinates", n, "drive"), c.drive) for n, c in drives)]
+        if getattr(part, "loss_factor", None) is not None
+    ]
+    if lossy and document.damping is not None:
+        yield lossy[0], "is given beside damping, the ratios of modes: state it in one way"
+    free = [name for name, own in drives if own.moves == "free"]
+    for k, target in enumerate(document.targets):
+        if isinstance(target, ResponseTarget):
+            path = ("targets", k, "response")
+            if not lossy and document.damping is None:
+                yield path, "needs damping: ratios (damping: 1 %, say), or loss_factor of materials"
+            if free:
+                yield path, f"needs what holds {listed(free)}: give a drive stiffness, or lock it"
+
+
 def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
     """Something deviates where deviations count."""
     deviates = any(entry.tolerance for entry in document.design.entries.values())
@@ -371,6 +393,7 @@ RULES: tuple[Rule, ...] = (
     one_shot_has_a_quadratic_program,
     objectives_have_what_they_take,
     antiresonances_are_held,
+    damping_is_stated_once,
     robust_designs_have_tolerances,
 )
 LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right

@@ -29,7 +29,7 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.trajectory import TIME, Coordinates, Times
-from eigassign.case.units import DIMENSIONS, written
+from eigassign.case.units import DIMENSIONS, SI, handy_unit, written
 
 FREQUENCY = quantity("frequency", above=0)
 Frequency: TypeAlias = Annotated[float, FREQUENCY]
@@ -118,17 +118,43 @@ class FollowedMode(Part):
         return f"the mode like mode {self.like} ({where})"
 
 
-class Antiresonance(Part):
-    """A frequency at which a force on a node leaves that node at rest along it.
+class Node(Part):
+    """Where something may give way by so much.
 
     Keys:
         at: the node, `<link>.<node>`
-        direction: in the axes of the ground
-        number: 1 is the lowest; modes that the force does not see are not counted
     """
 
     at: str
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        return self.at
+
+
+class PushedNode(Node):
+    """Where a force acts, and along which direction it and the way that gives are.
+
+    Keys:
+        direction: in the axes of the ground
+    """
+
     direction: Direction
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        return f"{self.at} along [{', '.join(f'{v:g}' for v in self.direction)}]"
+
+
+class Antiresonance(PushedNode):
+    """A frequency at which a force on a node leaves that node at rest along it.
+
+    Keys:
+        number: 1 is the lowest; modes that the force does not see are not counted
+    """
+
     number: Mode = 1
 
     @property
@@ -139,8 +165,7 @@ class Antiresonance(Part):
     @property
     def name(self) -> str:
         """It in words."""
-        along = ", ".join(f"{each:g}" for each in self.direction)
-        return f"antiresonance {self.number} of {self.at} along [{along}]"
+        return f"antiresonance {self.number} of {super().name}"
 
 
 class NamedAntiresonance(Part):
@@ -413,29 +438,33 @@ class HighestTarget(AnyTarget):
 # --- Statics
 
 
-class Node(Part):
-    """Where something may give way by so much.
+class ShakenNode(PushedNode):
+    """Where a force shakes, at which frequencies.
 
     Keys:
-        at: the node, `<link>.<node>`
+        from: the lowest
+        to: the highest
     """
 
-    at: str
+    lowest: Frequency = Field(alias="from")
+    highest: Frequency = Field(alias="to")
 
+    @property
+    def name(self) -> str:
+        """It in words."""
+        unit, size = handy_unit(SI("Hz", self.lowest, self.highest))
+        return f"{super().name} at {self.lowest / size:g} … {self.highest / size:g} {unit}"
 
-class PushedNode(Node):
-    """Where a force acts, and along which direction it and the way that gives are.
-
-    Keys:
-        direction: in the axes of the ground
-    """
-
-    direction: Direction
+    def _mistakes(self, space: str | None) -> Mistakes:
+        if self.lowest > self.highest:
+            got = f"{written(self.lowest, 'Hz')} to {written(self.highest, 'Hz')}"
+            yield wrong(f"the lowest frequency comes first, got {got}", "to")
 
 
 class StaticTarget(AnyTarget):
-    """A limit of what statics gives at every pose: it is on no mode."""
+    """A limit of how a force moves a node at every pose: it is on no mode."""
 
+    noun: ClassVar[str] = ""  # of its amount, unless it is that of its kind
     limit: ClassVar[str]  # the key that it has with kinds of other targets
 
     @property
@@ -501,6 +530,21 @@ class SagTarget(StaticTarget):
     at_most: Annotated[float, quantity("length", above=0)]
 
 
+class ResponseTarget(StaticTarget):
+    """A shaken node does not move by more than a force over this stiffness.
+
+    Keys:
+        response: where, along which direction, and at which frequencies
+        at_least: dynamic stiffness, force over the way along it, at every sample and frequency
+    """
+
+    kind = "response"
+    noun = "dynamic stiffness"
+    limit = "at_least"
+    response: ShakenNode
+    at_least: Annotated[float, quantity("stiffness", above=0)]
+
+
 def _which_target(value: object) -> int:
     """By its one key that names a kind; beside a kind of statics, a limit names none."""
     given = mapping(value)
@@ -524,7 +568,8 @@ TargetForm: TypeAlias = Annotated[
     | GapTarget
     | StiffnessTarget
     | ComplianceTarget
-    | SagTarget,
+    | SagTarget
+    | ResponseTarget,
     Told(_which_target),
 ]
 # By the key that says the kind, which the limit of what is static does not.

@@ -322,7 +322,7 @@ def loss_pencil(
             lose(f"materials.{name}", material, key, max(factor(material), SMALLEST))
     given = replace(parameters, by_path=numbers)
     lossy = {}
-    for name, mesh in meshes.items():
+    for name, mesh in _meshes(case, parameters, motion, meshes).items():
         link: Any = mechanism.links[name]
         parts = link.beams.values() if hasattr(link, "beams") else [link]
         names = {part.material for part in parts if hasattr(part, "material")}
