@@ -17,13 +17,15 @@ those of Λ + iΦᵀK_lossΦ, complex symmetric,
 Of one factor for all, μ_i = λ_i (1 + iη). Of several, the shares of strain energy are an estimate,
 η_i ≈ φᵀK_lossφ/λ_i, and ζ_i ≈ η_i/2 is what is told of either (Ewins, Modal Testing, 2000, ch. 2).
 
-Slopes. With u = (K − ω²M + iK_loss)⁻¹ b, ∂H/∂x = −uᵀ(K_x + iK_loss,x − ω²M_x)u + 2 b_xᵀu. Ratios
-make H a function g(λ) = 1/d of the pencil, and with β_i = b·φ_i, A = ΦᵀK_xΦ and B = ΦᵀM_xΦ
+Slopes. With u = (K − ω²M + iωC)⁻¹ b, and K_loss beside K or C of ratios,
 
-    ∂H/∂x = Σ_ij β_i β_j (g[λ_i, λ_j] A_ij − (λg)[λ_i, λ_j] B_ij) + 2 Σ_i (b_x·φ_i) g_i β_i,
+    ∂H/∂x = −uᵀ (K_x − ω²M_x + iωC_x) u + 2 b_xᵀu,
 
-g[λ_i, λ_j] divided differences (Daleckii, Krein; Higham, Functions of Matrices, 2008, ch. 3); what
-is at rest is a mode with λ → ∞ in it.
+where C = M s(M⁻¹K) of s = 2ζ√λ has, with A = ΦᵀK_xΦ and B = ΦᵀM_xΦ and divided differences s[·, ·],
+
+    (ΦᵀC_xΦ)_ij = s[λ_i, λ_j] A_ij + (s_i + s_j − (λs)[λ_i, λ_j]) B_ij
+
+(Daleckii, Krein; Higham, Functions of Matrices, 2008, ch. 3).
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.study import Damping as Ratios
@@ -53,7 +56,7 @@ NEAR = 1e-9  # relative: of λ that are as good as one, and of what is left at r
 SPAN = (
     30.0  # times the highest frequency asked for: modes beyond are at rest, to 1e-3 of their part
 )
-FEW = 8  # modes at first
+FEW = 64  # modes that are all solved; of larger pencils so many at first
 
 
 class Damping(NamedTuple):
@@ -107,22 +110,12 @@ def _end(given: Any, k: int) -> float:
     return float((given[k] if isinstance(given, tuple) else given) or 0.0)
 
 
-def require_held(case: CaseFile, what: str) -> None:
-    """Raise MechanismError where a coordinate is free: ``what`` needs all to be held."""
-    for name, own in case.coordinates.items():
-        if own.moves == "free":
-            message = (
-                f"is free, and {what} needs what holds it: give it a drive stiffness, or lock it"
-            )
-            raise MechanismError(f"coordinates.{name}", message)
-
-
 @dataclass(frozen=True, eq=False)
 class ModalResponse:
     """Modes at samples x (n, n_x), and what m unit forces do in them; see the top of this page.
 
-    ``rest`` (n, n_dof, m) is what the forces do to what is left out; ``mu``, ``psi`` and ``gamma``
-    are λ, φ and b·φ of the complex modes where there is a K_loss, and else the same.
+    ``rest`` (n, n_dof, m) is what the forces do to what is left out; ``mu`` and ``gamma`` are λ and
+    b·φ of the complex modes Φ X where there is a K_loss, and else the same.
     """
 
     model: Model
@@ -133,9 +126,9 @@ class ModalResponse:
     lam: Floats  # (n, r)
     phi: Floats  # (n, n_dof, r)
     mu: Numbers  # (n, r)
-    psi: Numbers  # (n, n_dof, r)
     gamma: Numbers  # (n, r, m)
     rest: Numbers
+    turn: Numbers | None = None  # X (n, r, r)
 
     @property
     def beta(self) -> Floats:
@@ -169,64 +162,79 @@ class ModalResponse:
 
     def slopes(self, omega: Floats, wanted: NDArray[np.bool_]) -> Numbers:
         """∂H/∂x (n, k, n_x) of the first force at itself, where ``wanted`` (n_x,)."""
-        along, every, pencil = np.flatnonzero(wanted), np.arange(len(self.x)), self.model.pencil
-        if not len(along):
-            return np.zeros((*omega.shape, self.x.shape[1]))
-        g = self._shares(omega, every)
-        u = np.einsum("ndr,nkr,nr->ndk", self.psi, g, self.gamma[..., 0]) + self.rest[..., :1]
+        along, pencil, r = np.flatnonzero(wanted), self.model.pencil, self.lam.shape[1]
         found = np.zeros((*omega.shape, self.x.shape[1]), dtype=complex)
+        if not len(along):
+            return found
+        ones = np.ones((*omega.shape, 1))  # the share of what is at rest
+        shares = self._shares(omega, np.arange(len(self.x))) * self.gamma[:, None, :, 0]
+        turned = shares if self.turn is None else shares @ np.swapaxes(self.turn, 1, 2)
+        rest = self.rest[..., :1]
+        u = self.phi @ np.swapaxes(turned, 1, 2) + rest
         _, by_x = self.forces.at(self.x, along)[0]
-        found[..., along] = 2.0 * np.einsum("dne,nek->nkd", by_x, u[:, self.forces.unknowns[0]])
+        pull = 2.0 * np.einsum("dne,nek->nkd", by_x, u[:, self.forces.unknowns[0]])
+        c, w = np.concatenate([turned, ones], axis=2), omega[..., None]
+        V = np.concatenate([self.phi.astype(rest.dtype), rest], axis=2)
+        A, B = (
+            _changed(pencil, part, self.x, V, along) for part in (pencil.stiffness, pencil.mass)
+        )
+        work = _work(A, c) - w**2 * _work(B, c)
         if self.damping.ratios:
-            V = np.concatenate([self.phi * self.gamma[:, None, :, 0], self.rest[..., :1]], axis=2)
-            in_K, in_M = self._differences(omega, g)
-        else:
-            V, in_K = u, np.zeros((*omega.shape, *[omega.shape[1]] * 2), dtype=complex)
-            j = np.arange(omega.shape[1])
-            in_K[:, j, j, j] = -1.0
-            in_M = -in_K * omega[..., None, None] ** 2
-        found += _changed(pencil, pencil.stiffness, self.x, V, in_K, along)
-        found += _changed(pencil, pencil.mass, self.x, V, in_M, along)
+            in_A, in_B = _root_differences(self.lam, self.damping.zeta(r))
+            work = work + 1j * w * _work(A * in_A[:, None] + B * in_B[:, None], c)
         if (loss := self.damping.loss) is not None:
-            found += _changed(loss, loss.stiffness, self.x, V, 1j * in_K, along)
+            work = work + 1j * _work(_changed(loss, loss.stiffness, self.x, V, along), c)
+        found[..., along] = pull - work
         return found
 
-    def _differences(self, omega: Floats, g: Numbers) -> tuple[Numbers, Numbers]:
-        """g[λ_i, λ_j] and −(λg)[λ_i, λ_j] (n, k, r + 1, r + 1), the last of what is at rest."""
-        lam, w, r = self.lam[:, None], omega[..., None], self.lam.shape[1]
-        zeta = self.damping.zeta(r)
-        steep = -(1.0 + 1j * zeta * w / np.sqrt(lam)) * g**2
-        apart = lam[..., :, None] - lam[..., None, :]
-        near = np.abs(apart) <= NEAR * lam[..., None]
-        pairs = []
-        for value, slope in ((g, steep), (lam * g, g + lam * steep)):
-            mean = 0.5 * (slope[..., :, None] + slope[..., None, :])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = (value[..., :, None] - value[..., None, :]) / apart
-            pairs.append(np.where(near, mean, ratio))
-        edges = (-g, np.full((*omega.shape, 1), -1.0)), (1.0 - lam * g, -(w**2))
-        in_K, in_M = (
-            np.block([[pair, edge[..., :, None]], [edge[..., None, :], corner[..., None]]])
-            for pair, (edge, corner) in zip(pairs, edges, strict=True)
-        )
-        return in_K, -in_M
+
+def _work(A: Numbers, c: Numbers) -> Numbers:
+    """cᵀ A_d c (n, k, d) of matrices (n, d, r, r) and vectors (n, k, r)."""
+    n, k, r = c.shape
+    half = c @ np.swapaxes(A, 1, 2).reshape(n, r, -1)  # (n, k, d r)
+    return np.asarray(np.einsum("nkdr,nkr->nkd", half.reshape(n, k, -1, r), c))
+
+
+def _root_differences(lam: Floats, zeta: Floats) -> tuple[Floats, Floats]:
+    """What of ΦᵀC_xΦ goes with ΦᵀK_xΦ and with ΦᵀM_xΦ, each (n, r + 1, r + 1).
+
+    s[λ_i, λ_j] and s_i + s_j − (λs)[λ_i, λ_j] of s = 2ζ√λ; the last row is of what is at rest.
+    """
+    n, r = lam.shape
+    s = 2.0 * zeta * np.sqrt(lam)
+    apart = lam[:, :, None] - lam[:, None]
+    near = np.abs(apart) <= NEAR * lam[:, None]
+    in_A, in_B = np.zeros((2, n, r + 1, r + 1))
+    pairs = []
+    for value, slope in ((s, 0.5 * s / lam), (lam * s, 1.5 * s)):
+        mean = 0.5 * (slope[:, :, None] + slope[:, None])
+        ratio = (value[:, :, None] - value[:, None]) / np.where(near, 1.0, apart)
+        pairs.append(np.where(near, mean, ratio))
+    in_A[:, :r, :r] = pairs[0]
+    in_B[:, :r, :r] = s[:, :, None] + s[:, None] - pairs[1]
+    in_B[:, :r, r] = in_B[:, r, :r] = s
+    return in_A, in_B
+
+
+def unit_forces(model: Model, nodes: Mapping[str, Sequence[Sequence[float]]]) -> Forces:
+    """Unit forces at nodes along directions; raises MechanismError where a coordinate is free."""
+    case = model.poses.case
+    for name, own in case.coordinates.items():
+        if own.moves == "free":
+            message = "is free, and a response needs what holds it: give it a drive stiffness"
+            raise MechanismError(f"coordinates.{name}", f"{message}, or lock it")
+    return forces(case, model.poses.parameters, model.motion, nodes)
 
 
 def modal_response(
-    model: Model,
-    damping: Damping,
-    nodes: Mapping[str, Sequence[Sequence[float]]],
-    x: Floats,
-    highest: float,
+    model: Model, damping: Damping, own: Forces, x: Floats, highest: float
 ) -> ModalResponse:
-    """Responses to unit forces at nodes, each along its directions, at samples x (n, n_x).
+    """Responses to `unit_forces` at samples x (n, n_x).
 
-    Of all modes up to ``SPAN`` times the ``highest`` frequency (rad/s) that is asked for, what lies
-    beyond being at rest. Raises MechanismError where a coordinate is free.
+    Of all modes of a small pencil, and else of those up to ``SPAN`` times the ``highest`` frequency
+    (rad/s) that is asked for: what lies beyond is at rest.
     """
-    case, pencil = model.poses.case, model.pencil
-    require_held(case, "a response")
-    own = forces(case, model.poses.parameters, model.motion, nodes)
+    pencil = model.pencil
     b = np.zeros((len(x), pencil.n_dof, len(own.unknowns)))
     for k, (places, (values, _)) in enumerate(
         zip(own.unknowns, own.at(x, np.arange(0)), strict=True)
@@ -238,14 +246,14 @@ def modal_response(
     rest = displaced(pencil, theta, b) - phi @ (beta / lam[..., None])
     known = model, damping, own, x, b, lam, phi
     if damping.loss is None:
-        return ModalResponse(*known, lam, phi, beta, rest)
+        return ModalResponse(*known, lam, beta, rest)
     stiff = np.einsum("ndm,ndm->nm", b, rest)
     lost = np.einsum("nmm->nm", _seen(damping.loss, x, rest))
     whole = stiff + (beta**2 / lam[..., None]).sum(axis=1)
     eta = np.divide(lost, stiff, out=np.zeros_like(lost), where=stiff > NEAR * whole)
     mu, X = _complex_modes(lam, _seen(damping.loss, x, phi))
     gamma = np.swapaxes(X, 1, 2) @ beta
-    return ModalResponse(*known, mu, phi @ X, gamma, rest / (1.0 + 1j * eta)[:, None])
+    return ModalResponse(*known, mu, gamma, rest / (1.0 + 1j * eta)[:, None], X)
 
 
 def _complex_modes(lam: Floats, L: Floats) -> tuple[Numbers, Numbers]:
@@ -256,7 +264,8 @@ def _complex_modes(lam: Floats, L: Floats) -> tuple[Numbers, Numbers]:
 
 def _modes_up_to(pencil: Pencil, theta: Floats, highest: float) -> tuple[Floats, Floats]:
     """λ (n, r) and φ (n, n_dof, r) of all modes up to a frequency in rad/s, of some beyond."""
-    count, most = min(FEW, len(pencil.elastic)), len(pencil.elastic)
+    most = len(pencil.elastic)
+    count = most if most <= FEW else FEW
     while True:
         found = lowest_modes(pencil, theta, 1, count - 1)
         there = found.lam.shape[1]
@@ -278,33 +287,32 @@ def _seen(pencil: Pencil, x: Floats, V: Floats) -> Floats:
     return np.concatenate(parts)
 
 
-def _changed(
-    pencil: Pencil, weights: Any, x: Floats, V: Numbers, C: Numbers, along: Ints
-) -> Numbers:
-    """Σ_ij C_ij v_iᵀ ∂A/∂x v_j (n, k, n_x) of A = K or M by its ``weights``; C (n, k, r, r)."""
+def _changed(pencil: Pencil, weights: Any, x: Floats, V: Numbers, along: Ints) -> Numbers:
+    """Vᵀ ∂A/∂x V (n, d, r, r) in d variables of A = K or M by its ``weights``; V (n, n_dof, r)."""
     rates = pencil.theta_slopes(x, along)
     moving = np.flatnonzero(np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0)
-    A = weights[:, moving]
-    entries = np.flatnonzero(np.diff(A.indptr))
-    A, rows, columns = A[entries], pencil.rows[entries], pencil.columns[entries]
-    found = np.zeros((*C.shape[:2], x.shape[1]), dtype=complex)
-    for k in chunks(np.arange(len(x)), C.shape[1] * V.shape[2] * max(len(entries), 1)):
-        half = C[k] @ np.swapaxes(V[k], 1, 2)[:, None]  # (p, k, r, n_dof)
-        W = np.einsum("per,pkre->pke", V[k][:, rows], half[..., columns])
-        forms = (W.reshape(-1, len(entries)) @ A).reshape(*W.shape[:2], len(moving))
-        found[np.ix_(k, np.arange(C.shape[1]), along)] = np.einsum(
-            "pkt,dtp->pkd", forms, rates[:, moving][:, :, k]
-        )
+    some = weights[:, moving]
+    entries = np.flatnonzero(np.diff(some.indptr))
+    some, rows, columns = some[entries], pencil.rows[entries], pencil.columns[entries]
+    size = len(along), pencil.n_dof, pencil.n_dof
+    found = np.zeros((len(x), len(along), V.shape[2], V.shape[2]), dtype=V.dtype)
+    every = np.arange(len(x))
+    for k in chunks(every, int(np.prod(size))) if pencil.is_dense else every[:, None]:
+        values = np.tensordot(rates[:, moving][..., k], some.toarray(), (1, 1))  # (d, p, entries)
+        if pencil.is_dense:
+            changed = np.zeros((len(k), *size))
+            changed[..., rows, columns] = values.swapaxes(0, 1)
+            found[k] = np.swapaxes(V[k], 1, 2)[:, None] @ (changed @ V[k][:, None])
+            continue
+        for d, own in enumerate(values[:, 0]):
+            A = sparse.csr_array((own, (rows, columns)), shape=size[1:])
+            found[k[0], d] = V[k[0]].T @ (A @ V[k[0]])
     return found
 
 
 # --- The largest |H| in parts of a range of frequencies
 
-SCAN, ROUNDS, FINER = (
-    7,
-    5,
-    5,
-)  # frequencies in a part at first; rounds about the largest, and in each
+SCAN = 5  # frequencies in a part, beside those about peaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,8 +320,7 @@ class Shaken:
     """The largest |H| of a node, in parts of a range of frequencies with these ``ends`` (rad/s)."""
 
     model: Model
-    node: str
-    direction: Sequence[float]
+    forces: Forces
     ends: Floats
     dampings: tuple[Damping, ...]
 
@@ -327,7 +334,7 @@ class Shaken:
             same = {name: mesh for name, mesh in model.meshes.items() if not mesh.whole.strands}
             frames = replace(model.poses, case=case)
             model = replace(model, pencil=pencil, poses=frames, meshes=same)
-        return cls(model, node, direction, ends, dampings(model))
+        return cls(model, unit_forces(model, {node: [direction]}), ends, dampings(model))
 
     def at(self, x: Floats, wanted: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """|H| (n, m) in m/N at x (n, n_x), of m parts and dampings, slopes (n, m, n_x) in those
@@ -335,43 +342,32 @@ class Shaken:
         """
         values, slopes = [], []
         for damping in self.dampings:
-            nodes = {self.node: [self.direction]}
-            found = modal_response(self.model, damping, nodes, x, float(self.ends[-1]))
+            found = modal_response(self.model, damping, self.forces, x, float(self.ends[-1]))
             omega = self._largest(found)
             H = found.at(omega)
             values.append(np.abs(H))
             turned = (H.conj() / np.maximum(np.abs(H), np.finfo(float).tiny))[..., None]
-            steep = (
-                found.slopes(omega, wanted) if wanted.any() else np.zeros((*H.shape, len(wanted)))
-            )
-            slopes.append((turned * steep).real)
+            slopes.append((turned * found.slopes(omega, wanted)).real)
         return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)
 
     def _largest(self, found: ModalResponse) -> Floats:
-        """ω (n, m) of the largest |H| in each part: by a scan with peaks in it, and finer ones."""
-        low, high, n = self.ends[:-1], self.ends[1:], len(found.x)
-        own, width = (
-            np.sqrt(found.mu.real),
-            1.0 + found.zeta[..., None] * [-1.0, -0.5, 0.0, 0.5, 1.0],
-        )
-        there = (own > 0.5 * low[0]) & (own < 2.0 * high[-1])
-        near = (own[..., None] * width)[:, there.any(axis=0)].reshape(n, -1)
+        """ω (n, m) of the largest |H| in each part: a scan with peaks in it, then the top of the
+        parabola of 1/|H|² through the largest and both beside it, which a peak of one mode is.
+        """
+        low, high, every = self.ends[:-1], self.ends[1:], np.arange(len(found.x))[:, None]
+        own, width = np.sqrt(found.mu.real), 1.0 + found.zeta[..., None] * [-0.5, 0.0, 0.5]
+        there = ((own > 0.5 * low[0]) & (own < 2.0 * high[-1])).any(axis=0)
+        near = np.clip((own[..., None] * width)[:, there].reshape(len(own), -1), low[0], high[-1])
         scan = np.linspace(low, high, SCAN).T.ravel()
-        omega = np.sort(np.hstack([np.tile(scan, (n, 1)), np.clip(near, low[0], high[-1])]), axis=1)
-        size, every = np.abs(found.at(omega)), np.arange(n)[:, None]
+        omega = np.sort(np.hstack([np.tile(scan, (len(own), 1)), near]), axis=1)
+        level = 1.0 / np.maximum(np.abs(found.at(omega)), np.finfo(float).tiny) ** 2
         inside = (omega[:, None] >= low[:, None]) & (omega[:, None] <= high[:, None])
-        best = np.where(inside, size[:, None], -1.0).argmax(axis=2)
-        beside = [np.clip(best + k, 0, omega.shape[1] - 1) for k in (-1, 1)]
-        start, end = (np.clip(omega[every, k], low, high) for k in beside)
-        for _ in range(ROUNDS):
-            omega = np.linspace(start, end, FINER, axis=2)
-            best = (
-                np.abs(found.at(omega.reshape(n, -1)))
-                .reshape(omega.shape)
-                .argmax(axis=2)[..., None]
-            )
-            start, end, top = (
-                np.take_along_axis(omega, np.clip(best + k, 0, FINER - 1), axis=2)[..., 0]
-                for k in (-1, 1, 0)
-            )
-        return np.asarray(top)
+        best = np.where(inside, level[:, None], np.inf).argmin(axis=2)
+        places = [np.clip(best + k, 0, omega.shape[1] - 1) for k in (-1, 0, 1)]
+        (a, b, c), (f, g, h) = ([each[every, k] for k in places] for each in (omega, level))
+        # the vertex, by divided differences
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first, second = (g - f) / (b - a), (h - g) / (c - b)
+            top = 0.5 * (a + b) - 0.5 * first * (c - a) / (second - first)
+        top = np.clip(np.where(np.isfinite(top), top, b), np.maximum(a, low), np.minimum(c, high))
+        return np.asarray(np.where(np.abs(found.at(top)) ** -2.0 < g, top, b))
