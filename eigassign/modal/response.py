@@ -178,7 +178,7 @@ class ModalResponse:
         A, B = (
             _changed(pencil, part, self.x, V, along) for part in (pencil.stiffness, pencil.mass)
         )
-        work = _work(A, c) - w**2 * _work(B, c)
+        work: Any = _work(A, c) - w**2 * _work(B, c)
         if self.damping.ratios:
             in_A, in_B = _root_differences(self.lam, self.damping.zeta(r))
             work = work + 1j * w * _work(A * in_A[:, None] + B * in_B[:, None], c)
