@@ -41,7 +41,16 @@ TYPE_CHECKING = False  # `typing` and `errors` take 30 ms in which `__main__` ca
 if TYPE_CHECKING:
     from typing import Any
 
-    from eigassign.api import Case, assign, expand, load_case, reduce, update, urdf_mapping
+    from eigassign.api import (
+        Case,
+        assign,
+        expand,
+        load_case,
+        reduce,
+        response,
+        update,
+        urdf_mapping,
+    )
     from eigassign.errors import CaseError, EigassignError
 
 __all__ = [
@@ -53,6 +62,7 @@ __all__ = [
     "expand",
     "load_case",
     "reduce",
+    "response",
     "update",
     "urdf_mapping",
 ]

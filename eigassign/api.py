@@ -19,7 +19,7 @@ from eigassign.modal.reduced import ReducedModel
 from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
-from eigassign.pipeline.run import Options, Result, solve_case
+from eigassign.pipeline.run import Options, Result, respond, responding, solve_case
 from eigassign.pipeline.stages import silent
 from eigassign.pipeline.studies import Updated, update_case
 from eigassign.pipeline.urdf import urdf_mapping
@@ -27,6 +27,7 @@ from eigassign.process import one_thread
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case
 from eigassign.study import pictures as drawing
+from eigassign.study.results import ResponseRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +38,7 @@ __all__ = [
     "expand",
     "load_case",
     "reduce",
+    "response",
     "update",
     "urdf_mapping",
 ]
@@ -142,6 +144,20 @@ def reduce(
     """
     half_order = whole_within(half_order, "half_order", 1, 10)
     return modal_reduced.reduce(as_model(model).pencil, q0, y0, modes, half_order)
+
+
+@one_thread
+def response(case: Case, **keys: Any) -> tuple[ResponseRow, ...]:
+    """What ``eigassign response`` computes, nothing written: a row for each response.
+
+    H of a node along a direction, of the design as written: ``keys`` are those of `response` in
+    case files, ``at="arm.end", direction=[0, 1], lowest="40 Hz", highest="60 Hz"``; without them
+    the case's own. ``.frequency_hz`` (k,), ``.stiffness`` 1/|H| (n, k) in N/m at the samples,
+    ``.least_real`` (k,) in m/N, ``.modes_hz`` (n, r), ``.constants`` b·φ (n, r, m) in 1/√kg.
+    Raises UsageError for wrong keys, CaseError where a coordinate is free.
+    """
+    given = {{"lowest": "from", "highest": "to"}.get(key, key): each for key, each in keys.items()}
+    return respond(responding(case, given)).responses
 
 
 @one_thread

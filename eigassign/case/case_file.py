@@ -79,7 +79,7 @@ from eigassign.case.schema.study import (
     Sweep,
     ValidationKeys,
 )
-from eigassign.case.schema.targets import AnyTarget, TargetForm
+from eigassign.case.schema.targets import AnyTarget, DrawnResponse, ResponseForm, TargetForm
 from eigassign.case.schema.trajectory import (
     Added,
     TrajectoryForm,
@@ -181,6 +181,7 @@ class CaseFile:
     design: Design
     expansion: ExpansionKeys
     targets: tuple[TargetForm, ...]
+    response: ResponseForm | None
     assignment: AssignmentKeys
     measurements: Measurements | None
     validation: ValidationKeys
@@ -206,6 +207,12 @@ class CaseFile:
         objective = self.assignment.objective
         aim = () if isinstance(objective, str) else (("assignment.objective", objective.target),)
         return (*aim, *((f"targets[{k}]", target) for k, target in enumerate(self.targets)))
+
+    @property
+    def responses(self) -> tuple[DrawnResponse, ...]:
+        """Those that are drawn."""
+        form = self.response or ()
+        return form if isinstance(form, tuple) else (form,)
 
     @property
     def has_question(self) -> bool:

@@ -6,7 +6,7 @@ command needs is imported when it runs, so that ``--help`` is instant.
 Reading order:
 
     arguments  what several commands share: options, what is written on stderr, JSON
-    runs       optimize, compare, expand, update, validate, chart
+    runs       optimize, compare, expand, response, update, validate, chart
     inspect    check, modes, schema, init, docs
     batch      batch
 """
@@ -26,7 +26,7 @@ from eigassign.cli.arguments import print_json
 from eigassign.cli.batch import batch
 from eigassign.cli.inspect import check, docs, init, modes, schema
 from eigassign.cli.inspect import results_schema as results_schema
-from eigassign.cli.runs import chart, compare, expand, optimize, update, validate
+from eigassign.cli.runs import chart, compare, expand, optimize, response, update, validate
 from eigassign.errors import UsageError
 
 
@@ -111,6 +111,6 @@ def cli() -> None:
 
 
 FIRST = (init, check, optimize, update, batch, docs)
-MORE = (compare, modes, expand, validate, chart, schema)
+MORE = (compare, modes, response, expand, validate, chart, schema)
 for command in (*FIRST, *MORE):
     cli.add_command(command)

@@ -75,6 +75,11 @@ PATH = click.Path(path_type=Path)
 COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)
+design = click.option(
+    "--y",
+    metavar="VALUES",
+    help="Design, such as '0.125, 0.125' or '125 g, 0' (default: as the case file has it).",
+)
 pose = several(
     click.option(
         "--q",
@@ -82,11 +87,7 @@ pose = several(
         help="Pose, such as '1.817, 5.312' or '104 deg, 304 deg' (default: the expansion point of "
         "the case, or the start of its trajectory).",
     ),
-    click.option(
-        "--y",
-        metavar="VALUES",
-        help="Design, such as '0.125, 0.125' or '125 g, 0' (default: as the case file has it).",
-    ),
+    design,
 )
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 common = several(

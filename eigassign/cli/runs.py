@@ -1,4 +1,4 @@
-"""The work on cases: `optimize`, `expand`, `update`, `compare`, `validate`, `chart`."""
+"""The work on cases: `optimize`, `expand`, `response`, `update`, `compare`, `validate`, `chart`."""
 
 from __future__ import annotations
 
@@ -85,6 +85,52 @@ def expand(
         return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
 
     return _finished(expanded, case, as_json, how)
+
+
+@click.command(
+    epilog=arguments.examples(
+        'eigassign response milling_arm.yaml --at forearm.end --direction "0, 1" --from "40 Hz" '
+        '--to "60 Hz" --teeth 4',
+        "eigassign response milling_arm.yaml --figures none --json",
+    )
+)
+@arguments.case
+@click.option("--at", metavar="NODE", help="Node that is shaken (default: the case's response).")
+@click.option("--direction", metavar="VALUES", help="Along which direction, such as '0, 1'.")
+@click.option("--seen", metavar="NODE", help="Node that is seen to move (default: the same).")
+@click.option("--along", metavar="VALUES", help="Along which direction (default: the same).")
+@click.option("--from", "lowest", metavar="FREQUENCY", help="Lowest frequency, such as '40 Hz'.")
+@click.option("--to", "highest", metavar="FREQUENCY", help="Highest frequency.")
+@click.option("--teeth", type=click.IntRange(1), help="Of a cutter: tells free spindle speeds.")
+@click.option("--harmonics", type=click.IntRange(1), help="Of the passing of teeth (default: 1).")
+@arguments.design
+@arguments.writing("results/<case>_response")
+@arguments.json
+@arguments.common
+def response(case: Path, y: str | None, as_json: bool, **how: Any) -> int:
+    """Compute frequency responses along the trajectory.
+
+    Writes dynamic stiffness over time and frequency, its least value along the path, modes with
+    their constants at the nodes, and free speeds of a spindle: modes.csv, response.csv and
+    response.h5. Without --at it is the response of the case.
+    """
+    from eigassign.case.reader import resolve
+    from eigassign.pipeline import queries, run
+
+    def place(at: str | None, along: str | None) -> dict[str, object]:
+        values = [*map(resolve, queries.split(along or ""))]
+        return {**({"at": at} if at else {}), **({"direction": values} if values else {})}
+
+    drawn = place(how["at"], how["direction"])
+    if how["seen"] or how["along"]:
+        drawn["seen"] = {**drawn, **place(how["seen"], how["along"])}
+    names = {"lowest": "from", "highest": "to", "teeth": "teeth", "harmonics": "harmonics"}
+    drawn |= {key: how[name] for name, key in names.items() if how[name] is not None}
+
+    def responded(path: Path, options: Options) -> Outcome:
+        return run.respond_case(path, options, drawn, y)
+
+    return _finished(responded, case, as_json, how)
 
 
 def _finished(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from eigassign.case.units import handy_unit
 from eigassign.mechanism.trajectory.trajectory import TIME, TIP_COLUMNS
+from eigassign.output.store.cache import hdf5
 from eigassign.study.results import RunResults, StaticRow, TargetStudy, TrajectoryRow
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,7 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         for row in results.trajectories
     }
     files["frequencies.csv"] = csv_text(frequency_columns(results))
+    files |= _response_files(results)
     for name, rows in {"drives.csv": results.drives, "statics.csv": results.statics}.items():
         if rows:
             files[name] = csv_text([*_samples(results), *_both(rows)])
@@ -57,6 +59,47 @@ def frequency_columns(results: RunResults) -> list[Column]:
     if not results.targets:
         return [*_samples(results), *_expanded(results)]
     return [*_samples(results), *_assigned(results), *_others(results)]
+
+
+def _response_files(results: RunResults) -> dict[str, bytes]:
+    """modes.csv: a row a sample and mode; response.csv: a row a frequency; maps in response.h5."""
+    if not results.responses:
+        return {}
+    last = max(results.responses, key=lambda row: row.modes_hz.shape[1])
+    n, r = last.modes_hz.shape
+    modes: list[Column] = [
+        (head, [v for v in own for _ in range(r)]) for head, own in _samples(results)
+    ]
+    modes += [("mode", [*range(1, r + 1)] * n), ("tracked", last.tracked.ravel().tolist())]
+    modes.append(("frequency [Hz]", last.modes_hz.ravel().tolist()))
+    ends = ("", "") if len(last.ratios) < 2 else (" least", " most")
+    modes += [
+        (f"damping ratio{e} [1]", z.ravel().tolist())
+        for e, z in zip(ends, last.ratios, strict=False)
+    ]
+    with np.errstate(divide="ignore"):
+        for place, own in zip(last.places, np.moveaxis(last.constants, 2, 0), strict=True):
+            mass = 1.0 / own**2
+            stiffness = mass * (2.0 * np.pi * last.modes_hz) ** 2
+            for head, v in (
+                ("constant", own),
+                ("modal mass", mass),
+                ("modal stiffness", stiffness),
+            ):
+                unit = {"constant": "1/sqrt(kg)", "modal mass": "kg"}.get(head, "N/m")
+                modes.append((f"{place} {head} [{unit}]", v.ravel().tolist()))
+    rows, arrays = list[Column](), {"time_s": results.time_s, "q": results.q}
+    for k, one in enumerate(results.responses, 1):
+        columns = {"frequency [Hz]": one.frequency_hz, "least dynamic stiffness [N/m]":
+                   one.stiffness.min(axis=0), "least real part [m/N]": one.least_real}  # fmt: skip
+        columns |= {} if one.initial is None else {"initial dynamic stiffness [N/m]": one.initial}
+        rows += [(f"{one.name} {head}", own.tolist()) for head, own in columns.items()]
+        arrays |= {f"{k}/frequency_hz": one.frequency_hz, f"{k}/dynamic_stiffness": one.stiffness}
+    named = {str(k): one.name for k, one in enumerate(results.responses, 1)}
+    tall = max(len(own) for _, own in rows)
+    table = [(head, [*own, *[math.nan] * (tall - len(own))]) for head, own in rows]
+    return {"modes.csv": csv_text(modes), "response.csv": csv_text(table),
+            "response.h5": hdf5(arrays, named)}  # fmt: skip
 
 
 def _samples(results: RunResults) -> Iterator[Column]:

@@ -353,6 +353,17 @@ def _robustness(results: RunResults) -> Iterator[Table]:
         yield facts_table("Sag under the weight", far, "node sag most", f"{caption}.")
 
 
+def _responses(results: RunResults) -> Iterator[Table]:
+    """The least dynamic stiffness of each response, and speeds that are free."""
+    caption = f"Dynamic stiffness 1/|H|, the least along {results.along} and over its frequencies."
+    yield facts_table(
+        "Responses", results.responses, "name handy least at_hz at_s before real mesh", caption
+    )
+    caption = "No harmonic of the passing of teeth comes within f (1 ± ζ) of a mode on the way."
+    free = [one for row in results.responses for one in row.free]
+    yield facts_table("Free speeds of the spindle", free, "of lowest highest", caption)
+
+
 def _motion(results: RunResults) -> Iterator[Table]:
     """What every drive exerts: its peak, where that is, and rms, before and after."""
     rows = results.drives
@@ -394,6 +405,7 @@ SECTIONS = {  # of a page, with their headings; what is in none is in the append
     "design": "Design",
     "depends": "What it hangs on",
     "robustness": "Robustness",
+    "responses": "Responses",
     "motion": "Motion",
 }
 _KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
@@ -401,6 +413,7 @@ _KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
     "requirements": _requirements,
     "depends": _depends,
     "robustness": _robustness,
+    "responses": _responses,
     "motion": _motion,
     "appendix": _appendix,
 }

@@ -3,8 +3,8 @@
 Reading order:
 
     stages   the stages of a run, its folder and log; expansions from the cache or computed
-    run      the paper's flowchart: case, model, expansion, assignment, verification
     queries  check a case, draw it; its frequencies at one point
+    run      the paper's flowchart: case, model, expansion, assignment, verification; responses
     urdf     a robot from URDF as the content of a case
     studies  measured frequencies to the parameters that explain them
     charting  speed against accuracy of every method, on one case or several
@@ -17,7 +17,10 @@ __all__, __getattr__, __dir__ = face(
     {
         "charting": "chart_case chart_cases",
         "queries": "check draw modes",
-        "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
+        "run": (
+            "Options Outcome Result expand_case optimize prepare respond responding solve_case "
+            "validate"
+        ),
         "stages": "Stages affordable_order expand_plan expansion_key silent",
         "studies": "update_case",
     },

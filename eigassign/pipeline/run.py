@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,16 +18,27 @@ from numpy.typing import NDArray
 from eigassign.assignment.one_shot import Assignment
 from eigassign.assignment.requirements.sampling import with_instants
 from eigassign.brief import counted
-from eigassign.case.reader import shown
+from eigassign.case.reader import dotted, read_mapping, shown
+from eigassign.case.rules.mechanism import node_problem
+from eigassign.case.schema.document import validated_part
+from eigassign.case.schema.targets import DrawnResponse
 from eigassign.case.units import handy
-from eigassign.errors import EigassignError
+from eigassign.errors import EigassignError, UsageError
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.output.store.run_folder import UNFINISHED, unfinished_beside
-from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
+from eigassign.pipeline.queries import pose_and_design
+from eigassign.pipeline.stages import (
+    RunFolder,
+    Stages,
+    coefficient_files,
+    expand_plan,
+    new_run_folder,
+    silent,
+)
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
 from eigassign.study.collect import between_samples, collect_results
@@ -38,10 +50,12 @@ from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_
 from eigassign.study.meaning import Studies, study_meaning
 from eigassign.study.pictures import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
-from eigassign.study.results import Motion, RunResults, TargetStudy
+from eigassign.study.response import study_responses
+from eigassign.study.results import Motion, ResponseRow, RunResults, TargetStudy
 from eigassign.study.scene import (
     TRAJECTORY,
     Expansions,
+    ModeStudies,
     Scene,
     Validation,
     reach_warnings,
@@ -159,9 +173,10 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
             bound = None
             if answer.found is not None and asked is not Studies.NONE:
                 bound = proof(scene, answer.found, thorough=asked is Studies.ALL)
+        drawn = _responses(scene, answer.y, stages)
     found = VerifiedAssignment(answer, targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
-    results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s)
+    results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s, drawn)
     if options.figures or options.report != "none":
         between = between_samples(scene, answer.y, len(results.spectrum))
         results = replace(results, between=between)
@@ -202,6 +217,60 @@ def _moving(
             first[target.asked.rows] = np.maximum(row.exact_numbers, 1)
     numbers = {name: first, **numbers} | {name: first}
     return tuple(motions(scene.file, scene.model, scene.path, y, numbers))
+
+
+def _responses(scene: Scene, y: Floats, stages: Stages) -> tuple[ResponseRow, ...]:
+    if not scene.file.responses:
+        return ()
+    with stages("responses", "computing responses along the trajectory"):
+        return tuple(study_responses(scene, y))
+
+
+def respond(
+    given: BuiltCase, options: Options = DEFAULT, folder: RunFolder | None = None
+) -> RunResults:
+    """Responses of a case as it is written, along its trajectory, into a ``folder`` if any.
+
+    Raises CaseError where the case has no trajectory, or a coordinate is free.
+    """
+    stages = Stages(options.progress)
+    needs = {"trajectory": given.file.trajectory, "response": given.file.responses}
+    told = {key: (bool(own), "what to draw, and where") for key, own in needs.items()}
+    given.file.require("eigassign response", told)
+    with given.located():
+        scene = prepare(given, stages, None, assigned=True)
+        accuracy, drawn = study_accuracy(scene), _responses(scene, scene.initial, stages)
+    results = collect_results(scene, ModeStudies(), accuracy, None, (), stages.timing_s, drawn)
+    if folder is not None:
+        folder.write(results, options.figures, options.report)
+    return results
+
+
+def respond_case(
+    path: str | Path, options: Options, drawn: Mapping[str, object], y: str | None
+) -> Outcome:
+    """`respond` into a run folder; ``drawn`` are keys of a response instead of the case's."""
+    case, started = responding(load_case(path, options.allow_outside), drawn, y), perf_counter()
+    with new_run_folder(case.file, options.out, options.force, "_response") as folder:
+        results = respond(case, options, folder)
+    return Outcome(folder.path, results, perf_counter() - started)
+
+
+def responding(case: BuiltCase, drawn: Mapping[str, object], y: str | None = None) -> BuiltCase:
+    """The case with another response and design y; raises UsageError for keys that are wrong."""
+    file = case.file if y is None else case.file.with_design(pose_and_design(case, None, y)[1])
+    if drawn:
+        context = {"space": file.mechanism.space, "folder": None}
+        keys, wrong = validated_part(DrawnResponse, read_mapping(drawn, "response").tree, context)
+        wrong += [
+            (("at",), problem)
+            for place in (keys.places if keys else ())
+            if (problem := node_problem(file.mechanism, place.at))
+        ]
+        if keys is None or wrong:
+            raise UsageError("; ".join(f"{dotted(path)}: {message}" for path, message in wrong))
+        file = replace(file, response=keys)
+    return BuiltCase(file)
 
 
 def prepare(

@@ -7,6 +7,7 @@ Reading order:
     built_case  validated cases, models and trajectories; what is left to auto for links, settled
     scene       model, trajectory and expansions of a case in one object, against exact solves
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
+    response    responses along the trajectory, and speeds that are free
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
     pictures    what is drawn of a mechanism, as plain lines and numbers
@@ -40,9 +41,10 @@ __all__, __getattr__, __dir__ = face(
             "AimRow AssignmentRow CaseRow CatalogueRow ClearanceRow CombinationRow "
             "Comparison DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
             "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
-            "ModeRow RangeRow RunResults SensitivityRow SolverRow TargetAlong "
+            "ModeRow RangeRow ResponseRow RunResults SensitivityRow SolverRow TargetAlong "
             "TargetStudy TrajectoryRow ValidationRow"
         ),
+        "response": "study_responses",
         "scene": (
             "BETWEEN DESIGN_BOX Scene TRAJECTORY compare reach_warnings "
             "study_modes unseen_points validate_expansions"

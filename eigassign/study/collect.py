@@ -31,6 +31,7 @@ from eigassign.study.results import (
     MassRow,
     ModeRow,
     Motion,
+    ResponseRow,
     RunResults,
     StaticRow,
     TargetStudy,
@@ -51,6 +52,7 @@ def collect_results(
     assigned: VerifiedAssignment | None,
     moving: tuple[Motion, ...],
     timing_s: Mapping[str, float],
+    responses: tuple[ResponseRow, ...] = (),
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
@@ -63,6 +65,8 @@ def collect_results(
         poses = rest_pose(file, scene.model, scene.q0, scene.initial)
     else:
         poses = draw_poses(file, scene.model, trajectory, scene.initial)
+    if responses and not any(np.any(each) for row in responses for each in row.ratios):
+        warnings.append("no damping is stated: responses are infinite at resonances")
     if assigned is not None:
         solved, targets = assigned.solved, assigned.targets
         judged = judged_modes(file, targets)
@@ -94,6 +98,7 @@ def collect_results(
         discretisation=accuracy.mesh,
         weight=weight.row,
         moving=moving,
+        responses=responses,
         **answer,
     )
 

@@ -56,6 +56,7 @@ MET = 1e-8  # a violation below it is round-off
 # Of a limit on a frequency: as much as 0.2 % of a stiffness or mass, which no machine is known to
 THIN = 1e-3
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
+InPower = Annotated[float, Fact(unit="m/N", digits=partial(handy, unit="m/N"), says_unit=True)]
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 
 
@@ -282,6 +283,40 @@ class DriveRow(StaticRow):
     def quantity(self) -> str:
         """The word for what it exerts."""
         return " force" if self.unit == "N" else " torque"
+
+
+@dataclass(frozen=True)
+class FreeSpeeds:
+    """Speeds of a spindle at which no harmonic of the passing of teeth meets a mode on the path."""
+
+    of: Annotated[Key, Fact(heading="response")]
+    lowest: Annotated[float, Fact("from", "from", "rpm", number)]
+    highest: Annotated[float, Fact("to", "to", "rpm", number)]
+    teeth: Unwritten[int]
+
+
+@dataclass(frozen=True, repr=False)
+class ResponseRow(InOneUnit, Brief):
+    """A response at n samples and k frequencies; of a range of damping the worse end of both."""
+
+    name: Annotated[Key, Fact(heading="response")]
+    unit: str
+    least: Annotated[InUnit, Fact("the least dynamic stiffness 1/|H|", "least stiffness")]
+    at_hz: Annotated[Hertz, Fact("of the least", "at")]
+    at_s: Annotated[Seconds, Fact("of the least, from the start of its trajectory", "at time")]
+    before: Annotated[InUnit | None, Fact("the least of the initial design", may_lack=True)]
+    real: Annotated[InPower, Fact("the least real part of H, which limits chatter", "least Re H")]
+    mesh: Annotated[Share | None, Fact("what twice the elements change of the least", "mesh")]
+    free: Annotated[tuple[FreeSpeeds, ...], Fact("of the spindle", name="free_speeds")]
+    frequency_hz: Unwritten[Floats]  # (k,)
+    stiffness: Unwritten[Floats]  # (n, k), N/m
+    least_real: Unwritten[Floats]  # (k,), m/N
+    initial: Unwritten[Floats | None]  # (k,), N/m: the least of the initial design
+    places: Unwritten[tuple[str, ...]]  # m nodes and directions
+    constants: Unwritten[Floats]  # b·φ (n, r, m), 1/√kg
+    modes_hz: Unwritten[Floats]  # (n, r)
+    ratios: Unwritten[tuple[Floats, ...]]  # ζ (n, r), at both ends of a range
+    tracked: Unwritten[Numbers]  # (n, r): what number a mode has where its trajectory begins
 
 
 @dataclass(frozen=True)
@@ -995,6 +1030,7 @@ class RunResults(Origin):
     statics: Annotated[
         tuple[StaticRow, ...], Fact("of static targets, by what they ask", by="name")
     ] = ()
+    responses: Annotated[tuple[ResponseRow, ...], Fact("drawn ones", by="name")] = ()
     targets: Annotated[tuple[TargetStudy, ...], Fact("in the order of the case")] = ()
     assignment: Annotated[
         AssignmentRow | None, Fact("the verdict, and how the answer was found")

@@ -121,6 +121,7 @@ def names_mean_parts(document: Document) -> Iterator[Finding]:
                 ("mechanism", "bodies", _, "at")
                 | ("trajectory", *_, "tip")
                 | ("targets", _, *_, "at")
+                | ("response", *_, "at")
             ):
                 problem = node_problem(mechanism, name)
         if problem:

@@ -25,7 +25,7 @@ from eigassign.case.schema.study import (
     Sweep,
     ValidationKeys,
 )
-from eigassign.case.schema.targets import TargetForm
+from eigassign.case.schema.targets import ResponseForm, TargetForm
 from eigassign.case.schema.trajectory import TrajectoryForms
 
 P = TypeVar("P", bound=Part)
@@ -47,6 +47,7 @@ class Document(Part):
         design: the design parameters y, in this order, and limits that they share
         expansion: the power series
         targets: wanted frequencies, limits, bands to keep out of, gaps
+        response: responses to draw; one, or a list of them
         assignment: how the optimal design is looked for
         measurements: measured frequencies, for `eigassign update`
         validation: the accuracy that expansions must have
@@ -63,6 +64,7 @@ class Document(Part):
     design: Design = Design.model_construct()
     expansion: ExpansionKeys = ExpansionKeys.model_construct()
     targets: tuple[TargetForm, ...] = ()
+    response: ResponseForm | None = None
     assignment: AssignmentKeys = AssignmentKeys.model_construct()
     measurements: Measurements | None = None
     validation: ValidationKeys = ValidationKeys.model_construct()

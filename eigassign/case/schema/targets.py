@@ -545,6 +545,40 @@ class ResponseTarget(StaticTarget):
     at_least: Annotated[float, quantity("stiffness", above=0)]
 
 
+class DrawnResponse(ShakenNode):
+    """A response along the trajectory: the way of a node over the force that shakes one.
+
+    Keys:
+        seen: the node that is seen to move, and along which direction; the shaken one unless given
+        teeth: of a cutter, for the speeds of its spindle that are free
+        harmonics: of the passing of teeth, from the first on
+    """
+
+    seen: PushedNode | None = None
+    teeth: Annotated[int, Field(ge=1, le=1000)] | None = None
+    harmonics: Annotated[int, Field(ge=1, le=100)] = 1
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        return f"{self.seen.name} by {super().name}" if self.seen else super().name
+
+    @property
+    def places(self) -> tuple[PushedNode, PushedNode]:
+        """Where it is shaken, and where it is seen."""
+        return self, self.seen or self
+
+    def _mistakes(self, space: str | None) -> Mistakes:
+        yield from super()._mistakes(space)
+        if self.teeth is None and self.harmonics > 1:
+            yield wrong("is of the passing of teeth: give teeth, too", "harmonics")
+
+
+ResponseForm: TypeAlias = OneOrList[
+    DrawnResponse, Annotated[tuple[DrawnResponse, ...], Field(min_length=1)]
+]
+
+
 def _which_target(value: object) -> int:
     """By its one key that names a kind; beside a kind of statics, a limit names none."""
     given = mapping(value)

@@ -240,8 +240,8 @@ def reduced_where_asked(
 
 
 def interface(case: CaseFile, name: str) -> set[str]:
-    """Nodes of a link that stay: of a frame those that something is attached to, or that a static
-    target is about; of others all.
+    """Nodes of a link that stay: of a frame those that something is attached to, or that static
+    targets and responses are about; of others all.
     """
     mechanism: Any = case.mechanism
     if link_type(case, name) != "frame":
@@ -251,6 +251,7 @@ def interface(case: CaseFile, name: str) -> set[str]:
     used += [body.at for body in mechanism.bodies.values()]
     used += [end for spring in mechanism.springs.values() for end in spring.between]
     used += [target.place.at for target in case.targets if isinstance(target, StaticTarget)]
+    used += [place.at for response in case.responses for place in response.places]
     pairs = [str(end).partition(".") for end in used]
     return {node for link, _, node in pairs if link == name}
 

@@ -87,7 +87,17 @@ class Rule:
     note: str = ""
 
 
-Mark = Curve | Shade | Rule
+@dataclass(frozen=True, eq=False)
+class Heat:
+    """Colours of values ``z`` (n_y, n_x) over the graph's abscissa and ``y`` (n_y,)."""
+
+    y: Floats
+    z: Floats
+    key: str  # what the values are
+    label: str = ""
+
+
+Mark = Curve | Shade | Rule | Heat
 
 
 @dataclass(frozen=True, eq=False)

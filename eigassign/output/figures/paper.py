@@ -23,6 +23,7 @@ from eigassign.output.figures.graph import (
     Curve,
     FigurePlan,
     Graph,
+    Heat,
     Look,
     Panel,
     Rule,
@@ -218,6 +219,9 @@ def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[Any]:
             handle = _curve(axes, panel, mark, shown, 2.0 + 1e-3 * at)
         elif isinstance(mark, Shade):
             handle = _shade(axes, panel, mark, shown.x)
+        elif isinstance(mark, Heat):
+            drawn = axes.pcolormesh(shown.x, mark.y, mark.z, shading="nearest", rasterized=True)
+            axes.figure.colorbar(drawn, ax=axes, label=mark.key, pad=0.02)
         else:
             handle = _rule(axes, mark)
         if mark.label:

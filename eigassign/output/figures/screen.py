@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.output.figures import graph, mechanism, scene
-from eigassign.output.figures.graph import Curve, Graph, Look, Panel, Rule, Shade, short
+from eigassign.output.figures.graph import Curve, Graph, Heat, Look, Panel, Rule, Shade, short
 from eigassign.output.figures.scene import Part, Shape
 from eigassign.study.results import Motion
 
@@ -81,6 +81,8 @@ def screen_figure(shown: Graph) -> Json:
                 data.append(_curve(mark, panel, shown, axis, names))
             elif isinstance(mark, Shade):
                 data.append(_shade(mark, panel, shown.x, axis))
+            elif isinstance(mark, Heat):
+                data.append(_heat(mark, shown.x, axis))
             else:
                 shapes.append(_rule(mark, axis))
                 notes += _note(mark, axis)
@@ -200,6 +202,15 @@ def _key(name: str, look: Look) -> Json:
     return {
         "type": "scatter", "mode": "lines", "x": [None], "y": [None], "name": name,
         "line": _line(look), "hoverinfo": "skip",
+    }  # fmt: skip
+
+
+def _heat(heat: Heat, x: Floats, axis: str) -> Json:
+    rows, columns = (np.unique(np.linspace(0, n - 1, 200).astype(int)) for n in heat.z.shape)
+    values = [_numbers(row) for row in heat.z[rows][:, columns]]
+    return {
+        "type": "heatmap", "x": _numbers(x[columns]), "y": _numbers(heat.y[rows]), "z": values,
+        "yaxis": axis, "colorscale": "Viridis", "colorbar": {"title": {"text": heat.key}},
     }  # fmt: skip
 
 

@@ -1,0 +1,122 @@
+"""Responses along the trajectory: dynamic stiffness, modal constants, speeds that are free.
+
+Frequencies are so near that a peak between two of them is at most 0.8 % higher: a quarter of the
+least damping ratio apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from eigassign.case.schema.targets import DrawnResponse, PushedNode
+from eigassign.case.units import SI, Given
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.exact.tracking import links
+from eigassign.modal.response import ModalResponse, Shaken, dampings, modal_response, unit_forces
+from eigassign.study.results import FreeSpeeds, ResponseRow
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+UNIT = SI("N/m", Given(1e6, "1 N/um"))  # as machines are rated
+FEWEST, MOST = 200, 4000  # frequencies of a response
+
+
+def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
+    """What the case draws, of design y (n_y,), beside the initial one where that is another.
+
+    Raises MechanismError where a coordinate is free.
+    """
+    keys, model, path = scene.file.responses, scene.model, scene.path
+    every = dict.fromkeys((p.at, p.direction) for key in keys for p in key.places)
+    nodes = {at: [d for node, d in every if node == at] for at, _ in every}
+    order = [(at, d) for at, own in nodes.items() for d in own]
+    designs = [y] if np.array_equal(y, scene.initial) else [y, scene.initial]
+    samples = [model.x(path.at(each)[0], each) for each in designs]
+    own = unit_forces(model, nodes)
+    for key in keys:
+        a, b = (order.index((p.at, p.direction)) for p in key.places)
+        highest = 2.0 * np.pi * key.highest * key.harmonics
+        each = [
+            [modal_response(model, d, own, x, highest) for d in dampings(model)] for x in samples
+        ]
+        hz = _frequencies(key, each[0])
+        H = [
+            _together([m.at(np.tile(2.0 * np.pi * hz, (len(m.x), 1)), a, b) for m in ms])
+            for ms in each
+        ]
+        size, found = np.abs(H[0]).max(axis=0), each[0]
+        k, j = np.unravel_index(size.argmax(), size.shape)
+        mesh = None
+        if model.is_meshed and key.seen is None:
+            ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
+            both = (
+                Shaken.of(model, key.at, key.direction, ends, finer)
+                .at(samples[0][[k]], np.zeros(samples[0].shape[1], dtype=bool))[0]
+                .max()
+                for finer in (True, False)
+            )
+            mesh = abs(next(both) / next(both) - 1.0)
+        shown = max(4, int((found[0].lam < (2.0 * highest) ** 2).any(axis=0).sum()))
+        modes_hz = np.sqrt(found[0].lam[:, :shown]) / (2.0 * np.pi)
+        ratios = tuple(m.zeta[:, :shown] for m in found)
+        initial = 1.0 / np.abs(H[1]).max(axis=(0, 1)) if len(H) > 1 else None
+        yield ResponseRow(
+            name=key.name,
+            unit=UNIT,
+            least=1.0 / float(size[k, j]),
+            at_hz=float(hz[j]),
+            at_s=float(path.time_s[k]),
+            before=None if initial is None else float(initial.min()),
+            real=float(H[0].real.min()),
+            mesh=mesh,
+            free=tuple(_free(key, modes_hz, ratios)),
+            frequency_hz=hz,
+            stiffness=1.0 / size,
+            least_real=H[0].real.min(axis=(0, 1)),
+            initial=initial,
+            places=tuple(PushedNode(at=at, direction=d).name for at, d in order),
+            constants=found[0].beta[:, :shown],
+            modes_hz=modes_hz,
+            ratios=ratios,
+            tracked=_tracked(found[0], path, shown),
+        )
+
+
+def _together(ends: Sequence[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+    """H (ends, n, k), which is infinite at a peak without damping."""
+    return np.where(np.isfinite(H := np.array(ends)), H, -np.inf)
+
+
+def _frequencies(key: DrawnResponse, found: Sequence[ModalResponse]) -> Floats:
+    least = min(float(m.zeta.min(initial=1.0, where=m.zeta > 0.0)) for m in found)
+    count = 4.0 / least * np.log(key.highest / key.lowest)
+    return np.unique(np.geomspace(key.lowest, key.highest, int(np.clip(count, FEWEST, MOST))))
+
+
+def _free(key: DrawnResponse, hz: Floats, ratios: Sequence[Floats]) -> Iterator[FreeSpeeds]:
+    """Speeds whose first harmonic is drawn less those of modes: f (1 ± ζ), all along the path."""
+    if key.teeth is None:
+        return
+    zeta = np.maximum.reduce(ratios)
+    low, high = (hz * (1.0 - zeta)).min(axis=0), (hz * (1.0 + zeta)).max(axis=0)
+    shares = 1.0 / np.arange(1, key.harmonics + 1)
+    taken = sorted(zip(np.outer(shares, low).flat, np.outer(shares, high).flat, strict=True))
+    at, rpm = key.lowest, 60.0 / key.teeth
+    for start, end in [*taken, (key.highest, key.highest)]:
+        if (until := min(float(start), key.highest)) > at:
+            yield FreeSpeeds(key.name, rpm * at, rpm * until, key.teeth)
+        at = max(at, float(end))
+
+
+def _tracked(found: ModalResponse, path: Trajectories, count: int) -> NDArray[np.intp]:
+    """Modes by likeness to those of the sample before, (φᵀMφ')², numbered where a path begins."""
+    phi = found.phi[..., :count]
+    alike = links(found.model.pencil, found.x[1:], phi[:-1], phi[1:])[0] ** 2
+    numbers = np.tile(np.arange(1, 1 + phi.shape[2]), (len(phi), 1))
+    for k in sorted({*range(1, len(phi))} - {rows.start for rows in path.rows}):
+        numbers[k] = numbers[k - 1][linear_sum_assignment(-alike[k - 1])[1]]
+    return numbers
