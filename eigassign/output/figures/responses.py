@@ -19,8 +19,7 @@ def response_figures(results: RunResults) -> Iterator[FigurePlan]:
     for k, row in enumerate(results.responses, 1):
         yield _least(row, k)
         for part in results.trajectories:
-            several = len(results.trajectories) > 1
-            end, clock = (f"_{part.name}", part.name) if several else ("", "")
+            end = f"_{part.name}" if len(results.trajectories) > 1 else ""
             hz, time_s = row.frequency_hz, results.time_s[part.rows]
             level = np.log10(np.maximum(row.stiffness[part.rows].T, 1.0) / MICRO)
             heat = Heat(hz, level, "log₁₀ of N/µm")
@@ -29,9 +28,9 @@ def response_figures(results: RunResults) -> Iterator[FigurePlan]:
             yield FigurePlan(
                 f"response_{k}_map{end}",
                 title,
-                f"1/|H| over time and frequency{', ' * several}{clock}: dark where it gives way.",
+                f"1/|H| over time and frequency along {part.name!r}: dark where it gives way.",
                 "A map of the dynamic stiffness over time and frequency.",
-                Graph(title, "time [s]", time_s, (panel,), clock=clock),
+                Graph(title, "time [s]", time_s, (panel,)),
                 "responses",
             )
 

@@ -129,7 +129,7 @@ const eigassign = (function () {
   function csv(name) {  // a column a curve over one abscissa; of named points a row a point
     const { data, layout } = figures[name], across = layout.xaxis.title.text || "x", columns = new Map(), points = data.filter((t) => t.hovertext);
     const axis = (trace) => layout[trace.yaxis.replace("y", "yaxis")].title.text;
-    const lines = (rows) => rows.map((row) => row.map((cell) => quoted(cell ?? "")).join()).join("\n") + "\n";
+    const lines = (rows) => rows.map((row) => row.map((cell) => quoted(cell ?? "")).join()).join("\n") + "\n", heat = data.find((t) => t.z); if (heat) return lines([[`${axis(heat)} / ${across}`, ...heat.x], ...heat.y.map((y, i) => [y, ...heat.z[i]])]);
     const ups = [...new Set(points.map(axis))].filter(Boolean);  // without a title: rows of a sheet
     if (points.length) return lines([["point", "series", across, ...ups], ...points.flatMap((t) => t.x.map((x, i) => [t.hovertext[i], t.name, x, ...ups.map((up) => up === axis(t) ? t.y[i] : "")]))]);
     const add = (head, x, y) => { if (!columns.has(head)) columns.set(head, new Map(x.map((at, i) => [at, y[i]]))); };
