@@ -146,7 +146,8 @@ class ModalResponse:
 
     def at(self, omega: Floats, a: int = 0, b: int = 0) -> Numbers:
         """H_ab (n, k) in m/N at angular frequencies ω (n, k)."""
-        both = self.gamma[..., a] * self.gamma[..., b]
+        left = self.beta if self.turn is None else np.swapaxes(self.turn, 1, 2) @ self.beta
+        both = left[..., a] * self.gamma[..., b]
         still = np.einsum("nd,nd->n", self.b[..., a], self.rest[..., b])
         found = np.empty(omega.shape, dtype=complex)
         for k in chunks(np.arange(len(omega)), omega.shape[1] * both.shape[1]):
@@ -252,14 +253,17 @@ def modal_response(
     whole = stiff + (beta**2 / lam[..., None]).sum(axis=1)
     eta = np.divide(lost, stiff, out=np.zeros_like(lost), where=stiff > NEAR * whole)
     mu, X = _complex_modes(lam, _seen(damping.loss, x, phi))
-    gamma = np.swapaxes(X, 1, 2) @ beta
+    gamma = np.linalg.solve(X, beta)  # of modes that coincide X need not be orthogonal
     return ModalResponse(*known, mu, gamma, rest / (1.0 + 1j * eta)[:, None], X)
 
 
 def _complex_modes(lam: Floats, L: Floats) -> tuple[Numbers, Numbers]:
-    """μ (n, r) and X (n, r, r) with (Λ + iL) X = X diag(μ), XᵀX = I; L (n, r, r)."""
-    mu, X = np.linalg.eig(lam[..., None] * np.eye(lam.shape[1]) + 1j * L)
-    return mu, X / np.sqrt(np.einsum("nij,nij->nj", X, X))[:, None]
+    """μ (n, r) and X (n, r, r) with (Λ + iL) X = X diag(μ); L (n, r, r).
+
+    Of the inverse, whose largest eigenvalues are those of the lowest modes.
+    """
+    nu, X = np.linalg.eig(np.linalg.inv(lam[..., None] * np.eye(lam.shape[1]) + 1j * L))
+    return 1.0 / nu, X
 
 
 def _modes_up_to(pencil: Pencil, theta: Floats, highest: float) -> tuple[Floats, Floats]:
