@@ -261,12 +261,10 @@ def responding(case: BuiltCase, drawn: Mapping[str, object], y: str | None = Non
     file = case.file if y is None else case.file.with_design(pose_and_design(case, None, y)[1])
     if drawn:
         context = {"space": file.mechanism.space, "folder": None}
-        keys, wrong = validated_part(DrawnResponse, read_mapping(drawn, "response").tree, context)
-        wrong += [
-            (("at",), problem)
-            for place in (keys.places if keys else ())
-            if (problem := node_problem(file.mechanism, place.at))
-        ]
+        body = read_mapping(drawn, "response").tree
+        keys, wrong = validated_part(DrawnResponse, body, context, "response")
+        named = [node_problem(file.mechanism, place.at) for place in (keys.places if keys else ())]
+        wrong += [(("response", "at"), problem) for problem in named if problem]
         if keys is None or wrong:
             raise UsageError("; ".join(f"{dotted(path)}: {message}" for path, message in wrong))
         file = replace(file, response=keys)

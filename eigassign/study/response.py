@@ -93,8 +93,9 @@ def _together(ends: Sequence[NDArray[np.complex128]]) -> NDArray[np.complex128]:
 
 def _frequencies(key: DrawnResponse, found: Sequence[ModalResponse]) -> Floats:
     least = min(float(m.zeta.min(initial=1.0, where=m.zeta > 0.0)) for m in found)
-    count = 4.0 / least * np.log(key.highest / key.lowest)
-    return np.unique(np.geomspace(key.lowest, key.highest, int(np.clip(count, FEWEST, MOST))))
+    wanted = np.clip(4.0 / least * np.log(key.highest / key.lowest), FEWEST, MOST)
+    count = int(wanted) if key.highest > key.lowest else 1
+    return np.geomspace(key.lowest, key.highest, count)
 
 
 def _free(key: DrawnResponse, hz: Floats, ratios: Sequence[Floats]) -> Iterator[FreeSpeeds]:

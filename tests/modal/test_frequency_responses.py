@@ -104,6 +104,15 @@ def exactly(one: Shaken, zeta: Floats) -> float:
     return OF_ALL + rounding_error(one.model.pencil, one.x[0], 3) / float(zeta.min())
 
 
+def of_four(one: Shaken, found: ModalResponse, K: Floats, eta: float = 0.0) -> Any:
+    """H by four modes and what the others do at rest."""
+    w, beta2, lam = one.omega[0][:, None], found.beta[0, :4, 0] ** 2, found.lam[0, :4]
+    zeta = 0.0 if eta else found.zeta[0, :4]
+    d = lam * (1.0 + 1j * eta) - w**2 + 2j * zeta * w * np.sqrt(lam)
+    left = one.b[0] @ np.linalg.solve(K, one.b[0]) - (beta2 / lam).sum()
+    return (beta2 / d).sum(axis=1) + left / (1.0 + 1j * eta)
+
+
 def few_are_enough(one: Shaken, found: ModalResponse) -> bool:
     """Where four modes are seen, and the next lies above three times the highest frequency.
 
@@ -115,9 +124,7 @@ def few_are_enough(one: Shaken, found: ModalResponse) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_ratios_of_modes_are_a_matrix_that_is_diagonal_in_modes(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ratios_of_modes_are_a_matrix_that_is_diagonal_in_modes(seed: int) -> None:
     one = drawn(seed, damping={"ratio": 0.02, "modes": [0.005, 0.03]})
     (damping,) = dampings(one.model)
     found = one.responses(damping)
@@ -128,26 +135,20 @@ def test_ratios_of_modes_are_a_matrix_that_is_diagonal_in_modes(
     hz, phi = one.model.modes(one.x[:, :n_q], [], len(zeta))
     C = M @ phi[0] @ np.diag(4.0 * np.pi * zeta * hz[0]) @ phi[0].T @ M
     assert off(found.at(one.omega, 1, 0)[0], one.direct(K, C, seen=1)) < exactly(one, zeta)
-    monkeypatch.setattr("eigassign.modal.response.FEW", 4)
-    few = one.responses(damping, 1e-9)
-    assert few.lam.shape[1] == min(4, len(zeta))
     if few_are_enough(one, found):
-        assert off(few.at(one.omega)[0], one.direct(K, C)) < OF_FOUR
+        assert off(of_four(one, found, K), one.direct(K, C)) < OF_FOUR
 
 
 @pytest.mark.parametrize("seed", range(25, 50))
-def test_one_loss_factor_makes_the_stiffness_complex(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_loss_factor_makes_the_stiffness_complex(seed: int) -> None:
     one = drawn(seed, "equal")
     (damping,), K = dampings(one.model), stiffness_of(one)
     np.testing.assert_allclose(losses_of(one, damping), ETA * K, atol=1e-10 * np.abs(K).max())
     exact, found = one.direct(K * (1.0 + 1j * ETA)), one.responses(damping)
     assert off(found.at(one.omega)[0], exact) < exactly(one, found.zeta)
     np.testing.assert_allclose(found.zeta, 0.5 * ETA, rtol=1e-5)
-    monkeypatch.setattr("eigassign.modal.response.FEW", 4)
     if few_are_enough(one, found):
-        assert off(one.responses(damping, 1e-9).at(one.omega)[0], exact) < OF_FOUR
+        assert off(of_four(one, found, K, ETA), exact) < OF_FOUR
 
 
 @pytest.mark.parametrize("seed", range(50, 70))
@@ -182,3 +183,33 @@ def test_without_damping_it_is_what_the_mechanism_does_beside_resonances() -> No
     assert off(found.at(one.omega)[0], one.direct(stiffness_of(one))) < exactly(
         one, np.array([0.01])
     )
+
+
+@pytest.mark.parametrize("losses", ["ratios", "factors"])
+def test_of_many_modes_those_far_above_are_at_rest(losses: str) -> None:
+    """A fine mesh, of which 64 of 120 modes are solved: the others lie 30 times as high."""
+    steel = {"youngs_modulus": 210e9, "density": 7850}
+    tree: Any = {
+        "title": "arm",
+        "mechanism": {
+            "space": "planar",
+            "materials": {"steel": steel},
+            "sections": {"rod": {"shape": "circle", "diameter": 0.03}},
+            "links": {
+                "arm": {"length": 1.0, "material": "steel", "section": "rod", "elements": 60}
+            },
+            "joints": {"root": {"type": "revolute", "base": "ground", "follower": "arm.start"}},
+        },
+        "coordinates": {"q": {"joint": "root", "drive": {"stiffness": 2e4}}},
+    }
+    if losses == "factors":
+        steel["loss_factor"] = tree["coordinates"]["q"]["drive"]["loss_factor"] = 0.02
+    else:
+        tree["damping"] = 0.01
+    model = model_of(tree)
+    own, x = unit_forces(model, {"arm.end": [[0.0, 1.0]]}), model.x([0.3], [])
+    omega = 2.0 * np.pi * np.linspace(5.0, 200.0, 50)[None]
+    few = modal_response(model, dampings(model)[0], own, x, float(omega.max()))
+    every = modal_response(model, dampings(model)[0], own, x, 1e9)
+    assert few.lam.shape[1] < every.lam.shape[1]
+    assert off(few.at(omega), every.at(omega)) < 1e-5
