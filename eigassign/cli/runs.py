@@ -89,20 +89,19 @@ def expand(
 
 @click.command(
     epilog=arguments.examples(
-        'eigassign response milling_arm.yaml --at forearm.end --direction "0, 1" --from "40 Hz" '
+        'eigassign response planar_arm.yaml --at forearm.end --direction "0, 1" --from "5 Hz" '
         '--to "60 Hz" --teeth 4',
-        "eigassign response milling_arm.yaml --figures none --json",
     )
 )
 @arguments.case
-@click.option("--at", metavar="NODE", help="Node that is shaken (default: the case's response).")
-@click.option("--direction", metavar="VALUES", help="Along which direction, such as '0, 1'.")
+@click.option("--at", metavar="NODE", help="Node that is shaken (default: the case's responses).")
+@click.option("--direction", metavar="VALUES", help="'0, 1': along which (default: none).")
 @click.option("--seen", metavar="NODE", help="Node that is seen to move (default: the same).")
 @click.option("--along", metavar="VALUES", help="Along which direction (default: the same).")
-@click.option("--from", "lowest", metavar="FREQUENCY", help="Lowest frequency, such as '40 Hz'.")
-@click.option("--to", "highest", metavar="FREQUENCY", help="Highest frequency.")
-@click.option("--teeth", type=click.IntRange(1), help="Of a cutter: tells free spindle speeds.")
-@click.option("--harmonics", type=click.IntRange(1), help="Of the passing of teeth (default: 1).")
+@click.option("--from", "lowest", metavar="HZ", help="Lowest frequency, '40 Hz' (default: none).")
+@click.option("--to", "highest", metavar="HZ", help="Highest frequency (default: none).")
+@click.option("--teeth", type=click.IntRange(1), help="Of a cutter on the spindle (default: none).")
+@click.option("--harmonics", type=click.IntRange(1), help="Of its tooth passing (default: 1).")
 @arguments.design
 @arguments.writing("results/<case>_response")
 @arguments.json

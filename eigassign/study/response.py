@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from eigassign.case.schema.targets import DrawnResponse, PushedNode
 from eigassign.case.units import SI, Given
+from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.tracking import links
 from eigassign.modal.response import ModalResponse, Shaken, dampings, modal_response, unit_forces
@@ -28,7 +29,7 @@ FEWEST, MOST = 200, 4000  # frequencies of a response
 def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
     """What the case draws, of design y (n_y,), beside the initial one where that is another.
 
-    Raises MechanismError where a coordinate is free.
+    Raises MechanismError where a coordinate is free, and where nothing gives way.
     """
     keys, model, path = scene.file.responses, scene.model, scene.path
     every = dict.fromkeys((p.at, p.direction) for key in keys for p in key.places)
@@ -49,9 +50,11 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
             for ms in each
         ]
         size, found = np.abs(H[0]).max(axis=0), each[0]
+        if not size.any():
+            raise MechanismError("response", f"nothing gives way: {key.name}")
         k, j = np.unravel_index(size.argmax(), size.shape)
         mesh = None
-        if model.is_meshed and key.seen is None:
+        if model.is_meshed and key.seen is None and all(m.zeta.any() for m in found):
             ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
             both = (
                 Shaken.of(model, key.at, key.direction, ends, finer)
@@ -75,7 +78,7 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
             mesh=mesh,
             free=tuple(_free(key, modes_hz, ratios)),
             frequency_hz=hz,
-            stiffness=1.0 / size,
+            stiffness=1.0 / np.maximum(size, np.finfo(float).tiny),
             least_real=H[0].real.min(axis=(0, 1)),
             initial=initial,
             places=tuple(PushedNode(at=at, direction=d).name for at, d in order),

@@ -305,7 +305,7 @@ class ResponseRow(InOneUnit, Brief):
     at_hz: Annotated[Hertz, Fact("of the least", "at")]
     at_s: Annotated[Seconds, Fact("of the least, from the start of its trajectory", "at time")]
     before: Annotated[InUnit | None, Fact("the least of the initial design", may_lack=True)]
-    real: Annotated[InPower, Fact("the least real part of H, which limits chatter", "least Re H")]
+    real: Annotated[InPower, Fact("the least of H, limits chatter", "least Re H", may_lack=True)]
     mesh: Annotated[Share | None, Fact("what twice the elements change of the least", "mesh")]
     free: Annotated[tuple[FreeSpeeds, ...], Fact("of the spindle", name="free_speeds")]
     frequency_hz: Unwritten[Floats]  # (k,)

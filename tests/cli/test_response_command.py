@@ -181,6 +181,16 @@ def test_wrong_cases_are_named_with_their_lines(
     assert told in capsys.readouterr().err
 
 
+def test_where_nothing_gives_way_that_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A response at a pivot on the ground."""
+    case = written(tmp_path, f"{ARM}\ndamping: 1 %\n")
+    given = ["--at", "upper_arm.start", *TOOL[2:], "--out", str(tmp_path / "out")]
+    assert main(["response", case, *given]) == 2
+    assert "nothing gives way: upper_arm.start" in capsys.readouterr().err
+
+
 def test_without_damping_that_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case = written(tmp_path, ARM)
     more = [*QUICK[:-1], "--out", str(tmp_path / "out")]

@@ -348,6 +348,8 @@ def damping_is_stated_once(document: Document) -> Iterator[Finding]:
     if lossy and document.damping is not None:
         yield lossy[0], "is given beside damping, the ratios of modes: state it in one way"
     free = [name for name, own in drives if own.moves == "free"]
+    if free and document.response is not None:
+        yield ("response",), f"needs what holds {listed(free)}: give a drive stiffness, or lock it"
     for k, target in enumerate(document.targets):
         if isinstance(target, ResponseTarget):
             path = ("targets", k, "response")
