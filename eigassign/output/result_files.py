@@ -11,7 +11,7 @@ import csv
 import io
 import math
 from collections.abc import Iterator, Sequence
-from itertools import count, repeat
+from itertools import count, repeat, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,44 +62,35 @@ def frequency_columns(results: RunResults) -> list[Column]:
 
 
 def _response_files(results: RunResults) -> dict[str, bytes]:
-    """modes.csv: a row a sample and mode; response.csv: a row a frequency; maps in response.h5."""
+    """modes.csv: a row a sample and mode; response.csv: a row a frequency; H in response.h5."""
     if not results.responses:
         return {}
     last = max(results.responses, key=lambda row: row.modes_hz.shape[1])
     n, r = last.modes_hz.shape
-    modes: list[Column] = [
-        (head, [v for v in own for _ in range(r)]) for head, own in _samples(results)
-    ]
-    modes += [("mode", [*range(1, r + 1)] * n), ("tracked", last.tracked.ravel().tolist())]
-    modes.append(("frequency [Hz]", last.modes_hz.ravel().tolist()))
-    ends = ("", "") if len(last.ratios) < 2 else (" least", " most")
-    modes += [
-        (f"damping ratio{e} [1]", z.ravel().tolist())
-        for e, z in zip(ends, last.ratios, strict=False)
-    ]
+    heads = ("",) if len(last.ratios) < 2 else (" least", " most")
+    own: dict[str, Floats] = {"frequency [Hz]": last.modes_hz}
+    own |= {f"damping ratio{e} [1]": z for e, z in zip(heads, last.ratios, strict=True)}
     with np.errstate(divide="ignore"):
-        for place, own in zip(last.places, np.moveaxis(last.constants, 2, 0), strict=True):
-            mass = 1.0 / own**2
-            stiffness = mass * (2.0 * np.pi * last.modes_hz) ** 2
-            for head, v in (
-                ("constant", own),
-                ("modal mass", mass),
-                ("modal stiffness", stiffness),
-            ):
-                unit = {"constant": "1/sqrt(kg)", "modal mass": "kg"}.get(head, "N/m")
-                modes.append((f"{place} {head} [{unit}]", v.ravel().tolist()))
-    rows, arrays = list[Column](), {"time_s": results.time_s, "q": results.q}
+        for place, constant in zip(last.places, np.moveaxis(last.constants, 2, 0), strict=True):
+            own[f"{place} constant [1/sqrt(kg)]"] = constant
+            own[f"{place} modal mass [kg]"] = mass = 1.0 / constant**2
+            own[f"{place} modal stiffness [N/m]"] = mass * (2.0 * np.pi * last.modes_hz) ** 2
+    modes: list[Column] = [(h, [v for v in one for _ in range(r)]) for h, one in _samples(results)]
+    modes += [("mode", [*range(1, r + 1)] * n), ("tracked", last.tracked.ravel().tolist())]
+    modes += [(head, values.ravel().tolist()) for head, values in own.items()]
+    table, arrays = dict[str, Floats](), {"time_s": results.time_s, "q": results.q}
     for k, one in enumerate(results.responses, 1):
-        columns = {"frequency [Hz]": one.frequency_hz, "least dynamic stiffness [N/m]":
-                   one.stiffness.min(axis=0), "least real part [m/N]": one.least_real}  # fmt: skip
-        columns |= {} if one.initial is None else {"initial dynamic stiffness [N/m]": one.initial}
-        rows += [(f"{one.name} {head}", own.tolist()) for head, own in columns.items()]
-        arrays |= {f"{k}/frequency_hz": one.frequency_hz, f"{k}/dynamic_stiffness": one.stiffness}
+        table[f"{one.name} frequency [Hz]"] = one.frequency_hz
+        table[f"{one.name} least dynamic stiffness [N/m]"] = one.stiffness.min(axis=0)
+        table[f"{one.name} least real part [m/N]"] = one.least_real
+        if one.initial is not None:
+            table[f"{one.name} least dynamic stiffness, initial [N/m]"] = one.initial
+        arrays |= {f"{k}/{key}": getattr(one, key) for key in ("frequency_hz", "response")}
     named = {str(k): one.name for k, one in enumerate(results.responses, 1)}
-    tall = max(len(own) for _, own in rows)
-    table = [(head, [*own, *[math.nan] * (tall - len(own))]) for head, own in rows]
-    return {"modes.csv": csv_text(modes), "response.csv": csv_text(table),
-            "response.h5": hdf5(arrays, named)}  # fmt: skip
+    rows = zip_longest(*table.values(), fillvalue=math.nan)
+    columns = zip(table, map(list, zip(*rows, strict=True)), strict=True)
+    files = {"modes.csv": csv_text(modes), "response.csv": csv_text([*columns])}
+    return files | {"response.h5": hdf5(arrays, named)}
 
 
 def _samples(results: RunResults) -> Iterator[Column]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,14 +30,7 @@ from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.output.store.run_folder import UNFINISHED, unfinished_beside
 from eigassign.pipeline.queries import pose_and_design
-from eigassign.pipeline.stages import (
-    RunFolder,
-    Stages,
-    coefficient_files,
-    expand_plan,
-    new_run_folder,
-    silent,
-)
+from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
 from eigassign.study.collect import between_samples, collect_results
@@ -226,34 +218,30 @@ def _responses(scene: Scene, y: Floats, stages: Stages) -> tuple[ResponseRow, ..
         return tuple(study_responses(scene, y))
 
 
-def respond(
-    given: BuiltCase, options: Options = DEFAULT, folder: RunFolder | None = None
-) -> RunResults:
-    """Responses of a case as it is written, along its trajectory, into a ``folder`` if any.
+def respond(case: BuiltCase, options: Options = DEFAULT) -> RunResults:
+    """Responses of a case as it is written, along its trajectory; nothing written.
 
     Raises CaseError where the case has no trajectory, or a coordinate is free.
     """
-    stages = Stages(options.progress)
-    needs = {"trajectory": given.file.trajectory, "response": given.file.responses}
-    told = {key: (bool(own), "what to draw, and where") for key, own in needs.items()}
-    given.file.require("eigassign response", told)
-    with given.located():
-        scene = prepare(given, stages, None, assigned=True)
+    stages, file = Stages(options.progress), case.file
+    needs = {"trajectory": bool(file.trajectory), "response": bool(file.responses)}
+    told = {key: (given, "what is drawn, and where") for key, given in needs.items()}
+    file.require("eigassign response", told)
+    with case.located():
+        scene = prepare(case, stages, None, assigned=True)
         accuracy, drawn = study_accuracy(scene), _responses(scene, scene.initial, stages)
-    results = collect_results(scene, ModeStudies(), accuracy, None, (), stages.timing_s, drawn)
-    if folder is not None:
-        folder.write(results, options.figures, options.report)
-    return results
+    return collect_results(scene, ModeStudies(), accuracy, None, (), stages.timing_s, drawn)
 
 
 def respond_case(
     path: str | Path, options: Options, drawn: Mapping[str, object], y: str | None
 ) -> Outcome:
     """`respond` into a run folder; ``drawn`` are keys of a response instead of the case's."""
-    case, started = responding(load_case(path, options.allow_outside), drawn, y), perf_counter()
+    case = responding(load_case(path, options.allow_outside), drawn, y)
     with new_run_folder(case.file, options.out, options.force, "_response") as folder:
-        results = respond(case, options, folder)
-    return Outcome(folder.path, results, perf_counter() - started)
+        results = respond(case, options)
+        folder.write(results, options.figures, options.report)
+    return Outcome(folder.path, results, sum(results.timing_s.values()))
 
 
 def responding(case: BuiltCase, drawn: Mapping[str, object], y: str | None = None) -> BuiltCase:

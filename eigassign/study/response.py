@@ -37,40 +37,36 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
     order = [(at, d) for at, own in nodes.items() for d in own]
     designs = [y] if np.array_equal(y, scene.initial) else [y, scene.initial]
     samples = [model.x(path.at(each)[0], each) for each in designs]
-    own = unit_forces(model, nodes)
+    own, damped = unit_forces(model, nodes), dampings(model)
     for key in keys:
         a, b = (order.index((p.at, p.direction)) for p in key.places)
         highest = 2.0 * np.pi * key.highest * key.harmonics
-        each = [
-            [modal_response(model, d, own, x, highest) for d in dampings(model)] for x in samples
-        ]
-        hz = _frequencies(key, each[0])
-        H = [
-            _together([m.at(np.tile(2.0 * np.pi * hz, (len(m.x), 1)), a, b) for m in ms])
-            for ms in each
-        ]
-        size, found = np.abs(H[0]).max(axis=0), each[0]
-        if not size.any():
+        each = [[modal_response(model, d, own, x, highest) for d in damped] for x in samples]
+        found, hz = each[0], _frequencies(key, each[0])
+        w = np.tile(2.0 * np.pi * hz, (len(path.time_s), 1))
+        H = np.array([[one.at(w, a, b) for one in ends] for ends in each])
+        H = np.where(np.isfinite(H), H, -np.inf)  # at a peak without damping
+        size = np.abs(H).max(axis=1)
+        if not size[0].any():
             raise MechanismError("response", f"nothing gives way: {key.name}")
-        k, j = np.unravel_index(size.argmax(), size.shape)
+        k, j = np.unravel_index(size[0].argmax(), size[0].shape)
         mesh = None
         if model.is_meshed and key.seen is None and all(m.zeta.any() for m in found):
             ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
-            both = (
-                Shaken.of(model, key.at, key.direction, ends, finer)
-                .at(samples[0][[k]], np.zeros(samples[0].shape[1], dtype=bool))[0]
-                .max()
-                for finer in (True, False)
+            none, worst = np.zeros(samples[0].shape[1], dtype=bool), samples[0][[k]]
+            coarse, fine = (
+                Shaken.of(model, key.at, key.direction, ends, finer).at(worst, none)[0].max()
+                for finer in (False, True)
             )
-            mesh = abs(next(both) / next(both) - 1.0)
+            mesh = abs(float(fine / coarse) - 1.0)
         shown = max(4, int((found[0].lam < (2.0 * highest) ** 2).any(axis=0).sum()))
         modes_hz = np.sqrt(found[0].lam[:, :shown]) / (2.0 * np.pi)
         ratios = tuple(m.zeta[:, :shown] for m in found)
-        initial = 1.0 / np.abs(H[1]).max(axis=(0, 1)) if len(H) > 1 else None
+        initial = 1.0 / size[1].max(axis=0) if len(size) > 1 else None
         yield ResponseRow(
             name=key.name,
             unit=UNIT,
-            least=1.0 / float(size[k, j]),
+            least=1.0 / float(size[0, k, j]),
             at_hz=float(hz[j]),
             at_s=float(path.time_s[k]),
             before=None if initial is None else float(initial.min()),
@@ -78,8 +74,7 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
             mesh=mesh,
             free=tuple(_free(key, modes_hz, ratios)),
             frequency_hz=hz,
-            stiffness=1.0 / np.maximum(size, np.finfo(float).tiny),
-            least_real=H[0].real.min(axis=(0, 1)),
+            response=H[0],
             initial=initial,
             places=tuple(PushedNode(at=at, direction=d).name for at, d in order),
             constants=found[0].beta[:, :shown],
@@ -87,11 +82,6 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
             ratios=ratios,
             tracked=_tracked(found[0], path, shown),
         )
-
-
-def _together(ends: Sequence[NDArray[np.complex128]]) -> NDArray[np.complex128]:
-    """H (ends, n, k), which is infinite at a peak without damping."""
-    return np.where(np.isfinite(H := np.array(ends)), H, -np.inf)
 
 
 def _frequencies(key: DrawnResponse, found: Sequence[ModalResponse]) -> Floats:

@@ -309,14 +309,24 @@ class ResponseRow(InOneUnit, Brief):
     mesh: Annotated[Share | None, Fact("what twice the elements change of the least", "mesh")]
     free: Annotated[tuple[FreeSpeeds, ...], Fact("of the spindle", name="free_speeds")]
     frequency_hz: Unwritten[Floats]  # (k,)
-    stiffness: Unwritten[Floats]  # (n, k), N/m
-    least_real: Unwritten[Floats]  # (k,), m/N
+    response: Unwritten[NDArray[np.complex128]]  # H (1 or 2 ends, n, k), m/N
     initial: Unwritten[Floats | None]  # (k,), N/m: the least of the initial design
     places: Unwritten[tuple[str, ...]]  # m nodes and directions
     constants: Unwritten[Floats]  # b·φ (n, r, m), 1/√kg
     modes_hz: Unwritten[Floats]  # (n, r)
     ratios: Unwritten[tuple[Floats, ...]]  # ζ (n, r), at both ends of a range
     tracked: Unwritten[Numbers]  # (n, r): what number a mode has where its trajectory begins
+
+    @property
+    def stiffness(self) -> Floats:
+        """1/|H| (n, k) in N/m, of the worse end."""
+        size = np.abs(self.response).max(axis=0)
+        return np.asarray(1.0 / np.maximum(size, np.finfo(float).tiny))
+
+    @property
+    def least_real(self) -> Floats:
+        """Re H (k,) in m/N, the least of all samples."""
+        return np.asarray(self.response.real.min(axis=(0, 1)))
 
 
 @dataclass(frozen=True)
