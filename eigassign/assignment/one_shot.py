@@ -247,10 +247,7 @@ def _units(A: Floats, lower: Floats, upper: Floats, y0: Floats) -> Floats:
 
 
 def _optimum(program: Program, names: Sequence[str]) -> tuple[Solved, int]:
-    """The optimum and the rank of A: of all optima the one nearest to x = 0.
-
-    The multipliers of one optimum belong to every other: those z that have the same A z.
-    """
+    """The optimum and the rank of A: of all optima the one nearest to x = 0."""
     n = program.cost.size
     solved = solve_program(program)
     if solved is None:

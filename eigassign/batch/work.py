@@ -139,10 +139,7 @@ def outcome_of(
 def _solved(
     variant: Variant, options: CaseOptions, ended: Callable[..., CaseOutcome]
 ) -> CaseOutcome:
-    """The outcome of a case, which stands in run.json of its folder.
-
-    That no design meets the limits is an answer too: a folder without results.
-    """
+    """The outcome of a case, which stands in run.json of its folder."""
     case, written = load(variant, options), _written(variant.path)
     if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
         raise UsageError(

@@ -95,12 +95,7 @@ def process_pool(workers: int) -> Iterator[Executor]:
 
 
 def _stop(pool: Executor, workers: set[Any]) -> None:
-    """Start nothing more, end the workers, and wait until the pool has taken note of their ends.
-
-    They may remove their temporary folders; those that take too long are killed. The pool's own
-    thread waits for the same processes: until it is done, a worker that it has reaped still counts
-    as alive here.
-    """
+    """Start nothing more, end the workers, and wait until the pool has taken note of their ends."""
     ending = threading.Thread(target=pool.shutdown, args=(True,), kwargs={"cancel_futures": True})
     ending.daemon = True
     ending.start()

@@ -166,11 +166,7 @@ def read_words(file: Path, key: str) -> list[tuple[int, list[str]]]:
 
 
 def _rows(file: Path, key: str) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of every line that says something; decimals take a point.
-
-    The first of these lines has the separator. Decimals may take a comma where it does not
-    separate, and no number of the file has a point.
-    """
+    """Line number and cells of every line that says something; decimals take a point."""
     text = _text(file, key)
     lines = io.StringIO(text, newline="")
     told = (line for line in lines if line.strip() and not line.lstrip().startswith("#"))
@@ -227,10 +223,7 @@ def _text(file: Path, key: str) -> str:
 def _headings(
     header: Sequence[str], columns: Sequence[CsvColumn]
 ) -> tuple[list[str], list[_Heading]]:
-    """The names in a header of `name` or `name [unit]`, and the ``columns`` that are there.
-
-    Raises ValueError.
-    """
+    """The names in a header of `name` or `name [unit]`, and the ``columns`` that are there."""
     names, units = list[str](), list[str]()
     for cell in header:
         if (match := _HEADER_CELL.fullmatch(cell)) is None:
@@ -255,10 +248,7 @@ def _headings(
 
 
 def _behind(name: str, names: Sequence[str], column: CsvColumn) -> tuple[str, str | None] | None:
-    """The name in the header and the unit that stands behind it, as ``name (deg)`` or ``x_deg``.
-
-    The latter only where the case says that the column is called so.
-    """
+    """The name in the header and the unit that stands behind it, as ``name (deg)`` or ``x_deg``."""
     for own in (other for other in names if other == name or other.startswith(f"{name} (")):
         match = _UNIT_BEHIND.fullmatch(own)
         written = match and (match.group(2) or (match.group(3) if column.written else ""))

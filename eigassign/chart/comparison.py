@@ -144,10 +144,7 @@ def _tasks(
 
 
 def _by_shape(subject: Subject, tests: Points) -> Floats:
-    """Frequencies (n, n_modes) of modes of one shape, NaN at most points and where it is lost.
-
-    The shapes are those of the test point at which neighbours are farthest from each other.
-    """
+    """Frequencies (n, n_modes) of modes of one shape, NaN at most points and where it is lost."""
     pencil, highest = subject.model.pencil, max(subject.modes)
     hz = np.full((len(tests), len(subject.modes)), np.nan)
     if pencil.n_dof > SOUGHT_DOF:
@@ -223,10 +220,7 @@ def reaches(rows: Sequence[BoxRow], accuracy: float) -> Iterator[Reach]:
 
 
 def _timed(jobs: Sequence[Callable[[], object]], repeats: int) -> list[tuple[float, float]]:
-    """Least and median seconds of each job by turns; short ones run many times at a turn.
-
-    All have run before, so that nothing is imported or made for the first time.
-    """
+    """Least and median seconds of each job by turns; short ones run many times at a turn."""
     spent, many = [list[float]() for _ in jobs], [1] * len(jobs)
     for turn in range(repeats):
         for k, job in enumerate(jobs):
@@ -339,10 +333,7 @@ def _near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
 
 
 def _numbers_at(subject: Subject, a: Floats, b: Floats, count: int) -> Floats:
-    """What numbers (n, count) the shapes of the lowest modes at a have at b.
-
-    ``count`` where another one has not come; NaN of shapes that are not unique.
-    """
+    """What numbers (n, count) the shapes of the lowest modes at a have at b."""
     try:
         (hz, before), (_, after) = (subject.model.modes(*subject.split(x), count) for x in (a, b))
     except EigassignError:  # somewhere there are no modes

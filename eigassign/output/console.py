@@ -95,12 +95,7 @@ def _styled(text: str, style: str, out: TextIO) -> str:
 
 
 def _drawn(table: Table, room: int, out: TextIO) -> Iterator[str]:
-    """A table in lines: columns in groups that fit side by side, each behind those that name rows.
-
-    The first column names the rows, or the first two where it alone does not tell them apart.
-    Numbers are always whole; text may be narrowed to a third of the room, or, where that does not
-    bring all columns side by side, to half of it.
-    """
+    """A table in lines: columns in groups that fit side by side, each behind those that name rows."""
     rows = [[printable(cell) for cell in row] for row in table.rows]
     cells = [[row[k] for row in rows] for k in range(len(table.columns))]
     longest = [max(map(_size, column), default=1) for column in cells]

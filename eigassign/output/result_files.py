@@ -118,10 +118,7 @@ def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
 
 
 def _assigned(results: RunResults) -> Iterator[Column]:
-    """One group of columns a wanted mode, limit or band, whichever trajectories it holds on.
-
-    A group has each sample once: of what is asked twice of a mode, the second has its own group.
-    """
+    """One group of columns a wanted mode, limit or band, whichever trajectories it holds on."""
     groups: dict[str, list[TargetStudy]] = {}
     for target in results.targets:
         name = target.asked.curve_name if target.asked.is_goal else target.label

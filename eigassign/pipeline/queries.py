@@ -108,10 +108,7 @@ FEW = 4  # modes, where no number is asked for
 
 
 def _with_modes(case: BuiltCase, count: int | None) -> tuple[BuiltCase, int]:
-    """The case with links reduced so that as many modes as are asked for are right, and how many.
-
-    Without a number at most as many as there are.
-    """
+    """The case with links reduced so that as many modes as are asked for are right, and how many."""
     with case.located():
         most = len(case.model().pencil.elastic)
     if count is None or count <= most:
@@ -290,10 +287,7 @@ def next_step(case: CaseFile) -> str:
 
 
 def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> Iterator[Problem]:
-    """What a colleague would ask of the lowest modes at one pose.
-
-    Exact solves: a mechanism without mass or stiffness is found here, at its line.
-    """
+    """What a colleague would ask of the lowest modes at one pose."""
     file, model = case.file, case.model()
     q = some_pose(case)[None] if q is None else q
     ours = [one for one in asked if not one.is_aim and not one.followed and one.mode_terms]

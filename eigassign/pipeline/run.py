@@ -304,10 +304,7 @@ def _result(
 
 
 def _first_curve(results: RunResults) -> tuple[Floats, Floats, Floats, Floats | None, Floats]:
-    """Times, and the first target's frequencies: wanted, initial, predicted and exact.
-
-    Without a target those of the lowest mode, with none wanted.
-    """
+    """Times, and the first target's frequencies: wanted, initial, predicted and exact."""
     if results.targets:
         first = results.targets[0]
         times = results.time_s[first.asked.rows]

@@ -195,10 +195,7 @@ class _Tree(ElementTree.TreeBuilder):
 def _parsed(
     path: Path,
 ) -> tuple[str, dict[str, Inertial | None], list[_Joint], dict[str, int]]:
-    """Name, links, joints and lines of links of a file without its meshes.
-
-    Raises UsageError with all that is wrong, StorageError.
-    """
+    """Name, links, joints and lines of links of a file without its meshes."""
     try:
         data = read_bytes(path, CASE)
     except (FileNotFoundError, NotADirectoryError):

@@ -46,10 +46,7 @@ def multiply(space: LowerSet, a: Floats, b: Floats) -> Floats:
 
 
 def _multiply_present(space: LowerSet, a: Floats, b: Floats, used_a: Used, used_b: Used) -> Floats:
-    """The product over the pairs of coefficients that any row of a and any row of b has.
-
-    Of a loop's closure equations (six_bar, order 8) it makes the series of θ in half the time.
-    """
+    """The product over the pairs of coefficients that any row of a and any row of b has."""
     table = space.table
     keep = np.flatnonzero(used_a[table.left] & used_b[table.right])
     target, result = table.target[keep], np.zeros_like(a)

@@ -188,12 +188,7 @@ def _nearest(
     y: Floats,
     allowed: float,
 ) -> float | None:
-    """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
-
-    Within the linear limits and those of the ``others`` that hold at this sample, with each
-    combination of catalogues. The search ends with the first start that leads within ``allowed`` of
-    it. None where none leads to a design within the limits, or there are many combinations.
-    """
+    """The frequency nearest to the one wanted at sample k of the target, by a search of its own."""
     at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
     there = AssignedFrequency(
         *(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal),

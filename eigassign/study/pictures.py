@@ -247,10 +247,7 @@ def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:
 
 
 def _farthest_travelled(file: CaseFile, model: Model, x: Floats, seams: Sequence[int]) -> Floats:
-    """The path of the node that travels farthest, where the case names no tip.
-
-    (n, d), NaN between the end of a trajectory and the next, which begins at a row of ``seams``.
-    """
+    """The path of the node that travels farthest, where the case names no tip."""
     nodes = [model.poses.world(*node) for node in _named_nodes(file, model)]
     paths = np.insert(np.stack(model.poses.values(x, nodes)), list(seams), np.nan, axis=1)
     way = np.nansum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)

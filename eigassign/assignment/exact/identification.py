@@ -199,10 +199,7 @@ def identify(
 def _are_same(
     problem: DesignProblem, a: Optimum, b: Optimum, explains: Callable[[Optimum], bool]
 ) -> bool:
-    """True where two minima are one: a way joins them; of such as explain nothing, χ² is equal.
-
-    The way is nowhere worse by more than measurements notice (`has_way`).
-    """
+    """True where two minima are one: a way joins them; of such as explain nothing, χ² is equal."""
     if not (explains(a) and explains(b)):
         return abs(a.objective - b.objective) <= SAME * max(a.objective, b.objective)
     most = MET, max(a.objective, b.objective) + NOTICED**2
@@ -253,11 +250,7 @@ def _directions(slopes: Floats) -> tuple[Floats, Floats]:
 
 
 def _unidentified(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> Floats:
-    """Directions (k, n_y) that the measurements do not notice, away from bounds that hold.
-
-    A held parameter takes no part where the direction would lead another out of its bound, or
-    where its own bound holds it by more than the measurements' noise.
-    """
+    """Directions (k, n_y) that the measurements do not notice, away from bounds that hold."""
     width = problem.upper - problem.lower
     inwards = np.array([{"lower": 1.0, "upper": -1.0, "": 0.0}[side] for side in held])
     slopes = fit.seen.slopes * width
@@ -292,11 +285,7 @@ def _held(fit: Optimum, n: int) -> tuple[str, ...]:
 
 
 def _apart(directions: Floats, first: Bools) -> Floats:
-    """A basis (k, n) of the same space whose vectors share as few parameters as can be.
-
-    Each vector has a parameter, its entry 1, that no other has (Gauss–Jordan, largest pivots, of
-    parameters in ``first`` before others).
-    """
+    """A basis (k, n) of the same space whose vectors share as few parameters as can be."""
     basis = directions.copy()
     for row in range(len(basis)):
         sizes = np.abs(basis[row:]).max(axis=0)
@@ -314,11 +303,7 @@ def _apart(directions: Floats, first: Bools) -> Floats:
 
 
 class _Profile:
-    """χ² along each parameter, the others fitted anew; remembers the best fit that it meets.
-
-    And every fit that χ² allows: each lies within the intervals of all parameters, so that what one
-    profile comes upon widens the others'.
-    """
+    """χ² along each parameter, the others fitted anew; remembers the best fit that it meets."""
 
     def __init__(self, problem: DesignProblem, fit: Optimum, doubtful: bool) -> None:
         self.problem, self.fit, self.best, self.doubtful = problem, fit, fit, doubtful
@@ -396,11 +381,7 @@ class _Profile:
         return NOTICED * float(self.width[j] / max(float(np.linalg.norm(rest)), 1e-300))
 
     def _refitted(self, j: int, at: float, near: Optimum, everywhere: bool) -> Optimum | None:
-        """The best fit with y_j ``at`` a value; None where the model has no answer there.
-
-        It starts from ŷ; where χ² does not allow what that leads to, on the line from ŷ through
-        ``near``, and ``everywhere`` from both corners of the bounds, too.
-        """
+        """The best fit with y_j ``at`` a value; None where the model has no answer there."""
         centre, best = self.fit.y, None
         along = near.y - centre
         line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)

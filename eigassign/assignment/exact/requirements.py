@@ -198,11 +198,7 @@ class Requirements:
         return max(worst, 0.0), np.concatenate([np.zeros(0), *residual])
 
     def _pairs(self, found: Frequencies, m: int) -> NeighbourPairs | None:
-        """Rows of one mode beside its neighbours; None where nothing is known of these.
-
-        Squares of errors of neighbours that are both wanted are smooth together where they meet at
-        the frequency that is wanted of both: they make no pair.
-        """
+        """Rows of one mode beside its neighbours; None where nothing is known of these."""
         if found.mixed is None:
             return None
         parts: list[NeighbourPairs] = []

@@ -211,10 +211,7 @@ def _along(path: Trajectories, rows: slice) -> Iterator[tuple[str, slice]]:
 
 
 def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:
-    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time.
-
-    A profile runs linearly in time between its points, and is not extrapolated.
-    """
+    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time."""
     if not isinstance(curve, FrequencyProfile):
         return np.full(rows.stop - rows.start, float(curve))
     found, knots = [], np.array(curve.time)

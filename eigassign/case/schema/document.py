@@ -116,10 +116,7 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
 
 
 def _with_entries_apart(tree: Tree) -> Tree:
-    """In the file the entries stand directly under `design`, beside the reserved names.
-
-    A parameter may be called by a reserved name too: it was possible before the name was reserved.
-    """
+    """In the file the entries stand directly under `design`, beside the reserved names."""
     design = tree.get("design")
     if not isinstance(design, Mapping):
         return tree

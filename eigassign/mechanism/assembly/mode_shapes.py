@@ -154,11 +154,7 @@ def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Link
 
 
 def _spokes(link: str, mesh: LinkMesh, poses: LinkFrames) -> tuple[Strand, ...]:
-    """The connections drawn of a rigid link or a superelement, each as one element.
-
-    That is straight for a rigid link; between the nodes of a superelement, of which nothing else
-    is known, it has the nodes' displacements and slopes.
-    """
+    """The connections drawn of a rigid link or a superelement, each as one element."""
     none = Shear(0.0, 0.0)
     return tuple(
         Strand(

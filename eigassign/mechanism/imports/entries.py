@@ -201,10 +201,7 @@ def read_matlab(data: bytes) -> Contents | None:
 
 
 def _sent(data: bytes) -> bytes:
-    """What the other process makes of the file.
-
-    Raises UnfitError for more than limits allow, ValueError for a file that it does not survive.
-    """
+    """What the other process makes of the file."""
     room = int(raised(MATRIX))
     memory = int(_START + _ENTRY * raised(ENTRIES) + 2 * len(data))
     seconds = int(max(_SECONDS, raised(_SECONDS)) + len(data) / _PACE)

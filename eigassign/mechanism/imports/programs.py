@@ -235,10 +235,7 @@ def _matrix(cards: list[bytes]) -> Matrix:
 
 
 def _grid(card: bytes, moved: bool) -> tuple[int, Floats]:
-    """Number and place; NaN where the place or the freedoms are in a system of their own.
-
-    They may be where a card ``moved`` those that name none.
-    """
+    """Number and place; NaN where the place or the freedoms are in a system of their own."""
     fields = fields_of(card)
     node, system, *_ = entries.wholes(fields[:2]).tolist()
     own = moved or system or (entries.wholes(fields[5:6])[0] if len(fields) > 5 else 0)

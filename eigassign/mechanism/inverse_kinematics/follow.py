@@ -210,10 +210,7 @@ def at_parameters(followed: Followed, course: Course) -> Floats:
 
 
 def _along(ik: TipProblem, course: Course, u0: Floats) -> tuple[Floats, Trace]:
-    """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends.
-
-    With the trace that they are found from.
-    """
+    """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
     for turn in _TURNS:
         path = trace(ik, course, u0, turn)
         n = int(np.searchsorted(course.s, path.s[-1], side="right"))
@@ -260,10 +257,7 @@ def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
 
 
 def _own(ik: TipProblem, u: Floats) -> Floats:
-    """States with the passive freedoms that the model itself has, coming from its reference.
-
-    Raises SingularityError where the model has none.
-    """
+    """States with the passive freedoms that the model itself has, coming from its reference."""
     if ik.chain.assembly is None:
         return u
     q = ik.coordinates(u)

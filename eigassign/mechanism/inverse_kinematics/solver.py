@@ -181,10 +181,7 @@ def prepare(
 def _spread(
     chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
 ) -> Floats:
-    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows.
-
-    That is a turn, or as far about a place ``near`` as the path and the tip may be.
-    """
+    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows."""
     (matrix, offset), n_q = chain.relative_map, chain.n_q
     middle = matrix @ (np.zeros(n_q) if near is None else near[:n_q]) + offset
     seen = chain.evaluate(np.zeros((1, len(chain.kinds))))

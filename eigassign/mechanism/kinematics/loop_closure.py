@@ -334,10 +334,7 @@ class _Branches:
         )
 
     def _elsewhere(self) -> str:
-        """The clause on another pose at which the loops close; nothing where none is found.
-
-        Of some poses that whose ways to close stay furthest from dead points.
-        """
+        """The clause on another pose at which the loops close; nothing where none is found."""
         best, text = RANK, ""
         varied = [v for v in self.used if v < len(self.q)]
         turning = np.array(self.case.coordinate_units)[varied] == "rad"
@@ -371,10 +368,7 @@ class _Branches:
         return ""
 
     def _unclosable(self) -> str:
-        """The sentence on loops that do not close: too many conditions, or too little length.
-
-        Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
-        """
+        """The sentence on loops that do not close: too many conditions, or too little length."""
         message, n = f"the loops cannot be closed at {self._at}", self.function.n_equations
         met = int(np.linalg.matrix_rank(self._equations(self._starts)[2], RANK).max())
         p = self._descended(self._starts)

@@ -148,10 +148,7 @@ def bubbles(count: int, xi: Any) -> Any:
 
 
 def _matrices(x: Floats, rows: Ints, count: int, nu: float) -> tuple[Floats, Floats]:
-    """K_b,nb (m, 3 k, 3 n_nodes + 3 k) and ∫ N_b N_n dV of elements with nodes x (m, n_nodes, 3).
-
-    Both elements of an edge count along it alike.
-    """
+    """K_b,nb (m, 3 k, 3 n_nodes + 3 k) and ∫ N_b N_n dV of elements with nodes x (m, n_nodes, 3)."""
     xi, weights = KINDS[count].heavy
     sign = np.ones((len(rows), count + len(owners(count))))
     for k, (a, b) in enumerate(KINDS[count].edges):
@@ -193,11 +190,7 @@ def centre(mesh: SolidMesh, own: Ints) -> Floats:
 
 
 def _moments(mesh: SolidMesh, own: Ints) -> tuple[Floats, Floats]:
-    """∫ N_i dA (n,) and ∫ N_i x dA (n, 3) of a surface of the nodes ``own``, for an area of 1.
-
-    Its faces are those all of whose nodes are among them; those of two elements are inside the
-    part. Without any its nodes count alike.
-    """
+    """∫ N_i dA (n,) and ∫ N_i x dA (n, 3) of a surface of the nodes ``own``, for an area of 1."""
     inside = np.zeros(len(mesh.x), dtype=bool)
     inside[own] = True
     faces: dict[tuple[int, ...], tuple[Ints, Floats]] = {}

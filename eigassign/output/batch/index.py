@@ -78,10 +78,7 @@ def index_page(
 
 
 def _swept(rows: Sequence[CaseOutcome], keys: Sequence[str]) -> Iterator[Column]:
-    """What a sweep set, in the unit that it is written in, with digits that tell values apart.
-
-    And the case file, where there are several.
-    """
+    """What a sweep set, in the unit that it is written in, with digits that tell values apart."""
     if keys and len({row.path for row in rows}) > 1:
         yield ("case file", "", "swept"), [Path(row.path).stem for row in rows]
     for key, name in short_keys(keys, 2).items():
@@ -107,10 +104,7 @@ def _swept(rows: Sequence[CaseOutcome], keys: Sequence[str]) -> Iterator[Column]
 
 
 def _columns(rows: Sequence[CaseOutcome]) -> Iterator[Column]:
-    """Verdict, errors, mass, price, design, message; for plots frequencies and time too.
-
-    Parameters that less than half of the designs have are told in words.
-    """
+    """Verdict, errors, mass, price, design, message; for plots frequencies and time too."""
     yield ("verdict", "", "word"), [row.word for row in rows]
     for name in NUMBERS:
         one, kind = fact(CaseOutcome, name), "hidden" if name.startswith("pred") else "number"

@@ -291,9 +291,6 @@ def junit_xml(tests: Iterable[Test]) -> bytes:
 
 
 def _escaped(text: str) -> str:
-    """``text`` as content or attribute, on one line.
-
-    Characters that XML cannot hold are shown as ``\\x1b``.
-    """
+    """``text`` as content or attribute, on one line."""
     shown = _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
     return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", shown)

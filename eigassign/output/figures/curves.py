@@ -206,11 +206,7 @@ def _is_far(target: TargetStudy) -> bool:
 
 
 def _asked(target: TargetStudy, time_s: Floats, width: float) -> Iterator[Mark]:
-    """A wanted frequency; a band; of a limit a strip on its wrong side in its mode's colour.
-
-    Others may lie there. ``width`` is that of the strip in Hz. Of a mode that is followed by its
-    shape also its own curves, for its number changes.
-    """
+    """A wanted frequency; a band; of a limit a strip on its wrong side in its mode's colour."""
     asked, x = target.asked, time_s[target.asked.rows]
     low, high = asked.forbidden_hz
     colour = mode_colour(asked.mode)

@@ -239,10 +239,7 @@ def _aligned(points: Floats, along: Floats) -> Floats:
 
 
 def _thick(held: Extent, flat: Floats, ends: tuple[float, float], colour: str) -> Iterator[Curve]:
-    """A line as thick as its section, but no hair; a taper in eight pieces.
-
-    White around it, so that links that cross are told apart.
-    """
+    """A line as thick as its section, but no hair; a taper in eight pieces."""
     if len(flat) < 2 or not np.ptp(flat, axis=0).any():
         return
     start, end = (max(72.0 * thick / held.per_inch, THINNEST) for thick in ends)

@@ -125,10 +125,7 @@ ROW, LETTER = 0.18, 0.075  # inches of a line of the legend, and of a letter
 
 
 def _graph(shown: Graph) -> Figure:
-    """What is put into a figure is placed in inches.
-
-    matplotlib's own layouts measure every letter twice, a third of the time of a figure.
-    """
+    """What is put into a figure is placed in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -38,10 +38,7 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
 
 
 def _plotted(*ys: Floats, most: int = 600) -> NDArray[np.intp]:
-    """The samples that are plotted, at most about as many as a screen has pixels across.
-
-    All of them, or the first, the last, and of each of many stretches where a ``y`` is at its ends.
-    """
+    """The samples that are plotted, at most about as many as a screen has pixels across."""
     every = np.arange(len(ys[0]))
     if every.size <= most:
         return every

@@ -316,10 +316,7 @@ def _shown(
     files: Mapping[str, bytes],
     room: int,
 ) -> Iterator[Shown]:
-    """Plots where there are any; else pictures while there is room.
-
-    Of a figure that was not written nothing is said. ``room`` is in bytes.
-    """
+    """Plots where there are any; else pictures while there is room."""
     for plan in plans:
         if plan.name in graphs:
             yield Shown(plan, graphs[plan.name]["layout"]["height"])

@@ -50,10 +50,7 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
 
 
 def _measurements(results: UpdateResults) -> Graph:
-    """Frequencies relative to the measured ones before and after, standardised residuals below.
-
-    Each has a panel: beside the errors before, the bars of one standard deviation would be points.
-    """
+    """Frequencies relative to the measured ones before and after, standardised residuals below."""
     rows = results.measurements
     at = np.arange(1.0, len(rows) + 1.0)
     measured = np.array([row.measured_hz for row in rows])

@@ -94,10 +94,7 @@ def write_record(folder: Path, run: RunOf, token: str, outcome: Mapping[str, Any
 
 
 def _seal(folder: Path, content: Mapping[str, Any]) -> str:
-    """SHA-256 of ``content`` and of the files that it lists.
-
-    Raises OSError where one of them is no file, or a link, or larger than a gigabyte.
-    """
+    """SHA-256 of ``content`` and of the files that it lists."""
     found = hashlib.sha256(json.dumps(content).encode())
     for name in content["files"]:
         if (folder / name).is_symlink():
@@ -277,10 +274,7 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
 
 
 def _settle(hidden: Path, target: Path) -> None:
-    """Delete a run that was never published or has been replaced; else put back or keep aside.
-
-    Two processes may settle the same at once: each step is a rename, which one of them makes.
-    """
+    """Delete a run that was never published or has been replaced; else put back or keep aside."""
     with contextlib.suppress(FileNotFoundError):
         if hidden.suffix != ".tmp":
             record = read_record(hidden)
@@ -306,10 +300,7 @@ def _settle(hidden: Path, target: Path) -> None:
 
 
 def _is_replaced(old: Path, target: Path) -> bool:
-    """Whether ``target`` has a run of the case of ``old``, and nobody changed anything in ``old``.
-
-    An empty folder can always be replaced.
-    """
+    """Whether ``target`` has a run of the case of ``old``, and nobody changed anything in ``old``."""
     if not old.is_dir():
         return False
     record, new = read_record(old), read_record(target)

@@ -146,10 +146,7 @@ def _searched(scene: Scene, found: Found) -> dict[str, Any]:
 
 
 def _decided(scene: Scene, answer: Answer) -> Conflict | None:
-    """The limits that contradict, unless one of them is not decided for all designs.
-
-    Where all is listed each is decided by going through the lists.
-    """
+    """The limits that contradict, unless one of them is not decided for all designs."""
     open_ = {one.name for one in scene.limits if not one.is_decided}
     settled = answer.found is not None and _is_settled(answer.found)
     found = answer.conflict
@@ -176,12 +173,7 @@ def _doubts(
 def _of_mesh(
     scene: Scene, own: VerifiedAssignment, of_model: Mapping[int, float], accepted: float
 ) -> tuple[list[str], dict[str, str]]:
-    """Which target may be missed most, by as much as mesh and reduced links raise its modes.
-
-    And which are missed by less than that, by name: a finer mesh may meet them. Bands are checked
-    for themselves, and what nothing raises is what it seems to be. Deviations of a robust design
-    may have used up whatever room it has.
-    """
+    """Which target may be missed most, by as much as mesh and reduced links raise its modes."""
     exact, at_stake, undecided = own.solved.exact, [(accepted, "")], dict[str, str]()
     for target in own.targets:
         too_high = max((of_model[mode] for mode in target.numbers), default=0.0)
@@ -240,10 +232,7 @@ def _deviated(
 def _missed_between(
     scene: Scene, designs: Sequence[Floats], targets: Sequence[TargetStudy], accepted: float
 ) -> Iterator[str]:
-    """Say which targets are missed between samples, by how much at worst.
-
-    The first of the designs is the answer, others are deviations.
-    """
+    """Say which targets are missed between samples, by how much at worst."""
     y, own = designs[0], followers(scene, scene.wanted)
     statics = [one for one in scene.followed_limits if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
@@ -263,10 +252,7 @@ def _missed_between(
 
 
 def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
-    """Say which static targets are met by the mesh and reduced links, and missed by finer ones.
-
-    Of what twice the elements make softer, elements beyond are taken to add a third at most.
-    """
+    """Say which static targets are met by the mesh and reduced links, and missed by finer ones."""
     q = scene.path.at(y)[0]
     for one in scene.statics if scene.model.is_meshed else ():
         w, finer = (one.way.at(q[one.rows], y, each) for each in (False, True))

@@ -116,10 +116,7 @@ def _bound(found: Found, outlook: Outlook, least: float, enough: float, most: in
 def _of_boxes(
     variant: PosedProblem, outlook: Outlook, lower: Floats, upper: Floats, missed: bool
 ) -> Iterator[float]:
-    """Yield what no design of each box is below, F or where ``missed`` the violation.
-
-    Infinite where none meets the limits.
-    """
+    """Yield what no design of each box is below, F or where ``missed`` the violation."""
     problem = variant.problem
     kept = can_be_kept(problem.constraints, lower, upper)
     known = outlook(outlook.levels - 1, lower, upper)

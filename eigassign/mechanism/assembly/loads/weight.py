@@ -218,11 +218,7 @@ def _add_row(
 def _through_element(
     beyond: Objects, turn: Floats, p: Objects, h: Scalar
 ) -> tuple[Objects, Objects]:
-    """What the ends of an element receive (12,), and the wrench about its first node of all.
-
-    ``beyond`` is about its last node in the link's axes, p (n_legendre, 3) its weight per length in
-    its own.
-    """
+    """What the ends of an element receive (12,), and the wrench about its first node of all."""
     F, M = multiply(turn, beyond[:3]), multiply(turn, beyond[3:])
     # ∫ ξ P_l dξ = 1/2, 1/6 for l = 0, 1
     first = p[0] * 0.5 + (p[1] * (1.0 / 6.0) if len(p) > 1 else 0.0)

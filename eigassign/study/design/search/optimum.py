@@ -426,10 +426,7 @@ def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> boo
 def _drawn_in(
     margins: tuple[Margin, ...], rows: Sequence[ClearanceRow], more: float
 ) -> tuple[Margin, ...]:
-    """Margins by the room that was lacking.
-
-    First by what the model raises the mode above the band, then by a little more than the rest.
-    """
+    """Margins by the room that was lacking."""
     found = []
     for (room, raised), row in zip(margins, rows, strict=True):
         if not row.clear and row.raised is not None:
@@ -455,10 +452,7 @@ def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:
-    """Violation (of bounds and constraints too, relative to their ranges) and F at the start.
-
-    Alone where it has no answer in a scenario.
-    """
+    """Violation (of bounds and constraints too, relative to their ranges) and F at the start."""
     y, problem, (lower, upper) = scene.initial, variant.problem, scene.bounds
     try:
         seen = problem.appraise(y)

@@ -134,10 +134,7 @@ def thinned(whole: Task, few: int) -> Task | None:
 
 
 def _few(whole: Task, few: int) -> NDArray[np.intp]:
-    """About so many samples, and the instants between samples at which most is asked.
-
-    Those are the first and the last of every target, and where its edges are lowest and highest.
-    """
+    """About so many samples, and the instants between samples at which most is asked."""
     path = whole.scene.path
     most = [
         one.rows.start + row
@@ -352,12 +349,7 @@ def search_starts(
 def _after(
     search: Searched, start: Floats, steps: int, deadline: float, before: Optimum | None = None
 ) -> Searched:
-    """The search with what ``start`` leads to, the optimum ``before`` of a rougher level, if any.
-
-    Once it has ended, a start is only judged. Where Ctrl-C hits before the start itself is judged,
-    it is judged only if nothing is known. A start without an answer leads nowhere; the first one of
-    all raises EigassignError.
-    """
+    """The search with what ``start`` leads to, the optimum ``before`` of a rougher level, if any."""
     problem, optima = search.variant.problem, search.optima
     try:
         found = minimise(problem, start, 0 if search.ended else steps, deadline)
@@ -408,10 +400,7 @@ def _refined(
 
 
 def _is_enough(search: Searched) -> bool:
-    """True where more starts are not expected to lead to more optima, or exact solves are used up.
-
-    No errors at all cannot be improved, nor what is cheapest of all within the bounds.
-    """
+    """True where more starts are not expected to lead to more optima, or exact solves are used up."""
     if search.tally is None:
         return False
     (violation, value), problem = worth(search.optima[0]), search.variant.problem
@@ -431,13 +420,7 @@ def _in_turn(
     starts: Sequence[Floats],
     most: int,
 ) -> Iterator[Floats]:
-    """The first starts, then by turns those that promise most of a sample, and spread ones.
-
-    What promises most leads to good optima; what is expected not to be seen rests on designs that
-    are spread. Of a design only frequencies at fewest samples are solved to judge it: all of them
-    are less work than a start. Where modes are followed or reduced models lead, it is more: there
-    none is judged.
-    """
+    """The first starts, then by turns those that promise most of a sample, and spread ones."""
     yield from starts
     most -= len(starts)
     if most <= 0:
