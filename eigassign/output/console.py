@@ -95,7 +95,7 @@ def _styled(text: str, style: str, out: TextIO) -> str:
 
 
 def _drawn(table: Table, room: int, out: TextIO) -> Iterator[str]:
-    """A table in lines: columns in groups that fit side by side, each behind those that name rows."""
+    """A table in lines: columns in groups that fit, each behind those that name rows."""
     rows = [[printable(cell) for cell in row] for row in table.rows]
     cells = [[row[k] for row in rows] for k in range(len(table.columns))]
     longest = [max(map(_size, column), default=1) for column in cells]

@@ -52,10 +52,7 @@ def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
 
 
 def frequency_columns(results: RunResults) -> list[Column]:
-    """Every sample with its frequencies in Hz: of targets, and of the expanded modes.
-
-    Of several trajectories one below the other, the first column naming them.
-    """
+    """Every sample with its frequencies in Hz: of targets, and of the expanded modes."""
     if not results.targets:
         return [*_samples(results), *_expanded(results)]
     return [*_samples(results), *_assigned(results), *_others(results)]

@@ -108,7 +108,7 @@ FEW = 4  # modes, where no number is asked for
 
 
 def _with_modes(case: BuiltCase, count: int | None) -> tuple[BuiltCase, int]:
-    """The case with links reduced so that as many modes as are asked for are right, and how many."""
+    """The case with links reduced so that as many modes as asked for are right; how many."""
     with case.located():
         most = len(case.model().pencil.elastic)
     if count is None or count <= most:

@@ -28,7 +28,7 @@ __all__, __getattr__, __dir__ = face(
         "design.followed": "followers named_pose solve_design",
         "design.judgement": "Facts Verdict verdict",
         "design.search.optimum": "Found find_optimum",
-        "design.search.response": ("DesignResponse ReducedModels reduced_models response_of"),
+        "design.search.response": "DesignResponse response_of",
         "design.search.variants": "Task variant_of",
         "pictures": "AMPLITUDE draw_modes draw_poses rest_pose",
         "meaning": "Studies levers proved_ranges study_meaning unreachable",

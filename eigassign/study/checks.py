@@ -218,10 +218,7 @@ def _row(
 def weight_doubt(
     file: CaseFile, row: WeightRow | None, asked: Collection[int], accepted: float
 ) -> Iterator[str]:
-    """Say why no number can be vouched for: gravity changes a mode ``asked`` for by too much.
-
-    Where none is, nothing that is asked rests on a frequency or on how far links bend.
-    """
+    """Say why no number can be vouched for: gravity changes a mode ``asked`` for by too much."""
     asks = bool(asked or file.targets)  # of modes or statics
     row = row if asks else None
     said, change = ("", 0.0) if row is None else _worst(row, asked)
@@ -329,10 +326,7 @@ def judged_poses(model: Model, q: Floats, most: int = MESH_POSES) -> Floats:
 
 
 def worst_poses(model: Model, q: Floats, y: Floats, highest: int) -> Floats:
-    """Few poses of q (n, n_q) at which reduced links are judged.
-
-    Of large whole links the one at which the ``highest`` mode is highest: there these bend most.
-    """
+    """Few poses of q (n, n_q) at which reduced links are judged."""
     if not model.is_reduced or model.whole.is_dense:
         return spread(q, FEW)
     q = spread(q, MESH_POSES)

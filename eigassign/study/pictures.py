@@ -131,10 +131,7 @@ def displaced(
     factors: Floats,
     points: int | None = None,
 ) -> DrawnPoses:
-    """Poses at samples x (n, n_x), of one design: each of ``found`` with ``factors`` (n, count).
-
-    ``points`` is how many of a line are drawn at most.
-    """
+    """Poses at samples x (n, n_x), of one design: each of ``found`` with ``factors`` (n, count)."""
     d, n = _dimension(file), len(found)
 
     def at(node: NodeName) -> Floats:

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from eigassign.case.schema.targets import DrawnResponse, PushedNode
 from eigassign.case.units import SI, Given
@@ -108,6 +107,8 @@ def _free(key: DrawnResponse, hz: Floats, ratios: Sequence[Floats]) -> Iterator[
 
 def _tracked(found: ModalResponse, path: Trajectories, count: int) -> NDArray[np.intp]:
     """Modes by likeness to those of the sample before, (φᵀMφ')², numbered where a path begins."""
+    from scipy.optimize import linear_sum_assignment
+
     phi = found.phi[..., :count]
     alike = links(found.model.pencil, found.x[1:], phi[:-1], phi[1:])[0] ** 2
     numbers = np.tile(np.arange(1, 1 + phi.shape[2]), (len(phi), 1))

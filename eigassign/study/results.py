@@ -1167,10 +1167,7 @@ def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
 
 
 def along_each(results: RunResults) -> tuple[RunResults, ...]:
-    """One for each trajectory, whose name is its ``only``; itself where there is none or one.
-
-    Poses, maps over q and y, design, solver, warnings and notes stay those of the whole run.
-    """
+    """One for each trajectory, whose name is its ``only``; itself where there is none or one."""
     if len(results.trajectories) < 2:
         return (results,)
     return tuple(_along(results, row) for row in results.trajectories)

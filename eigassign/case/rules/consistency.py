@@ -120,10 +120,7 @@ Span = tuple[float, float]  # first and last time, s
 
 
 def names_mean_something(document: Document) -> Iterator[Finding]:
-    """`ground` is no link, `time` heads every table over time, `torque` limits drives.
-
-    Those drives are named by their coordinates.
-    """
+    """`ground` is no link, `time` heads every table over time, `torque` limits drives."""
     if "time" in document.coordinates:
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in document.mechanism.links:
@@ -308,10 +305,7 @@ def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
 
 
 def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
-    """What is to be light, high or wide has limits beside it, no wanted frequencies.
-
-    Bands or gaps can be wide where there are some.
-    """
+    """What is to be light, high or wide has limits beside it, no wanted frequencies."""
     name = document.assignment.named_objective
     one_shot = document.assignment.method == "one_shot"  # which takes none of them
     if name not in ("lightest", "highest", "widest") or one_shot:

@@ -345,10 +345,7 @@ def _problem(
 
 
 def assembly_closes_loops(document: Document) -> Iterator[Finding]:
-    """`at` names coordinates, `guess` joints that move, with a number for each freedom.
-
-    An open mechanism can be put together in one way only.
-    """
+    """`at` names coordinates, `guess` joints that move, with a number for each freedom."""
     mechanism, path = document.mechanism, ("mechanism", "assembly")
     assembly = mechanism.assembly
     if assembly is None:

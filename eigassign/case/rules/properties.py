@@ -396,10 +396,7 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
 
 
 def parameters_name_properties(document: Document) -> Iterator[Finding]:
-    """The paths of design parameters, and of what trajectories set, name numbers that can vary.
-
-    A factor has no unit: what a parameter varies together has one dimension.
-    """
+    """The paths of design parameters, and of what trajectories set, name numbers that can vary."""
     groups = [*places(document.design).values()]
     for place, _, motion in named_trajectories(document.trajectory):
         groups += [{path: (*place, "set", path)} for path in motion.set]

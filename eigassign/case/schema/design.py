@@ -328,10 +328,7 @@ class Catalogue:
 
 
 def column_names(entry: str, properties: Sequence[str]) -> list[str]:
-    """Names in y of what the choices of an ``entry`` set: `boom.area` for `sections.boom.area`.
-
-    Where two paths end alike, the whole path.
-    """
+    """Names in y of what the choices of an ``entry`` set: `boom.area` for `sections.boom.area`."""
     ends = [path.rpartition(".")[2] for path in properties]
     pairs = zip(properties, ends, strict=True)
     return [f"{entry}.{end if ends.count(end) == 1 else path}" for path, end in pairs]

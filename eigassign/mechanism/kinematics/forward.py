@@ -79,7 +79,7 @@ class Placement:
 
     @cached_property
     def _world(self) -> tuple[Objects, Objects]:
-        """Asked for where something is drawn, reached or closed; links of a model mostly are not."""
+        """Rotation and place in the world; asked for where something is drawn or reached."""
         waiting = [self]
         while waiting[-1].base is not None and "_world" not in waiting[-1].base.__dict__:
             waiting.append(waiting[-1].base)

@@ -148,7 +148,7 @@ def bubbles(count: int, xi: Any) -> Any:
 
 
 def _matrices(x: Floats, rows: Ints, count: int, nu: float) -> tuple[Floats, Floats]:
-    """K_b,nb (m, 3 k, 3 n_nodes + 3 k) and ∫ N_b N_n dV of elements with nodes x (m, n_nodes, 3)."""
+    """K_b,nb (m, 3 k, 3 n_nodes + 3 k), ∫ N_b N_n dV of elements with nodes x (m, n_nodes, 3)."""
     xi, weights = KINDS[count].heavy
     sign = np.ones((len(rows), count + len(owners(count))))
     for k, (a, b) in enumerate(KINDS[count].edges):

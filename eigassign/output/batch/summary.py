@@ -156,10 +156,7 @@ def summary_json(rows: Sequence[CaseOutcome]) -> str:
 
 
 def summary_csv(rows: Sequence[CaseOutcome]) -> str:
-    """summary.csv: a column for every number, in the unit of the case file, else SI.
-
-    A key that has words beside numbers has a column of each.
-    """
+    """summary.csv: a column for every number, in the unit of the case file, else SI."""
     units = {name: handy_unit(row.unit(name)) for row in rows for name in row.units}
     values, ranges = ([*map(cells, rows)] for cells in (_values, _ranges))
     designs, drives = ([dict(getattr(row, of)) for row in rows] for of in ("design", "drives"))

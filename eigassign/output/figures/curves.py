@@ -67,10 +67,7 @@ def coordinates(results: RunResults) -> FigurePlan:
 
 
 def exerted(results: RunResults, name: str) -> FigurePlan:
-    """What each of the ``drives`` exerts, or how far the nodes of ``statics`` give way.
-
-    Before and after, with its limit, one panel for each.
-    """
+    """What each of the ``drives`` exerts, or how far the nodes of ``statics`` give way."""
     drives, panels = name == "drives", list[Panel]()
     rows: Sequence[StaticRow] = results.drives if drives else results.statics
     for k, row in enumerate(rows, 1):

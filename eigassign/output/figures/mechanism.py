@@ -209,10 +209,7 @@ def drawn(
 
 
 def silhouette(flat: Floats, faces: NDArray[np.intp]) -> Floats:
-    """Where faces (m, 4) turn away from the viewer: segments between ``flat`` points (n, 2).
-
-    NaN between them, (3 k, 2).
-    """
+    """Where faces (m, 4) turn away from the viewer: segments between ``flat`` points (n, 2)."""
     a, b, c = (flat[faces[:, k]] for k in range(3))
     front = np.linalg.det(np.stack([b - a, c - a], axis=1)) > 0.0
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)

@@ -300,7 +300,7 @@ def _settle(hidden: Path, target: Path) -> None:
 
 
 def _is_replaced(old: Path, target: Path) -> bool:
-    """Whether ``target`` has a run of the case of ``old``, and nobody changed anything in ``old``."""
+    """Whether ``target`` has a run of the case of ``old``, in which nobody changed anything."""
     if not old.is_dir():
         return False
     record, new = read_record(old), read_record(target)

@@ -36,10 +36,7 @@ MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 
 def require_assignable(file: CaseFile) -> None:
-    """Raise CaseError naming every key that an assignment needs and the case lacks.
-
-    Targets, but where the objective makes something light or high.
-    """
+    """Raise CaseError naming every key that an assignment needs and the case lacks."""
     needs = {
         "trajectory": (file.trajectory is not None, "along which the frequencies are assigned"),
         "design": (bool(file.design.parameters), "at least one parameter that may change"),

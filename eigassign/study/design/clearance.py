@@ -301,10 +301,7 @@ def lowest_room(
 def finer_path(
     path: Trajectories, model: Model, asked: Iterable[Requirement], designs: Sequence[Floats]
 ) -> Trajectories:
-    """The trajectories with instants where designs (n_y,) have less room than at samples.
-
-    By more than `LIMIT`, and none for what keeps its limit all along.
-    """
+    """The trajectories with instants where designs (n_y,) have less room than at samples."""
     times: list[list[float]] = [[] for _ in path.parts]
     for one, y in itertools.product(asked, designs):
         low = lowest_room(model, one, path, y)

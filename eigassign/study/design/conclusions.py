@@ -50,10 +50,7 @@ WIDE = 4.0  # times its lower end: a side so long is halved by ratio
 
 
 def proof(scene: Scene, found: Found, thorough: bool) -> OptimalityRow | None:
-    """What is proved of the optimum; None where nothing can be, or the search was ended.
-
-    It takes a quarter of the exact solves of the search; if ``thorough`` up to `MOST_SOLVED`.
-    """
+    """What is proved of the optimum; None where nothing can be, or the search was ended."""
     best, problem = found.best, found.variant.problem
     missed, lower, upper = best.seen.violation > MET, problem.lower, problem.upper
     if found.are_listed or best.end in (End.SECONDS, End.INTERRUPTED):
@@ -151,11 +148,7 @@ def _rounded(value: float) -> float:
 def aim_row(
     found: Found, of_model: Mapping[int, float], worst: ViolationRow | None
 ) -> AimRow | None:
-    """What is light, high or wide before and after; None where the objective is an error.
-
-    ``of_model`` is how much too high mesh and reduced links put modes at most, relative; ``worst``
-    what limits are violated by.
-    """
+    """What is light, high or wide before and after; None where the objective is an error."""
     scene = found.task.scene
     aim, kept, wanted = scene.file.assignment.named_objective, ")", scene.wanted
     designs = scene.initial, found.best.y
@@ -268,10 +261,7 @@ def conflict(found: Found, steps: int, of_design: Sequence[LimitedQuantity]) -> 
 
 
 def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
-    """The amount nearest to a limit that no design within the bounds keeps; None where one does.
-
-    Sought from y, without regard to other limits; of catalogues None.
-    """
+    """The amount nearest to a limit that no design within the bounds keeps; None where one does."""
     if scene.file.design.catalogues:
         return None
     (lower, upper), n = scene.bounds, len(y)
@@ -302,10 +292,7 @@ def _null_space(J: Floats) -> Floats:
 
 
 def least_changed(found: Found, initial: Floats) -> Found:
-    """The answer with undetermined directions pulled back to the initial design.
-
-    Only where the merit is not worse than 1e-9 of itself.
-    """
+    """The answer with undetermined directions pulled back to the initial design."""
     problem, best = found.variant.problem, found.best
     settled = found.are_listed or found.variant.requirements.least_change is not None
     if settled or found.clearances:  # a band is checked at this very design

@@ -82,10 +82,7 @@ def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
 
 
 def price_of_one(file: CaseFile) -> float:
-    """The price that is F = 1: beside errors prices are in %² of them, in the worst case in %.
-
-    Beside room they are in % of it too, beside a highest frequency in Hz.
-    """
+    """The price that is F = 1: beside errors prices are in %² of them, in the worst case in %."""
     aim = file.assignment.objective
     if aim == "widest":
         return 1e2

@@ -27,7 +27,7 @@ from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import least_changed
 from eigassign.study.design.lists import cost
 from eigassign.study.design.search.optimum import Found, find_optimum
-from eigassign.study.design.search.response import DesignResponse, box_corners, reduced_models
+from eigassign.study.design.search.response import box_corners
 from eigassign.study.design.search.variants import variant_of
 from eigassign.study.results import RobustRow, RobustTarget
 from eigassign.study.scene import Scene
@@ -145,11 +145,9 @@ class _Deviations:
         unit = 1.0 if rows.edge.any() else 1.0 / abs(self.had)
         return unit * (value - self.had), np.full_like(value, unit)
 
-    def worst_at(
-        self, rows: EdgeRows, y: Floats, response: DesignResponse | None = None
-    ) -> tuple[float, int, Floats]:
+    def worst_at(self, rows: EdgeRows, y: Floats) -> tuple[float, int, Floats]:
         """What is missed most at a design, the sample, and the slopes (n_y,) there."""
-        value, slopes = rows.at(y, (response or self.response)(y))
+        value, slopes = rows.at(y, self.response(y))
         missed, unit = self.missed(rows, value)
         k = int(missed.argmax())
         return float(missed[k]), rows.of.rows.start + k, unit[k] * slopes[k]
@@ -207,20 +205,14 @@ class _Deviations:
                 yield sigma
 
     def drawn(self, worst: Sequence[WorstDeviation]) -> dict[str, float]:
-        """The worst of random deviations by name; of large models by reduced ones that hold there.
+        """The worst of random deviations by name.
 
         Many more of small ones are solved where the ``worst`` of what is asked of frequencies have
         least room. Raises EigassignError where one has no answer.
         """
-        models = None if self.task.followers else reduced_models(self.scene)
-        response = replace(self.response, models=models)
         rng, (model, path) = np.random.default_rng(0), (self.scene.model, self.scene.path)
         designs = rng.uniform(self.lower, self.upper, (DRAWS, len(self.y)))
-        found = [
-            (rows.of.name, self.worst_at(rows, y, response)[0])
-            for y in designs
-            for rows in self.edges
-        ]
+        found = [(rows.of.name, self.worst_at(rows, y)[0]) for y in designs for rows in self.edges]
         least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
         at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
         designs = rng.uniform(self.lower, self.upper, (self.many, len(self.y)))

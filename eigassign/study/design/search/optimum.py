@@ -30,12 +30,11 @@ from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import STOPPED, End, minimise, worth
 from eigassign.assignment.program import can_be_kept
 from eigassign.assignment.requirements.kinds import Margin
-from eigassign.assignment.requirements.sampling import followed_modes
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import check_band, wanting
 from eigassign.study.design.lists import KEEP, catalogues, every_combination, with_rows
-from eigassign.study.design.search.response import Designs, reduced_models
+from eigassign.study.design.search.response import Designs
 from eigassign.study.design.search.variants import (
     SOLVES,
     Counts,
@@ -225,8 +224,7 @@ class _Search:
     ) -> None:
         self.task, self.starts = task, starts
         self.deadline, self.progress = deadline, progress
-        self.models = None if followed_modes(task.scene.file) else reduced_models(task.scene)
-        self.levels = coarse_to_fine(task, self.models)
+        self.levels = coarse_to_fine(task)
         few = self.levels[0]
         self.designs = Designs.all_over(few.scene, few.wanted) if few.bands else None
         belows: Sequence[Counts] = [()] if self.designs is None else self.designs.choices
@@ -254,7 +252,7 @@ class _Search:
             ended = best.best._replace(end=self.ended)
             best = replace(best, optima=(ended, *best.optima[1:]))
         solved = [one for level in self.levels for one in level.glances.values()]
-        beside = sum(one.exact_solves for one in [*solved, self.models] if one is not None)
+        beside = sum(one.exact_solves for one in solved)
         outcomes, scene = [best, *others], self.task.scene
         work = {
             "starts": self.made,
@@ -399,11 +397,7 @@ class _Search:
 
 
 def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> bool | None:
-    """Whether some choice meets the limits ``names`` together; None where that cannot be said.
-
-    Each is searched from the best design found, ``most`` of them at most; bands not named are left
-    out.
-    """
+    """Whether some choice meets the limits ``names`` together; None where that cannot be said."""
     named = [band.name in names for band in found.task.bands]
     belows = [
         tuple(n if own else None for n, own in zip(below, named, strict=True))

@@ -2,9 +2,7 @@
 
     ∂f/∂y = (∂λ/∂y + ∂λ/∂q dq/dy) / (8π² f)
 
-Exactly, from a solve at every sample; or, of large models, from reduced models, each made about one
-design at a few poses and used while exact solves between these agree. Where they do not, one is
-made about the design that is asked for. Answers are judged by exact solves alone.
+Exactly, from a solve at every sample.
 
 **Monotone** is every frequency in masses, which lower it, and in stiffnesses, which raise it.
 K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs and drives and moduli of
@@ -20,7 +18,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -33,12 +30,11 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.requirements.kinds import ForbiddenBand
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement, Solved
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, EigassignError, LostModeError, MissingMassError
+from eigassign.errors import EigassignError, LostModeError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
-from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.study.design.followed import Named, follow_all, followers, with_followed
 from eigassign.study.scene import Scene
 
@@ -49,8 +45,7 @@ Floats = NDArray[np.float64]
 class DesignResponse:
     """The lowest ``count`` frequencies at every sample and the one above, then those followed.
 
-    By exact solves, which are remembered; by reduced ``models``, if any, where they can be trusted,
-    and then without the one above.
+    By exact solves, which are remembered.
     """
 
     model: Model
@@ -58,7 +53,6 @@ class DesignResponse:
     wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
     count: int
     followers: tuple[Named, ...] = ()
-    models: ReducedModels | None = None
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)  # designs at which a followed mode is lost
@@ -72,11 +66,6 @@ class DesignResponse:
         if key in self.known:
             return self.known[key]
         q, of_design = self.path.at(y)
-        reduced = None if self.models is None else self.models.at(y, self.count)
-        if reduced is not None:
-            hz, slopes = in_hz(*reduced.slopes(q, y, self.wanted))
-            slopes = self.path.in_design(slopes, of_design)
-            return Frequencies(hz[:, : self.count], slopes[:, : self.count])
         try:
             self.known[key] = self._exact(y, q, of_design)
         except LostModeError as error:
@@ -103,12 +92,7 @@ class DesignResponse:
         return Frequencies(hz, *(self.path.in_design(own, of_design) for own in (slopes, mixed)))
 
 
-def response_of(
-    scene: Scene,
-    count: int,
-    followers: tuple[Named, ...] = (),
-    models: ReducedModels | None = None,
-) -> DesignResponse:
+def response_of(scene: Scene, count: int, followers: tuple[Named, ...] = ()) -> DesignResponse:
     """The response at all samples of the scene's trajectory."""
     lower, upper = scene.bounds
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
@@ -117,7 +101,7 @@ def response_of(
     if scene.file.assignment.robust:  # what deviates has slopes, though it may have no choice
         free = free | scene.tolerances.given
     wanted = np.append(moving, free)
-    return DesignResponse(scene.model, scene.path, wanted, count, followers, models)
+    return DesignResponse(scene.model, scene.path, wanted, count, followers)
 
 
 # --- Of many designs, without slopes
@@ -222,62 +206,6 @@ def outlook_of(
     count = requirements.modes
     own = glances.setdefault(count, Glances(scene.model, scene.path, count))
     return Outlook(scene.file, requirements, own, len(own.levels) if known.all() else 1)
-
-
-# --- Reduced models
-
-# Largest error of a frequency, relative, with which a model is used: with this the search of
-# `benchmarks/assignment_cost.py` comes within 5e-9 of the objective that exact solves end with
-TRUSTED = 1e-4
-
-
-@dataclass
-class ReducedModels:
-    """Reduced models about designs that a search came by, made as they are needed.
-
-    Modes and their derivatives at three poses make one; it is compared with exact solves at two
-    samples between these.
-    """
-
-    model: Model
-    path: Trajectories
-    left: int = 8  # that may still be tried in one search
-    made: list[ReducedModel] = field(default_factory=list)  # the last used one last
-    exact_solves: int = 0  # so far
-
-    def at(self, y: Floats, count: int) -> ReducedModel | None:
-        """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
-        q, exact_hz = self.path.chosen(self.watched).at(y)[0], None
-        for one in self._rungs(y, count):
-            if exact_hz is None:
-                exact_hz = self.model.frequencies(q, y, count)
-                self.exact_solves += len(q)
-            off = one.frequencies(q, y)[:, :count] / exact_hz - 1.0
-            if np.abs(off).max() <= TRUSTED:
-                self.made = [*(each for each in self.made if each is not one), one]
-                return one
-        return None
-
-    @cached_property
-    def watched(self) -> NDArray[np.intp]:
-        """The samples that are solved exactly: between those about which models are made."""
-        return np.setdiff1d(self.path.spread(5), self.path.spread(3))
-
-    def _rungs(self, y: Floats, count: int) -> Iterator[ReducedModel]:
-        """Yield those that are there already, and then a new one about y."""
-        yield from (one for one in reversed(self.made) if len(one.modes) >= count)
-        if self.left > 0:
-            self.left -= 1
-            poses = self.path.chosen(self.path.spread(3)).at(y)[0]
-            modes = tuple(range(1, count + 1))
-            with suppress(AccuracyError):
-                yield reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
-
-
-def reduced_models(scene: Scene) -> ReducedModels | None:
-    """Models to be reduced as a search needs them; None where exact solves are not dear."""
-    large = not scene.model.pencil.is_dense
-    return ReducedModels(scene.model, scene.path) if large else None
 
 
 MOMENTS = ("inertia", "motor_inertia", "ratio")  # of which a moment of inertia is made
@@ -419,10 +347,7 @@ class Designs:
 def solved_below(
     scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Named, ...], y: Floats
 ) -> Solved:
-    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass.
-
-    At all samples, with the modes that are followed.
-    """
+    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass."""
     q = scene.path.at(y)[0]
     available = scene.model.n_dof - scene.model.n_rigid
     beyond = max((float(band.upper.max()) for band in bands), default=0.0)

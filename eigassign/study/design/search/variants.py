@@ -4,8 +4,7 @@ What the case file asks for becomes requirements (`assignment.exact.requirements
 out of leaves a choice: on a connected trajectory it is clear if and only if the number k of
 modes below it is the same everywhere, so each k that the bounds may allow is one more problem.
 
-Starts are followed on few samples of a long trajectory, of large models by reduced ones; what they
-lead to is then optimised on all samples, and by exact solves last.
+Starts are followed on few samples of a long trajectory; what they lead to is then optimised on all.
 """
 
 from __future__ import annotations
@@ -56,7 +55,6 @@ from eigassign.study.design.search.response import (
     DesignResponse,
     Glances,
     Outlook,
-    ReducedModels,
     outlook_of,
     response_of,
     solved_below,
@@ -97,7 +95,6 @@ class Task:
     scene: Scene
     wanted: tuple[Requirement, ...]
     margins: tuple[Margin, ...] = ()  # by which modes keep off each band; none without bands
-    models: ReducedModels | None = None  # that stand for exact solves
     scenarios: tuple[Floats, ...] = ()  # in which it is asked too
 
     def designs(self, y: Floats) -> list[Floats]:
@@ -188,7 +185,7 @@ def variant_of(
         least_change=None if has_goals or aims or cost else (scene.initial, width),
         aims=tuple(aims),
     )
-    response = response_of(scene, requirements.modes, task.followers, task.models)
+    response = response_of(scene, requirements.modes, task.followers)
     if names is not None:
         requirements = requirements.with_limits(names)
     problem = DesignProblem(
@@ -216,11 +213,7 @@ def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appr
 
 
 def cost_of(scene: Scene, unit: float) -> Cost | None:
-    """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing.
-
-    What is chosen of lists with a price each counts in full. Of the lightest design the mass is
-    all that counts, in kg.
-    """
+    """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing."""
     design, mass, n = scene.file.design, scene.model.total_mass, len(scene.initial)
     if scene.file.assignment.objective == "lightest":
         return Cost(np.zeros(n), scene.initial, 1.0, mass, is_affine=mass.is_affine)
@@ -287,11 +280,10 @@ class Searched:
         return self.optima[0]
 
 
-def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
+def coarse_to_fine(whole: Task) -> tuple[Task, ...]:
     """The levels on which optima are sought one after the other, the whole task last."""
     few = thinned(whole, FEW)
-    coarse = ([] if few is None else [few]) + ([] if models is None else [whole])
-    return (*(replace(task, models=models) for task in coarse), whole)
+    return (whole,) if few is None else (few, whole)
 
 
 def most_starts(file: CaseFile, alone: bool = True) -> int:
@@ -349,7 +341,7 @@ def search_starts(
 def _after(
     search: Searched, start: Floats, steps: int, deadline: float, before: Optimum | None = None
 ) -> Searched:
-    """The search with what ``start`` leads to, the optimum ``before`` of a rougher level, if any."""
+    """The search with what ``start`` leads to, ``before`` being a rougher level's optimum."""
     problem, optima = search.variant.problem, search.optima
     try:
         found = minimise(problem, start, 0 if search.ended else steps, deadline)
@@ -400,7 +392,7 @@ def _refined(
 
 
 def _is_enough(search: Searched) -> bool:
-    """True where more starts are not expected to lead to more optima, or exact solves are used up."""
+    """True where more starts hardly lead to more optima, or exact solves are used up."""
     if search.tally is None:
         return False
     (violation, value), problem = worth(search.optima[0]), search.variant.problem
@@ -427,7 +419,7 @@ def _in_turn(
         return
     bounds = variant.problem.lower, variant.problem.upper
     box, spread = UnitBox.of(variant.problem), spread_designs(bounds, most, 0)
-    if task.models is not None or task.followers:
+    if task.followers:
         yield from spread
         return
     asked = posed(thinned(task, 8) or task)
