@@ -81,10 +81,7 @@ class Program:
         return faces(self)
 
     def is_affine(self, variables: NDArray[np.bool_]) -> bool:
-        """True where no output is of a degree above 1 in these ``variables`` (n_variables,).
-
-        Read off the form: a square that something else takes away again counts.
-        """
+        """True where no output is of a degree above 1 in these ``variables`` (n_variables,)."""
         degree = np.zeros(self.n_atoms)
         degree[self.inputs] = variables[self.input_variables]
         for step in self.steps:

@@ -1096,10 +1096,7 @@ class RunResults(Origin):
 
     @property
     def thin(self) -> tuple[TargetStudy, ...]:
-        """Limits on frequencies that are met with too little room, the least first.
-
-        Less than `THIN`, or than mesh and reduced links are off; a robust design has it all.
-        """
+        """Limits on frequencies that are met with too little room, the least first."""
         row = self.assignment
         if row is None or row.verdict != "reached" or row.robust is not None:
             return ()

@@ -199,10 +199,7 @@ class Scene:
         return tuple(one.constraint for one in self.limits if one.constraint is not None)
 
     def shown_modes(self, asked: int = 1) -> int:
-        """The number of modes shown along the trajectory: up to three above those ``asked`` for.
-
-        Those are the expanded ones too; of the three, as many as have mass.
-        """
+        """The number of modes shown along the trajectory: up to three above those ``asked`` for."""
         available = self.model.n_dof - self.model.n_rigid
         highest = max(*self.modes, asked)
         last = min(highest + OTHERS, available)

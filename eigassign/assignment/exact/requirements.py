@@ -232,10 +232,7 @@ class Requirements:
                     yield rows.of, rows.curve(values[at]), slopes[at] / rows.scale[:, None]
 
     def owner(self, index: int) -> tuple[str, str]:
-        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper.
-
-        Those of scenarios follow one another, as many of each.
-        """
+        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper."""
         index %= sum(len(rows.edge) for rows in self.excesses)
         rows = next(rows for rows, at in _spans(self.excesses) if index < at.stop)
         return rows.of.name, rows.side

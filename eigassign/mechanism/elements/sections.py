@@ -306,10 +306,7 @@ def beam_profiles(
     n: int,
     together: bool,
 ) -> list[Profile]:
-    """Values of n elements over a ``piece`` of a beam, from share to share of its length.
-
-    One profile for all, of arrays (n,) for a taper of numbers if ``together``; or one for each.
-    """
+    """Values of n elements over a ``piece`` of a beam, from share to share of its length."""
     if isinstance(beam.section, str):
         return [[beam_values(case, parameters, beam, beam.section)]]
     start, end = piece

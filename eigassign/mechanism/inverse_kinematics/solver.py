@@ -71,10 +71,7 @@ class TipProblem(NamedTuple):
         return change(reduced(self.evaluate(u), self.n_q), task[:, :, None])[:, :, 0]
 
     def evaluate(self, u: Floats, by_design: bool = False) -> TipEvaluation:
-        """The chain's evaluation with metres and radians in one measure.
-
-        Derivatives ``by_design``, per unit of y, are after those by q.
-        """
+        """The chain's evaluation with metres and radians in one measure."""
         chain, scale, z = self.chain, self.scale, u * self.scale
         seen = chain.evaluate(z, by_design=True) if by_design else chain.evaluate(z)
         if by_design:
@@ -260,10 +257,7 @@ class Corrected(NamedTuple):
 
 
 def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Corrected:
-    """Newton for tip(u) = target with closed loops.
-
-    A chain that cannot fill the space (n_q < m) settles, more slowly, on the nearest point.
-    """
+    """Newton for tip(u) = target with closed loops."""
     for _ in range(8 if ik.n_q == target.point.shape[1] + len(ik.chain.turned_by) else 40):
         seen = ik.evaluate(u)
         motion = reduced(seen, ik.n_q)
@@ -297,10 +291,7 @@ def change(motion: Reduced, tasks: Floats) -> Floats:
 
 
 def handedness(ik: TipProblem, u: Floats) -> Floats:
-    """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
-
-    0 for what is not square.
-    """
+    """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch."""
     seen = ik.evaluate(u)
     return _signs(ik, seen, reduced(seen, ik.n_q))
 

@@ -288,10 +288,7 @@ def _followers(mesh: SolidMesh, path: str, name: str, each: Coupling) -> _Follow
 
 
 def moments(mesh: SolidMesh, each: Coupling) -> tuple[Floats, Floats, Floats, Floats]:
-    """Of a surface ∫ N_i dA (n,), arms s (n, 3), ∫ N_i s dA (n, 3) and J (3, 3).
-
-    Where it moves as one its nodes count alike.
-    """
+    """Of a surface ∫ N_i dA (n,), arms s (n, 3), ∫ N_i s dA (n, 3) and J (3, 3)."""
     x, alike = mesh.x[each.own], each.rigid or each.alike
     w, first = (np.full(len(x), 1.0 / len(x)), x / len(x)) if alike else _moments(mesh, each.own)
     arms, levers = x - w @ x, first - np.outer(w, w @ x)

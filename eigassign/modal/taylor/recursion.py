@@ -114,10 +114,7 @@ class LocalSpace(NamedTuple):
 def local_space(
     pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None
 ) -> LocalSpace:
-    """The set over w that was asked for; raises UsageError for one of the wrong width.
-
-    Of a ``space`` given over x the variables that do not matter are taken out.
-    """
+    """The set over w that was asked for; raises UsageError for one of the wrong width."""
     if space is not None:
         if not isinstance(space, LowerSet):
             raise UsageError(f"space must be a lower set, not {type(space).__name__}")

@@ -79,10 +79,7 @@ class Loaded:
 
     @cached_property
     def sites(self) -> Mapping[NodeName, Objects]:
-        """The mass matrix (6, 6) of the bodies at each node that carries any.
-
-        A rigid link has one site, at its origin, with all of its own mass.
-        """
+        """The mass matrix (6, 6) of the bodies at each node that carries any."""
         found: dict[NodeName, Objects] = {}
         for name, link in self.links.items():
             J, kept = np.zeros((6, 6), dtype=object), list(DOFS[self.nodes.space])
