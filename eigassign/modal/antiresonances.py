@@ -1,10 +1,10 @@
 """Antiresonances: the frequencies at which a force on a node leaves that node at rest.
 
 The response of a node along n to a force there along n is H = Σ (b·φ_i)²/(λ_i − λ), b·φ its motion
-in mode i. Its zeros z_k are the modes of the mechanism with the node held (`mechanism.assembly.held`), and
-lie between its poles: λ_k ≤ z_k ≤ λ_{k+1}. A mode that the force does not see, b·φ_i = 0, is pole
-and zero at once, and leaves H as it is: such pairs, told by z = λ, one zero for each pole, are
-not counted.
+in mode i. Its zeros z_k are the modes of the mechanism with the node held
+(`mechanism.assembly.held`), and lie between its poles: λ_k ≤ z_k ≤ λ_{k+1}. A mode that the force
+does not see, b·φ_i = 0, is pole and zero at once, and leaves H as it is: such pairs, told by
+z = λ, one zero for each pole, are not counted.
 """
 
 from __future__ import annotations

@@ -316,7 +316,7 @@ def _changed(pencil: Pencil, weights: Any, x: Floats, V: Numbers, along: Ints) -
 
 # --- The largest |H| in parts of a range of frequencies
 
-SCAN = 5  # frequencies in a part, beside those about peaks
+SCAN, ROUNDS, STEP = 5, 4, 3e-4  # frequencies in a part beside peaks; parabolas, relative width
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,8 +355,8 @@ class Shaken:
         return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)
 
     def _largest(self, found: ModalResponse) -> Floats:
-        """ω (n, m) of the largest |H| in each part: a scan with peaks in it, then the top of the
-        parabola of 1/|H|² through the largest and both beside it, which a peak of one mode is.
+        """ω (n, m) of the largest |H| in each part: a scan with peaks in it, then vertices of
+        parabolas of 1/|H|², which a peak of one mode is. Beside the top slopes are others.
         """
         low, high, every = self.ends[:-1], self.ends[1:], np.arange(len(found.x))[:, None]
         own, width = np.sqrt(found.mu.real), 1.0 + found.zeta[..., None] * [-0.5, 0.0, 0.5]
@@ -364,14 +364,22 @@ class Shaken:
         near = np.clip((own[..., None] * width)[:, there].reshape(len(own), -1), low[0], high[-1])
         scan = np.linspace(low, high, SCAN).T.ravel()
         omega = np.sort(np.hstack([np.tile(scan, (len(own), 1)), near]), axis=1)
-        level = 1.0 / np.maximum(np.abs(found.at(omega)), np.finfo(float).tiny) ** 2
+        level = _level(found, omega)
         inside = (omega[:, None] >= low[:, None]) & (omega[:, None] <= high[:, None])
         best = np.where(inside, level[:, None], np.inf).argmin(axis=2)
-        places = [np.clip(best + k, 0, omega.shape[1] - 1) for k in (-1, 0, 1)]
-        (a, b, c), (f, g, h) = ([each[every, k] for k in places] for each in (omega, level))
-        # the vertex, by divided differences
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first, second = (g - f) / (b - a), (h - g) / (c - b)
-            top = 0.5 * (a + b) - 0.5 * first * (c - a) / (second - first)
-        top = np.clip(np.where(np.isfinite(top), top, b), np.maximum(a, low), np.minimum(c, high))
-        return np.asarray(np.where(np.abs(found.at(top)) ** -2.0 < g, top, b))
+        a, top, c = (omega[every, np.clip(best + k, 0, omega.shape[1] - 1)] for k in (-1, 0, 1))
+        a, c = np.maximum(a, low), np.minimum(c, high)
+        for _ in range(ROUNDS):
+            b, h = top, STEP * top
+            f, g, e = (_level(found, b + k * h) for k in (-1, 0, 1))
+            bend = f - 2.0 * g + e
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = np.where(bend > 0.0, 0.5 * h * (f - e) / bend, np.sign(f - e) * h)
+            top = np.clip(b + step, a, c)
+            top = np.where(_level(found, top) <= g, top, b)
+        return np.asarray(top)
+
+
+def _level(found: ModalResponse, omega: Floats) -> Floats:
+    """1/|H|² (n, m)."""
+    return np.asarray(1.0 / np.maximum(np.abs(found.at(omega)), np.finfo(float).tiny) ** 2)

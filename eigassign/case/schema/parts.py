@@ -374,10 +374,10 @@ ValueOr: TypeAlias = Annotated[T | L, Told(lambda value: isinstance(value, Mappi
 
 # A share of 1, such as a damping ratio, or the least and the most that it may be
 Share: TypeAlias = Annotated[float, Quantity(DIMENSIONS["fraction"], at_least=0, below=1)]
-ShareOrRange: TypeAlias = OneOrList[
-    Share,
-    Annotated[tuple[Share, Share], must(lambda ends: ends[0] <= ends[1], "is least, then most")],
+ShareRange: TypeAlias = Annotated[
+    tuple[Share, Share], must(lambda ends: ends[0] <= ends[1], "is least, then most")
 ]
+ShareOrRange: TypeAlias = OneOrList[Share, ShareRange]
 
 
 def mapping(value: object) -> Mapping[str, object]:

@@ -26,6 +26,7 @@ from eigassign.case.schema.parts import (
     Quantity,
     Share,
     ShareOrRange,
+    ShareRange,
     Told,
     ValueOr,
     quantity,
@@ -54,7 +55,7 @@ class Damping(Part):
 
 
 DampingForm: TypeAlias = Annotated[
-    Share | tuple[Share, Share] | Damping,
+    Share | ShareRange | Damping,
     Told(lambda v: 2 if isinstance(v, Mapping) else int(isinstance(v, (list, tuple)))),
 ]
 
