@@ -453,7 +453,8 @@ class ShakenNode(PushedNode):
     def name(self) -> str:
         """It in words."""
         unit, size = handy_unit(SI("Hz", self.lowest, self.highest))
-        return f"{super().name} at {self.lowest / size:g} … {self.highest / size:g} {unit}"
+        first = f"{self.lowest / size:g} … " if self.lowest < self.highest else ""
+        return f"{super().name} at {first}{self.highest / size:g} {unit}"
 
     def _mistakes(self, space: str | None) -> Mistakes:
         if self.lowest > self.highest:

@@ -75,7 +75,7 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
         values = [curve / size for curve in (row.initial_curve, row.optimal_curve)]
         edges = [] if row.limit is None else [row.limit / size, -row.limit / size]
         edges = [edge for edge in edges if any((edge * v > 0.0).any() for v in values)]
-        label = graph.short(row.name, 12) if drives else f"{k}: {row.name.partition(' ')[0]}"
+        label = graph.short(row.name, 12) if drives else f"{k}: {row.name.partition(' of ')[0]}"
         looks = ((_BEFORE, "before"), (_AFTER, "after"))
         curves = (Curve(v, look, hover=when) for v, (look, when) in zip(values, looks, strict=True))
         marks: tuple[Mark, ...] = (*(Rule(edge, EDGE) for edge in edges), *curves)
@@ -88,7 +88,7 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
         what = f"Torques and forces of {', '.join(row.name for row in rows)}"
         more = f"of {results.drives[0].of}"
     else:
-        title, section, more = "What gives way at rest", "requirements", "the drives hold"
+        title, section, more = "How far nodes give way", "requirements", "the drives hold"
         what = capital(", ".join(f"{k}: {row.name}" for k, row in enumerate(rows, 1)))
     heading = f"{title}{where(results)}"
     return FigurePlan(
