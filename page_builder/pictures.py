@@ -144,6 +144,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "imported-part": figure("modes", "superelement_arm", "mode_1", "--count", "1"),
     "solid-part": figure("modes", "casting_arm", "mode_1", "--count", "1"),
     "what-would-help": levers,
+    "at-the-tool": figure("response", "milling_arm", "response_1", "--report", "none"),
     "static-stiffness": figure("optimize", "drilling_arm", "statics", *LIGHT),
     "keep-out-bands": figure("optimize", "milling_column", "frequencies", *LIGHT),
     "catalogue": combinations,

@@ -43,6 +43,8 @@ def test_a_shipped_case_can_be_followed_and_its_targets_reached(name: str) -> No
     model, q = case.model(), case.trajectory.q
     y = np.tile(case.initial_design, (len(q), 1))
     for one in requirements_of(case.file, case.trajectory):
+        if one.followed:  # an antiresonance
+            continue
         rows = case.trajectory.rows_of(one.trajectory)
         mode = max(one.modes, default=1)
         target = case.file.targets[int(one.place.removeprefix("targets[").removesuffix("]"))]
