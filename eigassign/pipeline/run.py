@@ -251,7 +251,9 @@ def responding(case: BuiltCase, drawn: Mapping[str, object], y: str | None = Non
         context = {"space": file.mechanism.space, "folder": None}
         body = read_mapping(drawn, "response").tree
         keys, wrong = validated_part(DrawnResponse, body, context, "response")
-        named = [node_problem(file.mechanism, place.at) for place in ({*keys.places} if keys else ())]
+        named = [
+            node_problem(file.mechanism, place.at) for place in ({*keys.places} if keys else ())
+        ]
         wrong += [(("response", "at"), problem) for problem in named if problem]
         if keys is None or wrong:
             raise UsageError("; ".join(f"{dotted(path)}: {message}" for path, message in wrong))

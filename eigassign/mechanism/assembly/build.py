@@ -11,7 +11,6 @@ from scipy import sparse
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
-from eigassign.case.schema.parts import FrozenDict
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.held import Held, substitution
@@ -336,9 +335,12 @@ def loss_pencil(
             raise MechanismError(f"mechanism.links.{name}.reduce_to", message)
         else:
             lossy[name] = _link_mesh(case, given, motion.tree, name)
-    alone = mechanism.model_copy(update={"springs": FrozenDict(), "gravity": None})
-    case = replace(case, mechanism=alone)
-    return build_pencil(case, given, motion, local_links(case, given, motion, lossy))
+    links, nodes = local_links(case, given, motion, lossy)
+    stiffness, mass = AffineEntries(), AffineEntries()
+    add_links(stiffness, mass, links, nodes.count)
+    add_drives(stiffness, mass, case, given, motion, nodes.count)
+    entries = stiffness.finish(nodes.count), mass.finish(nodes.count)
+    return _compile(*entries, None, case, given, motion, nodes.count)
 
 
 def add_drives(
