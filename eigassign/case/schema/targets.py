@@ -224,7 +224,7 @@ class AnyTarget(Part):
     @property
     def numbers(self) -> tuple[int, ...]:
         """The numbers of all modes that it names, of followed ones where they are named."""
-        each = (mode for modes in self.named for mode in modes)
+        each = (m for modes in self.named for m in modes if not isinstance(m, Antiresonance))
         return tuple(mode if isinstance(mode, int) else mode.like for mode in each)
 
     @classmethod
