@@ -43,7 +43,8 @@ class Section:
 
 def keys() -> str:
     """The page of all keys."""
-    found = list(sections("", "Top level", [("", SCHEMA)], 2, set()))
+    every = sections("", "Top level", [("", SCHEMA)], 2, set())
+    found = [replace(section, heading=section.heading.rstrip(", ")) for section in every]
     headings: list[str] = []
     for k, section in enumerate(found):  # alike below two kinds: told apart by what they need
         if section.heading in headings:

@@ -46,12 +46,15 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
         H = np.array([[one.at(w, a, b) for one in ends] for ends in each])
         H = np.where(np.isfinite(H), H, -np.inf)  # at a peak without damping
         size = np.abs(H).max(axis=1)
+        ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
+        lam = np.sqrt(each[0][0].lam)
+        met = (lam.max(axis=0) >= ends[0]) & (lam.min(axis=0) <= ends[1])
+        endless = bool(met.any()) and not all(one.zeta.any() for one in each[0])
         if not size[0].any():
             raise MechanismError("response", f"nothing gives way: {key.name}")
         k, j = np.unravel_index(size[0].argmax(), size[0].shape)
         mesh = None
         if model.is_meshed and key.seen is None and all(m.zeta.any() for m in found):
-            ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
             none, worst = np.zeros(samples[0].shape[1], dtype=bool), samples[0][[k]]
             coarse, fine = (
                 Shaken.of(model, key.at, key.direction, ends, finer).at(worst, none)[0].max()
@@ -65,11 +68,11 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
         yield ResponseRow(
             name=key.name,
             unit=UNIT,
-            least=1.0 / float(size[0, k, j]),
+            least=0.0 if endless else 1.0 / float(size[0, k, j]),
             at_hz=float(hz[j]),
             at_s=float(path.time_s[k]),
             before=None if initial is None else float(initial.min()),
-            real=float(H[0].real.min()),
+            real=-np.inf if endless else float(H[0].real.min()),
             mesh=mesh,
             free=tuple(_free(key, modes_hz, ratios)),
             frequency_hz=hz,

@@ -292,8 +292,9 @@ def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
     for k, target in enumerate(document.targets):
         if not target.is_goal:
             yield ("targets", k, target.kind), f"is not a wanted frequency: {instead}"
-    for path, _ in followed_modes(document):
-        yield path, f"is no numbered mode: {instead}"
+    for path, mode in followed_modes(document):
+        what = "an antiresonance" if isinstance(mode, Antiresonance) else "followed by its shape"
+        yield path, f"is {what}: {instead}"
     if design.mass is not None:
         yield ("design", "mass"), f"limits or prices the mass: {instead}"
     if "torque" in design.model_fields_set:

@@ -46,7 +46,8 @@ class Damping(Part):
     """Damping ratios of modes.
 
     Keys:
-        ratio: ζ of every mode that `modes` does not list; or the least and the most
+        ratio: ζ of every mode that `modes` does not list; or the least and the most, which all
+            ranges have together
         modes: those of modes 1, 2, …
     """
 
