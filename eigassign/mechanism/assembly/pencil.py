@@ -230,8 +230,8 @@ class Pencil(Brief):
 
     @property
     def is_dense(self) -> bool:
-        """True where matrices of all unknowns are kept dense; else algebra is sparse."""
-        return self.n_dof <= self.dense_limit
+        """True where matrices are kept dense, which q̇ alone fill; else algebra is sparse."""
+        return self.n_dof <= self.dense_limit or not self.n_u
 
     @property
     def n_joints(self) -> int:

@@ -99,7 +99,7 @@ def _pins(pencil: Pencil, data: Floats, phi: Floats) -> Ints:
     diagonal = np.zeros(pencil.n_dof)
     on = pencil.rows == pencil.columns
     diagonal[pencil.rows[on]] = np.abs(data[on])
-    left = (phi * np.sqrt(diagonal))[:, : pencil.n_u or pencil.n_dof]
+    left = (phi * np.sqrt(diagonal))[:, : pencil.n_u]
     pins = []
     for _ in phi:
         mode, k = np.unravel_index(np.abs(left).argmax(), left.shape)
