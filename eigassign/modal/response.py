@@ -30,15 +30,15 @@ where C = M s(M⁻¹K) of s = 2ζ√λ has, with A = ΦᵀK_xΦ and B = ΦᵀM_x
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.study import Damping as Ratios
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import loss_pencil
@@ -52,6 +52,7 @@ from eigassign.modal.under_load import displaced
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Numbers = NDArray[Any]  # complex
+CHOSEN = 3  # ranges of damping of which every choice of ends is looked at
 NEAR = 1e-9  # relative: of λ that are as good as one, and of what is left at rest
 SPAN = (
     30.0  # times the highest frequency asked for: modes beyond are at rest, to 1e-3 of their part
@@ -72,42 +73,37 @@ class Damping(NamedTuple):
 
 
 def dampings(model: Model) -> tuple[Damping, ...]:
-    """The damping of a case, or where a range is stated the least and the most."""
+    """The damping of a case; of ranges every choice of their ends, of more than `CHOSEN` two."""
     case = model.poses.case
-    given, factors = case.damping, [*loss_factors(case).values()]
-    ends = range(1 + any(isinstance(each, tuple) for each in (*_ratios(given), *factors)))
-    if given is not None:
-        return tuple(Damping(tuple(_end(own, k) for own in _ratios(given))) for k in ends)
-    if not factors:
+    if case.damping is not None:
+        return tuple(Damping(tuple(ends)) for ends in _choices(_ratios(case.damping)))
+    drives = (own.drive for own in case.coordinates.values())
+    parts: list[Any] = [*case.mechanism.materials.values(), *drives]
+    parts = [part for part in parts if getattr(part, "loss_factor", None) is not None]
+    if not parts:
         return (Damping(),)
-    if model.held is not None:
-        raise MechanismError("mechanism", "a held mechanism has no response")
     known = case, model.poses.parameters, model.motion, model.meshes
 
-    def loss(end: int) -> Pencil:
-        return loss_pencil(*known, lambda part: _end(getattr(part, "loss_factor", None), end))
+    def loss(ends: Sequence[float]) -> Pencil:
+        own = {id(part): eta for part, eta in zip(parts, ends, strict=True)}
+        return loss_pencil(*known, lambda part: own.get(id(part), 0.0))
 
-    return tuple(Damping(loss=loss(k)) for k in ends)
+    return tuple(Damping(loss=loss(ends)) for ends in _choices([p.loss_factor for p in parts]))
 
 
-def loss_factors(case: CaseFile) -> Mapping[str, Any]:
-    """The loss factors that a case states, by the keys that they stand below."""
-    parts: dict[str, Any] = {
-        f"mechanism.materials.{n}": m for n, m in case.mechanism.materials.items()
-    }
-    parts |= {f"coordinates.{name}.drive": own.drive for name, own in case.coordinates.items()}
-    own = {path: getattr(part, "loss_factor", None) for path, part in parts.items()}
-    return {path: eta for path, eta in own.items() if eta is not None}
+def _choices(given: Sequence[Any]) -> Iterator[tuple[float, ...]]:
+    """The values with every choice of the ends of ranges, all least first and all most last."""
+    ranges = [k for k, each in enumerate(given) if isinstance(each, tuple)]
+    every = product((0, 1), repeat=len(ranges)) if len(ranges) <= CHOSEN else None
+    for ends in every or ((0,) * len(ranges), (1,) * len(ranges)):
+        at = dict(zip(ranges, ends, strict=True))
+        yield tuple(float(one[at[k]] if k in at else one) for k, one in enumerate(given))
 
 
 def _ratios(given: Any) -> tuple[Any, ...]:
     if given is None:
         return ()
     return (*(given.modes or ()), given.ratio) if isinstance(given, Ratios) else (given,)
-
-
-def _end(given: Any, k: int) -> float:
-    return float((given[k] if isinstance(given, tuple) else given) or 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +144,10 @@ class ModalResponse:
         """H_ab (n, k) in m/N at angular frequencies ω (n, k)."""
         left = self.beta if self.turn is None else np.swapaxes(self.turn, 1, 2) @ self.beta
         both = left[..., a] * self.gamma[..., b]
-        still = np.einsum("nd,nd->n", self.b[..., a], self.rest[..., b])
+        pairs = (a, b), (b, a)
+        still = sum(
+            0.5 * np.einsum("nd,nd->n", self.b[..., i], self.rest[..., j]) for i, j in pairs
+        )
         found = np.empty(omega.shape, dtype=complex)
         for k in chunks(np.arange(len(omega)), omega.shape[1] * both.shape[1]):
             found[k] = np.einsum("nkr,nr->nk", self._shares(omega, k), both[k]) + still[k, None]
@@ -220,6 +219,8 @@ def _root_differences(lam: Floats, zeta: Floats) -> tuple[Floats, Floats]:
 def unit_forces(model: Model, nodes: Mapping[str, Sequence[Sequence[float]]]) -> Forces:
     """Unit forces at nodes along directions; raises MechanismError where a coordinate is free."""
     case = model.poses.case
+    if model.held is not None:
+        raise MechanismError("mechanism", "a node is held: ask the mechanism itself for responses")
     for name, own in case.coordinates.items():
         if own.moves == "free":
             message = "is free, and a response needs what holds it: give it a drive stiffness"

@@ -63,7 +63,8 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
             mesh = abs(float(fine / coarse) - 1.0)
         shown = max(4, int((found[0].lam < (2.0 * highest) ** 2).any(axis=0).sum()))
         modes_hz = np.sqrt(found[0].lam[:, :shown]) / (2.0 * np.pi)
-        ratios = tuple(m.zeta[:, :shown] for m in found)
+        zeta = [m.zeta[:, :shown] for m in found]
+        ratios = tuple(zeta if len(zeta) < 2 else (np.min(zeta, axis=0), np.max(zeta, axis=0)))
         initial = 1.0 / size[1].max(axis=0) if len(size) > 1 else None
         yield ResponseRow(
             name=key.name,

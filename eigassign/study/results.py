@@ -309,12 +309,12 @@ class ResponseRow(InOneUnit, Brief):
     mesh: Annotated[Share | None, Fact("what twice the elements change of the least", "mesh")]
     free: Annotated[tuple[FreeSpeeds, ...], Fact("of the spindle", name="free_speeds")]
     frequency_hz: Unwritten[Floats]  # (k,)
-    response: Unwritten[NDArray[np.complex128]]  # H (1 or 2 ends, n, k), m/N
+    response: Unwritten[NDArray[np.complex128]]  # H (dampings, n, k), m/N
     initial: Unwritten[Floats | None]  # (k,), N/m: the least of the initial design
     places: Unwritten[tuple[str, ...]]  # m nodes and directions
     constants: Unwritten[Floats]  # b·φ (n, r, m), 1/√kg
     modes_hz: Unwritten[Floats]  # (n, r)
-    ratios: Unwritten[tuple[Floats, ...]]  # ζ (n, r), at both ends of a range
+    ratios: Unwritten[tuple[Floats, ...]]  # ζ (n, r), the least and the most of ranges
     tracked: Unwritten[Numbers]  # (n, r): what number a mode has where its trajectory begins
 
     @property

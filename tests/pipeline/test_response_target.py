@@ -153,6 +153,23 @@ def test_slopes_at_a_frequency_are_differences_to_a_millionth(damping: Any) -> N
         )
 
 
+def test_of_ranges_every_choice_of_ends_counts() -> None:
+    """Some choice between is softer than both with all least and with all most."""
+    data = tree("9 N/um", None)
+    for own in data["coordinates"].values():
+        own["drive"]["loss_factor"] = ["1 %", "10 %"]
+    model = ea.load_case(data).model()
+    every = dampings(model)
+    assert len(every) == 4
+    x = model.x([0.97, -1.14], ea.load_case(data).initial_design)
+    omega = 2.0 * np.pi * np.linspace(10.0, 60.0, 400)[None]
+    own = unit_forces(model, {"forearm.end": [[0, 1]]})
+    least, a, b, most = (np.abs(modal_response(model, d, own, x, 400.0).at(omega)) for d in every)
+    assert (np.maximum(a, b) / np.maximum(least, most)).max() > 1.02
+    data["mechanism"]["materials"]["steel"]["loss_factor"] = [0.001, 0.002]
+    assert len(dampings(ea.load_case(data).model())) == 8
+
+
 def test_it_is_told_as_what_it_is() -> None:
     data = tree("30 N/um")
     data["assignment"] = {"starts": 1}
