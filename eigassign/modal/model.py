@@ -121,19 +121,21 @@ class Model:
             return None
         return self._rebuilt(self.poses.case, self.meshes, bent=True)
 
-    def refined(self, factor: float = 2.0) -> tuple[CaseFile, Pencil]:
-        """The case, K and M with ``factor`` times the elements in every beam, no beam reduced."""
+    def refined(self, factor: float = 2.0) -> Model:
+        """The model with ``factor`` times the elements in every beam, no beam reduced."""
         if factor not in self._refined:
             beams = {name for name, mesh in self.meshes.items() if mesh.whole.strands}
             whole = dict.fromkeys(beams.intersection(self._reducible))
             case = refined(with_reduction(self.poses.case, whole), factor)[0]
             others = {name: mesh for name, mesh in self.meshes.items() if name not in beams}
             same = factor == 1.0 and not whole
-            self._refined[factor] = case, self.pencil if same else self._rebuilt(case, others)
+            pencil = self.pencil if same else self._rebuilt(case, others)
+            frames = replace(self.poses, case=case)
+            self._refined[factor] = replace(self, pencil=pencil, poses=frames, meshes=others)
         return self._refined[factor]
 
     @cached_property
-    def _refined(self) -> dict[float, tuple[CaseFile, Pencil]]:
+    def _refined(self) -> dict[float, Model]:
         return {}
 
     @property
@@ -272,12 +274,12 @@ class Model:
         fewest = min(refined(self.poses.case, 1.0)[1])
         certain = self.pencil.rails is None and self.pencil.weight is None and fewest > 1
         fine = certain and fewest >= FINE
-        return mesh_error(lambda factor: self.refined(factor)[1], x, modes, certain, fine)
+        return mesh_error(lambda factor: self.refined(factor).pencil, x, modes, certain, fine)
 
     def coarsest(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) -> Ints:
         """The samples at which twice the elements change one of the modes most."""
         x = self.x(q, y)
-        hz = [standing_frequencies(self.refined(k)[1], x, max(modes)) for k in (1.0, 2.0)]
+        hz = [standing_frequencies(self.refined(k).pencil, x, max(modes)) for k in (1.0, 2.0)]
         change = np.abs(hz[1] / hz[0] - 1.0)[:, np.array(modes) - 1]
         return np.unique(change.argmax(axis=0))
 

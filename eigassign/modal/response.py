@@ -31,7 +31,8 @@ where C = M s(M⁻¹K) of s = 2ζ√λ has, with A = ΦᵀK_xΦ and B = ΦᵀM_x
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -42,6 +43,7 @@ from scipy import sparse
 from eigassign.case.schema.study import Damping as Ratios
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import loss_pencil
+from eigassign.mechanism.assembly.held import require_held
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.forces import Forces, forces
 from eigassign.modal.arguments import chunks
@@ -57,6 +59,7 @@ NEAR = 1e-9  # relative: of λ that are as good as one, and of what is left at r
 SPAN = (
     30.0  # times the highest frequency asked for: modes beyond are at rest, to 1e-3 of their part
 )
+LEAST = 1e-300  # what stands for 0 in denominators
 FEW = 64  # modes that are all solved; of larger pencils so many at first
 
 
@@ -75,8 +78,9 @@ class Damping(NamedTuple):
 def dampings(model: Model) -> tuple[Damping, ...]:
     """The damping of a case; of ranges every choice of their ends, of more than `CHOSEN` two."""
     case = model.poses.case
-    if case.damping is not None:
-        return tuple(Damping(tuple(ends)) for ends in _choices(_ratios(case.damping)))
+    if (given := case.damping) is not None:
+        ratios = (*(given.modes or ()), given.ratio) if isinstance(given, Ratios) else (given,)
+        return tuple(Damping(ends) for ends in _choices(ratios))
     drives = (own.drive for own in case.coordinates.values())
     parts: list[Any] = [*case.mechanism.materials.values(), *drives]
     parts = [part for part in parts if getattr(part, "loss_factor", None) is not None]
@@ -100,12 +104,6 @@ def _choices(given: Sequence[Any]) -> Iterator[tuple[float, ...]]:
         yield tuple(float(one[at[k]] if k in at else one) for k, one in enumerate(given))
 
 
-def _ratios(given: Any) -> tuple[Any, ...]:
-    if given is None:
-        return ()
-    return (*(given.modes or ()), given.ratio) if isinstance(given, Ratios) else (given,)
-
-
 @dataclass(frozen=True, eq=False)
 class ModalResponse:
     """Modes at samples x (n, n_x), and what m unit forces do in them; see the top of this page.
@@ -126,7 +124,7 @@ class ModalResponse:
     rest: Numbers
     turn: Numbers | None = None  # X (n, r, r)
 
-    @property
+    @cached_property
     def beta(self) -> Floats:
         """The modal constants b·φ (n, r, m), 1/√kg."""
         return np.asarray(np.swapaxes(self.phi, 1, 2) @ self.b)
@@ -142,23 +140,34 @@ class ModalResponse:
 
     def at(self, omega: Floats, a: int = 0, b: int = 0) -> Numbers:
         """H_ab (n, k) in m/N at angular frequencies ω (n, k)."""
-        left = self.beta if self.turn is None else np.swapaxes(self.turn, 1, 2) @ self.beta
-        both = left[..., a] * self.gamma[..., b]
-        pairs = (a, b), (b, a)
-        still = sum(
-            0.5 * np.einsum("nd,nd->n", self.b[..., i], self.rest[..., j]) for i, j in pairs
-        )
+        left, still = self._sides
+        both, still = left[..., a] * self.gamma[..., b], still[:, a, b]
         found = np.empty(omega.shape, dtype=complex)
         for k in chunks(np.arange(len(omega)), omega.shape[1] * both.shape[1]):
             found[k] = np.einsum("nkr,nr->nk", self._shares(omega, k), both[k]) + still[k, None]
         return found
 
+    @cached_property
+    def _sides(self) -> tuple[Numbers, Numbers]:
+        """(Φ X)ᵀb (n, r, m), and R (n, m, m)."""
+        left = self.beta if self.turn is None else np.swapaxes(self.turn, 1, 2) @ self.beta
+        still = np.swapaxes(self.b, 1, 2) @ self.rest
+        return left, 0.5 * (still + np.swapaxes(still, 1, 2))
+
     def _shares(self, omega: Floats, k: Ints) -> Numbers:
-        """1/d_i (p, k, r) at samples ``k`` (p,); infinite at a peak without damping."""
+        """1/d_i (p, k, r) at samples ``k`` (p,), finite at a peak without damping."""
         w, lam = omega[k][..., None], self.mu[k][:, None]
         zeta = self.damping.zeta(lam.shape[2])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(1.0 / (lam - w**2 + 2j * zeta * w * np.sqrt(self.lam[k])[:, None]))
+        d = np.asarray(lam - w**2 + 2j * zeta * w * np.sqrt(self.lam[k])[:, None])
+        d[d == 0.0] = LEAST
+        return 1.0 / d
+
+    def peaks(self, low: float, high: float, beside: Sequence[float]) -> Floats:
+        """Frequencies (n, p) of modes between two, rad/s, so many times ζ_i ``beside`` each."""
+        own, width = np.sqrt(self.mu.real), 1.0 + self.zeta[..., None] * np.array(beside)
+        there = ((own > 0.5 * low) & (own < 2.0 * high)).any(axis=0)
+        near = (own[..., None] * width)[:, there].reshape(len(own), -1)
+        return np.asarray(np.clip(near, low, high))
 
     def slopes(self, omega: Floats, wanted: NDArray[np.bool_]) -> Numbers:
         """∂H/∂x (n, k, n_x) of the first force at itself, where ``wanted`` (n_x,)."""
@@ -221,10 +230,7 @@ def unit_forces(model: Model, nodes: Mapping[str, Sequence[Sequence[float]]]) ->
     case = model.poses.case
     if model.held is not None:
         raise MechanismError("mechanism", "a node is held: ask the mechanism itself for responses")
-    for name, own in case.coordinates.items():
-        if own.moves == "free":
-            message = "is free, and a response needs what holds it: give it a drive stiffness"
-            raise MechanismError(f"coordinates.{name}", f"{message}, or lock it")
+    require_held(case, model.motion, "a response")
     return forces(case, model.poses.parameters, model.motion, nodes)
 
 
@@ -334,11 +340,7 @@ class Shaken:
         cls, model: Model, node: str, direction: Sequence[float], ends: Floats, finer: bool = False
     ) -> Shaken:
         """Of a model, or of a mesh of twice the elements."""
-        if finer:
-            case, pencil = model.refined()
-            same = {name: mesh for name, mesh in model.meshes.items() if not mesh.whole.strands}
-            frames = replace(model.poses, case=case)
-            model = replace(model, pencil=pencil, poses=frames, meshes=same)
+        model = model.refined() if finer else model
         return cls(model, unit_forces(model, {node: [direction]}), ends, dampings(model))
 
     def at(self, x: Floats, wanted: NDArray[np.bool_]) -> tuple[Floats, Floats]:
@@ -360,11 +362,9 @@ class Shaken:
         parabolas of 1/|H|², which a peak of one mode is. Beside the top slopes are others.
         """
         low, high, every = self.ends[:-1], self.ends[1:], np.arange(len(found.x))[:, None]
-        own, width = np.sqrt(found.mu.real), 1.0 + found.zeta[..., None] * [-0.5, 0.0, 0.5]
-        there = ((own > 0.5 * low[0]) & (own < 2.0 * high[-1])).any(axis=0)
-        near = np.clip((own[..., None] * width)[:, there].reshape(len(own), -1), low[0], high[-1])
-        scan = np.linspace(low, high, SCAN).T.ravel()
-        omega = np.sort(np.hstack([np.tile(scan, (len(own), 1)), near]), axis=1)
+        near = found.peaks(low[0], high[-1], (-0.5, 0.0, 0.5))
+        scan = np.tile(np.linspace(low, high, SCAN).T.ravel(), (len(near), 1))
+        omega = np.sort(np.hstack([scan, near]), axis=1)
         level = _level(found, omega)
         inside = (omega[:, None] >= low[:, None]) & (omega[:, None] <= high[:, None])
         best = np.where(inside, level[:, None], np.inf).argmin(axis=2)

@@ -145,7 +145,7 @@ def sag_changes(
     if weight is None or not _bends_as_known(model):
         return None
     n, highest, theta = model.under_load.n_u, max(modes), model.pencil.theta(x)
-    hz = standing_frequencies(model.refined(1.0)[1], x, highest)
+    hz = standing_frequencies(model.refined(1.0).pencil, x, highest)
     bent, down = np.full(hz.shape, np.nan), np.asarray(g, dtype=np.float64)
     for k, pose in enumerate(model.under_load.at(x)):
         u = pose.displaced(pose.weight() @ down[:, None])[:, 0]
@@ -291,10 +291,10 @@ def compliances(
 
     ``finer``: of a mesh of twice the elements.
     """
-    case, pencil = model.refined() if finer else (model.poses.case, model.pencil)
-    found = forces(case, model.poses.parameters, model.motion, nodes)
+    model = model.refined() if finer else model
+    found = forces(model.poses.case, model.poses.parameters, model.motion, nodes)
     each = np.arange(len(found.unknowns))
-    return Flexibility(pencil, found, each, each)
+    return Flexibility(model.pencil, found, each, each)
 
 
 def sags(model: Model, node: str, finer: bool = False) -> Flexibility:
@@ -303,7 +303,8 @@ def sags(model: Model, node: str, finer: bool = False) -> Flexibility:
     As `under_load.sag_of_nodes` has it: the pose that the trajectory asks for is where the drives
     hold the mechanism, the weight bends links and passive joints.
     """
-    case, pencil = model.refined() if finer else (model.poses.case, model.pencil)
+    model = model.refined() if finer else model
+    case, pencil = model.poses.case, model.pencil
     assert pencil.weight is not None
     axes = np.eye(2 if case.mechanism.space == "planar" else 3)
     found = forces(case, model.poses.parameters, model.motion, {node: axes.tolist()}, weight=True)

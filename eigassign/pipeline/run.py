@@ -201,12 +201,13 @@ def _moving(
         return ()
     ones = np.ones(len(scene.path.q))
     numbers = {f"mode {k}": k * ones for k in range(1, min(scene.shown_modes(), SHOWN) + 1)}
-    target = next((t for t in targets if t.asked.is_goal), next(iter(targets), None))
+    of_modes = [t for t in targets if t.followed or not t.asked.followed]
+    target = next((t for t in of_modes if t.asked.is_goal), next(iter(of_modes), None))
     name, first = f"mode {scene.modes[0]}", scene.modes[0] * ones
     if target is not None:
         name, first = target.asked.curve_name, target.asked.mode * ones
         for row in target.followed[:1]:
-            first[target.asked.rows] = np.maximum(row.exact_numbers, 1)
+            first[target.asked.rows] = row.exact_numbers
     numbers = {name: first, **numbers} | {name: first}
     return tuple(motions(scene.file, scene.model, scene.path, y, numbers))
 

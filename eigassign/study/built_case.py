@@ -38,6 +38,7 @@ from eigassign.mechanism.assembly.build import (
     with_elements,
     with_reduction,
 )
+from eigassign.mechanism.assembly.held import require_held
 from eigassign.mechanism.assembly.mode_shapes import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.forward import build_link_frames, design_dependence
@@ -113,6 +114,8 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
     links = build_links(file) if links is None else links
     parameters, motion = links.parameters, links.motion
     with located(file):
+        if file.responses:
+            require_held(file, motion, "a response")
         local = local_links(file, parameters, motion, links.meshes)
         pencil = build_pencil(file, parameters, motion, local)
         poses = build_link_frames(file, parameters, motion)

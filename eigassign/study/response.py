@@ -1,7 +1,7 @@
 """Responses along the trajectory: dynamic stiffness, modal constants, speeds that are free.
 
-Frequencies are so near that a peak between two of them is at most 0.8 % higher: a quarter of the
-least damping ratio apart.
+The frequencies drawn are a quarter of the least damping ratio apart, if that are not too many. What
+is least is looked for at those of each sample's modes, too, and as far beside as ζ widens a peak.
 """
 
 from __future__ import annotations
@@ -16,7 +16,14 @@ from eigassign.case.units import SI, Given
 from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.tracking import links
-from eigassign.modal.response import ModalResponse, Shaken, dampings, modal_response, unit_forces
+from eigassign.modal.response import (
+    NEAR,
+    ModalResponse,
+    Shaken,
+    dampings,
+    modal_response,
+    unit_forces,
+)
 from eigassign.study.results import FreeSpeeds, ResponseRow
 from eigassign.study.scene import Scene
 
@@ -42,19 +49,14 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
         highest = 2.0 * np.pi * key.highest * key.harmonics
         each = [[modal_response(model, d, own, x, highest) for d in damped] for x in samples]
         found, hz = each[0], _frequencies(key, each[0])
-        w = np.tile(2.0 * np.pi * hz, (len(path.time_s), 1))
-        H = np.array([[one.at(w, a, b) for one in ends] for ends in each])
-        H = np.where(np.isfinite(H), H, -np.inf)  # at a peak without damping
-        size = np.abs(H).max(axis=1)
-        ends = 2.0 * np.pi * np.array([key.lowest, key.highest])
-        lam = np.sqrt(each[0][0].lam)
-        met = (lam.max(axis=0) >= ends[0]) & (lam.min(axis=0) <= ends[1])
-        endless = bool(met.any()) and not all(one.zeta.any() for one in each[0])
-        if not size[0].any():
+        (w, H), *others = (_looked_at(one, 2.0 * np.pi * hz, a, b) for one in each)
+        size = np.abs(H).max(axis=0)
+        if not size.any():
             raise MechanismError("response", f"nothing gives way: {key.name}")
-        k, j = np.unravel_index(size[0].argmax(), size[0].shape)
-        mesh = None
-        if model.is_meshed and key.seen is None and all(m.zeta.any() for m in found):
+        k, j = np.unravel_index(size.argmax(), size.shape)
+        ends, mesh = 2.0 * np.pi * hz[[0, -1]], None
+        endless = _is_endless(found, ends, a, b)
+        if model.is_meshed and key.seen is None and not endless:
             none, worst = np.zeros(samples[0].shape[1], dtype=bool), samples[0][[k]]
             coarse, fine = (
                 Shaken.of(model, key.at, key.direction, ends, finer).at(worst, none)[0].max()
@@ -65,26 +67,43 @@ def study_responses(scene: Scene, y: Floats) -> Iterator[ResponseRow]:
         modes_hz = np.sqrt(found[0].lam[:, :shown]) / (2.0 * np.pi)
         zeta = [m.zeta[:, :shown] for m in found]
         ratios = tuple(zeta if len(zeta) < 2 else (np.min(zeta, axis=0), np.max(zeta, axis=0)))
-        initial = 1.0 / size[1].max(axis=0) if len(size) > 1 else None
+        before = [np.abs(one).max(axis=(0, 1)) for _, one in others]  # (k,)
         yield ResponseRow(
             name=key.name,
             unit=UNIT,
-            least=0.0 if endless else 1.0 / float(size[0, k, j]),
-            at_hz=float(hz[j]),
+            least=0.0 if endless else 1.0 / float(size[k, j]),
+            at_hz=float(w[k, j]) / (2.0 * np.pi),
             at_s=float(path.time_s[k]),
-            before=None if initial is None else float(initial.min()),
-            real=-np.inf if endless else float(H[0].real.min()),
+            before=next((1.0 / float(one.max()) for one in before), None),
+            real=-np.inf if endless else float(H.real.min()),
             mesh=mesh,
             free=tuple(_free(key, modes_hz, ratios)),
             frequency_hz=hz,
-            response=H[0],
-            initial=initial,
+            response=H[..., : len(hz)],
+            initial=next((1.0 / one[: len(hz)] for one in before), None),
             places=tuple(PushedNode(at=at, direction=d).name for at, d in order),
             constants=found[0].beta[:, :shown],
             modes_hz=modes_hz,
             ratios=ratios,
             tracked=_tracked(found[0], path, shown),
         )
+
+
+def _looked_at(
+    found: Sequence[ModalResponse], omega: Floats, a: int, b: int
+) -> tuple[Floats, NDArray[np.complex128]]:
+    """Frequencies (n, k + p) in rad/s, first the k given; and H there, (dampings, n, k + p)."""
+    near = (one.peaks(omega[0], omega[-1], (-1.0, 0.0, 1.0)) for one in found)
+    w = np.hstack([np.tile(omega, (len(found[0].x), 1)), *near])
+    return w, np.array([one.at(w, a, b) for one in found])
+
+
+def _is_endless(found: Sequence[ModalResponse], ends: Floats, a: int, b: int) -> bool:
+    """Whether a mode without damping that is seen passes a frequency of the range on the way."""
+    own, seen = np.sqrt(found[0].lam), np.abs(found[0].beta[..., a] * found[0].beta[..., b])
+    met = (own.max(axis=0) >= ends[0]) & (own.min(axis=0) <= ends[1])
+    undamped = np.min([one.zeta for one in found], axis=(0, 1)) < NEAR
+    return bool((met & undamped & (seen > NEAR * seen.max()).any(axis=0)).any())
 
 
 def _frequencies(key: DrawnResponse, found: Sequence[ModalResponse]) -> Floats:

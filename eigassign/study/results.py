@@ -439,8 +439,8 @@ class TargetStudy(Brief):
     @property
     @told()
     def mode(self) -> int | None:
-        """The lowest of its modes; null of one that is followed by its shape."""
-        return None if self.followed else self.asked.mode
+        """The lowest of its modes; null of one followed by its shape, and of an antiresonance."""
+        return None if self.asked.followed else self.asked.mode
 
     @property
     @told("followed", optional=True)

@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from chains import case_of
 from rail_and_mast import HEIGHT, LAMP, OUT, alone, case, tree
 from scipy.optimize import brentq, minimize_scalar
 
+import eigassign as ea
 from eigassign.errors import CaseError, LostModeError
 from eigassign.output import results_document, sample_files
-from eigassign.pipeline import check, solve_case
+from eigassign.pipeline import Options, check, solve_case
 from eigassign.study import RunResults
 
+CASES = Path(__file__).parents[2] / "cases"
 RAIL, MAST = alone("rail").model(), alone("mast").model()
 X = alone("rail").trajectory.q
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
@@ -155,3 +158,20 @@ def written(folder: Path) -> Path:
     file = folder / "case.yaml"
     file.write_text(json.dumps({"title": "followed", **given}))
     return file
+
+
+def test_what_moves_in_a_report_is_the_mode_that_it_is_called() -> None:
+    """No mode of the five masses is their antiresonance, though it is asked for first."""
+    data = yaml.safe_load((CASES / "five_masses.yaml").read_text())
+    data["targets"].reverse()
+    case = ea.load_case(data)
+    results = solve_case(case, Options(report="full", study="none")).results
+    (motion,) = results.moving
+    assert {one.name for one in motion.modes} == {f"mode {k}" for k in range(1, 6)}
+    y = np.array([row.optimal for row in results.design])
+    hz = case.model().frequencies(case.trajectory.q[0], y, 5)[0]
+    for one in motion.modes:
+        np.testing.assert_allclose(one.hz, hz[int(one.name[-1]) - 1], rtol=1e-9)
+    row = results_document(results)["targets"][0]
+    assert row["mode"] is None
+    assert not row.get("followed")

@@ -185,7 +185,6 @@ def test_it_is_told_as_what_it_is() -> None:
     ("change", "message"),
     [
         ({"damping": None}, "needs damping: ratios"),
-        ({"q1": "free"}, "needs what holds q1"),
         ({"to": "5 Hz"}, "the lowest frequency comes first"),
         ({"at": "forearm.tip"}, "forearm.tip"),
         ({"at_most": "1 N/um"}, "a response has the limit at_least"),
@@ -200,8 +199,6 @@ def test_what_cannot_be_meant_is_named(change: Tree, message: str) -> None:
         data["targets"][0]["response"][key] = change[key]
     if "at_most" in change:
         data["targets"][0] = {"response": TARGET, "at_most": "1 N/um"}
-    if "q1" in change:
-        data["coordinates"]["q1"]["drive"] = "free"
     if "both" in change:
         data["mechanism"]["materials"]["steel"]["loss_factor"] = 0.01
     with pytest.raises(CaseError, match=message):

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.program import Floats, LinearConstraint, frozen
 from eigassign.brief import Brief
-from eigassign.case.schema.targets import AnyTarget, NamedMode
+from eigassign.case.schema.targets import AnyTarget, FollowedMode, NamedMode
 from eigassign.errors import UsageError
 from eigassign.facts import Fact, Unwritten, told
 
@@ -332,7 +332,7 @@ class Requirement(Brief):
     @property
     def mode(self) -> int:
         """Its mode, of several the lowest, 1 of all; of a followed one what it is named by."""
-        followed = (mode.like for mode in self.followed)
+        followed = (mode.like for mode in self.followed if isinstance(mode, FollowedMode))
         return min((*(mode for mode in self.modes if mode > 0), *followed), default=1)
 
     @property

@@ -158,11 +158,6 @@ class Antiresonance(PushedNode):
     number: Mode = 1
 
     @property
-    def like(self) -> int:
-        """Its number."""
-        return self.number
-
-    @property
     def name(self) -> str:
         """It in words."""
         return f"antiresonance {self.number} of {super().name}"

@@ -79,6 +79,14 @@ class Substitution(NamedTuple):
         return list(self.rows.get(unknown, {unknown: 1.0}).items())
 
 
+def require_held(case: CaseFile, motion: Kinematics, what: str) -> None:
+    """Raise MechanismError where nothing resists a coordinate."""
+    for k in motion.rigid:
+        name = list(case.coordinates)[motion.columns[k]]
+        message = f"is free, and {what} needs what holds it: give it a drive stiffness, or lock it"
+        raise MechanismError(f"coordinates.{name}", message)
+
+
 def substitution(
     held: Held, case: CaseFile, parameters: ModelParameters, motion: Kinematics, nodes: NodeMotions
 ) -> Substitution:
@@ -86,10 +94,7 @@ def substitution(
 
     Raises MechanismError where a coordinate is free, and where the node cannot move that way.
     """
-    for k in motion.rigid:
-        name = list(case.coordinates)[motion.columns[k]]
-        message = f"is free, and antiresonances of {held} need what holds it: give it a drive"
-        raise MechanismError(f"coordinates.{name}", f"{message} stiffness, or lock it")
+    require_held(case, motion, f"the response of {held}")
     ends = SpringEnds(case, parameters, motion, nodes.rows, nodes.count)
     n = np.array(held.direction) / np.linalg.norm(held.direction)
     axes = np.vstack([n, np.linalg.svd(n[None])[2][1:]])  # N

@@ -26,7 +26,7 @@ from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
-from eigassign.case.schema.targets import StaticTarget
+from eigassign.case.schema.targets import FollowedMode, StaticTarget
 from eigassign.facts import verdict_word
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.results import (
@@ -97,6 +97,7 @@ def study_targets(
                 followed=tuple(
                     FollowedRow(one.name, one.like, before.numbers[rows, k], after.numbers[rows, k])
                     for one, k in followed
+                    if isinstance(one, FollowedMode)
                 ),
                 near=None if near is None else mode_rows(near, before, after, rows),
                 room=_room(asked, after),
