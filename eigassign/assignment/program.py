@@ -148,7 +148,7 @@ def by_osqp(program: Program) -> tuple[Floats | None, int, str]:
 
 
 def _first_guess(program: Program, x: Floats) -> NDArray[np.int_]:
-    """The working set (rows of G,): +1 at the upper, −1 at the lower limit, 0 inactive."""
+    """The working set (rows of G,), ±1 at upper and lower limits that x is near, if independent."""
     row, equal = program.G @ x, program.lower == program.upper
     below, above = row - program.lower <= NEAR, program.upper - row <= NEAR
     near, side = np.where(above, 1, np.where(below, -1, 0)), np.zeros(len(row), dtype=int)
@@ -160,7 +160,11 @@ def _first_guess(program: Program, x: Floats) -> NDArray[np.int_]:
 
 
 def _descend(program: Program, x: Floats, side: NDArray[np.int_]) -> tuple[Floats, Floats]:
-    """Algorithm 16.3 from a working set, which it changes: x and mu."""
+    """Algorithm 16.3 from a working set, which it changes: x and mu.
+
+    If its steps run out, the last point is returned and residuals decide. A limit that x violates
+    stops the first step that makes it worse.
+    """
     most, mu = 10 * sum(program.G.shape) + 50, np.zeros(len(side))
     fixed = program.lower == program.upper
     for step in range(most):
@@ -187,7 +191,11 @@ def _null_space(rows: Floats) -> Floats:
 
 
 def _direction(program: Program, x: Floats, side: NDArray[np.int_]) -> Floats:
-    """The shortest step p with G_W p = 0 that minimises the objective."""
+    """The shortest step p with G_W p = 0 that minimises the objective.
+
+    Where the cost falls along a direction that A does not see, the step goes that way beyond all
+    limits: every direction of a falling cost has one.
+    """
     Z = _null_space(program.G[side != 0])
     residual, cost = program.A @ x + program.b, Z.T @ program.cost
     U, s, Vt = np.linalg.svd(program.A @ Z, full_matrices=False)

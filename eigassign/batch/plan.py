@@ -77,7 +77,7 @@ class PlannedFile:
 
     @cached_property
     def _twins(self) -> Mapping[str, set[str]]:
-        """Of each key the values that are told from another one by the case of letters alone."""
+        """Values of a key that differ by case alone, as folders on macOS and Windows cannot."""
         found = {}
         for key, column in zip(self.variants.keys, self.variants.columns, strict=True):
             texts = {text_of(value) for value in column if not isinstance(value, (int, float))}

@@ -139,7 +139,7 @@ def outcome_of(
 def _solved(
     variant: Variant, options: CaseOptions, ended: Callable[..., CaseOutcome]
 ) -> CaseOutcome:
-    """The outcome of a case, which stands in run.json of its folder."""
+    """The outcome, in run.json of its folder; that no design meets the limits is an answer too."""
     case, written = load(variant, options), _written(variant.path)
     if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
         raise UsageError(

@@ -520,7 +520,7 @@ def checked(
 
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
-    """SHA-256 of each file that is there, by its name as seen from ``folder``."""
+    """SHA-256 of each file that is there by its name from ``folder``; raises StorageError."""
     digests = {}
     for each in named:
         if (sha := file_digest(each.file, each.limit)) is not None:

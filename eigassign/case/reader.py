@@ -448,7 +448,7 @@ def key_path(tree: Tree, key: str) -> KeyPath:
 
 
 def short_keys(keys: Iterable[str], least: int = 1) -> dict[str, str]:
-    """The end of each key, from a name on and of at least so many parts, that no other key has."""
+    """The end of each key, of so many parts at least, that no other key has; else the whole key."""
     parts = {key: key.rsplit(".", 10) for key in keys}
     ends = {
         key: [".".join(p[-n:]) for n in range(least, len(p)) if not p[-n].isdecimal()]

@@ -223,7 +223,7 @@ def _text(file: Path, key: str) -> str:
 def _headings(
     header: Sequence[str], columns: Sequence[CsvColumn]
 ) -> tuple[list[str], list[_Heading]]:
-    """The names in a header of `name` or `name [unit]`, and the ``columns`` that are there."""
+    """Names of a header of `name` or `name [unit]`, and ``columns`` there; raises ValueError."""
     names, units = list[str](), list[str]()
     for cell in header:
         if (match := _HEADER_CELL.fullmatch(cell)) is None:

@@ -144,7 +144,7 @@ def _tasks(
 
 
 def _by_shape(subject: Subject, tests: Points) -> Floats:
-    """Frequencies (n, n_modes) of modes of one shape, NaN at most points and where it is lost."""
+    """Frequencies (n, n_modes) of one shape, that where neighbours are farthest; NaN where lost."""
     pencil, highest = subject.model.pencil, max(subject.modes)
     hz = np.full((len(tests), len(subject.modes)), np.nan)
     if pencil.n_dof > SOUGHT_DOF:
@@ -333,7 +333,7 @@ def _near_modes(subject: Subject, tests: Points) -> tuple[Near, ...]:
 
 
 def _numbers_at(subject: Subject, a: Floats, b: Floats, count: int) -> Floats:
-    """What numbers (n, count) the shapes of the lowest modes at a have at b."""
+    """Numbers (n, count) at b of the lowest shapes at a; NaN of shapes that are not unique."""
     try:
         (hz, before), (_, after) = (subject.model.modes(*subject.split(x), count) for x in (a, b))
     except EigassignError:  # somewhere there are no modes

@@ -199,7 +199,7 @@ def ritz_pairs(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
 
 
 def _standard(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
-    """L⁻¹ M_c L⁻ᵀ and L⁻¹ of K (n, k, k), whose lower triangle is read."""
+    """L⁻¹ M_c L⁻ᵀ, L⁻¹ of K (n, k, k), lower triangle; raises MechanismError if K is indefinite."""
     inverse = inverse_factor(K)
     return inverse @ M_c @ np.swapaxes(inverse, 1, 2), inverse
 

@@ -115,7 +115,7 @@ def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
 
 
 def _assigned(results: RunResults) -> Iterator[Column]:
-    """One group of columns a wanted mode, limit or band, whichever trajectories it holds on."""
+    """A group of columns a mode, limit or band, each sample once; asked twice, another one."""
     groups: dict[str, list[TargetStudy]] = {}
     for target in results.targets:
         name = target.asked.curve_name if target.asked.is_goal else target.label

@@ -146,7 +146,7 @@ def _plain(path: re.Match[str]) -> str:
 
 
 def headline(results: RunResults) -> str | None:
-    """The verdict with its reason, then worst distance, worst violation, and the least room."""
+    """Verdict, reason, worst distance and violation, least room; None if nothing was asked."""
     error, violation, row = results.error, results.violation, results.assignment
     goals = any(target.asked.is_goal for target in results.targets)
     said = [] if row is None else [f"{verdict_word(row.verdict)}: {row.reason}."]

@@ -195,7 +195,7 @@ class _Tree(ElementTree.TreeBuilder):
 def _parsed(
     path: Path,
 ) -> tuple[str, dict[str, Inertial | None], list[_Joint], dict[str, int]]:
-    """Name, links, joints and lines of links of a file without its meshes."""
+    """Name, links, joints, lines of links; raises UsageError with all problems, StorageError."""
     try:
         data = read_bytes(path, CASE)
     except (FileNotFoundError, NotADirectoryError):

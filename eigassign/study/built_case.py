@@ -238,7 +238,7 @@ def first_within(accuracy: float, tries: Iterator[Try]) -> Choice:
 
 
 def _finer_meshes(file: CaseFile, accuracy: float) -> Iterator[Try]:
-    """Twice and twice as many elements for the links that leave them to ``auto``."""
+    """Twice and twice as many elements for links left to ``auto``; raises AccuracyError."""
     elements, y = automatic_elements(file), initial_design(file)
     parts = [name for name in _left_to_auto(file) if is_imported(file, name)]
 

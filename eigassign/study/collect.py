@@ -109,7 +109,7 @@ SMOOTH = 100  # samples of a trajectory: a curve through more has no kinks to be
 def between_samples(
     scene: Scene, y: Floats, count: int
 ) -> dict[str, tuple[Floats, tuple[ModeRow, ...]]]:
-    """The lowest ``count`` modes before and after at many instants, for smooth pictures."""
+    """The lowest ``count`` modes at many instants, by trajectory, for pictures; none if dear."""
     if not scene.model.pencil.is_dense or len(scene.path.time_s) > SMOOTH * len(scene.path.parts):
         return {}
     try:

@@ -131,7 +131,7 @@ def displaced(
     factors: Floats,
     points: int | None = None,
 ) -> DrawnPoses:
-    """Poses at samples x (n, n_x), of one design: each of ``found`` with ``factors`` (n, count)."""
+    """Poses at x (n, n_x): ``found`` times ``factors`` (n, count), lines of ``points`` at most."""
     d, n = _dimension(file), len(found)
 
     def at(node: NodeName) -> Floats:
@@ -244,7 +244,7 @@ def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:
 
 
 def _farthest_travelled(file: CaseFile, model: Model, x: Floats, seams: Sequence[int]) -> Floats:
-    """The path of the node that travels farthest, where the case names no tip."""
+    """The path (n, d) of the node that travels farthest, NaN at ``seams`` between trajectories."""
     nodes = [model.poses.world(*node) for node in _named_nodes(file, model)]
     paths = np.insert(np.stack(model.poses.values(x, nodes)), list(seams), np.nan, axis=1)
     way = np.nansum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)

@@ -1096,7 +1096,7 @@ class RunResults(Origin):
 
     @property
     def thin(self) -> tuple[TargetStudy, ...]:
-        """Limits on frequencies that are met with too little room, the least first."""
+        """Limits met with less room than `THIN` or the error of mesh and links; the least first."""
         row = self.assignment
         if row is None or row.verdict != "reached" or row.robust is not None:
             return ()

@@ -126,7 +126,7 @@ class DesignPoint(NamedTuple):
         return Expected(values, behind, self._rows_behind(d, behind, values, slopes[worse[first]]))
 
     def _rows_behind(self, d: Floats, behind: Indices, values: Floats, slopes: Floats) -> Rows:
-        """The rows expected behind kinks, of slopes (p, n) at d."""
+        """The rows expected behind kinks, of slopes (p, n) at d; squares are one row together."""
         there, squares = values[behind], behind[: np.searchsorted(behind, self.m)]
         sign = np.where(self._either(behind), np.sign(there), 1.0)
         if self.squared and (p := len(squares)):

@@ -61,7 +61,7 @@ class Cost(NamedTuple):
         return value + self.of_mass * (mass - self.free), slopes + self.of_mass * steep
 
     def least(self, lower: Floats, upper: Floats) -> Floats:
-        """Costs (n,) that no design between two (n, n_y) of the same choices is below."""
+        """Costs (n,) that no design between two (n, n_y) is below: of affine c theirs."""
         slopes, constant = self.prices, -self.of_mass * self.free
         if self.mass is not None and self.is_affine:
             mass, steep = self.mass(self.reference)

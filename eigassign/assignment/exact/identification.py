@@ -250,7 +250,7 @@ def _directions(slopes: Floats) -> tuple[Floats, Floats]:
 
 
 def _unidentified(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> Floats:
-    """Directions (k, n_y) that the measurements do not notice, away from bounds that hold."""
+    """Directions (k, n_y) that measurements do not notice, without parameters that bounds hold."""
     width = problem.upper - problem.lower
     inwards = np.array([{"lower": 1.0, "upper": -1.0, "": 0.0}[side] for side in held])
     slopes = fit.seen.slopes * width
@@ -381,7 +381,11 @@ class _Profile:
         return NOTICED * float(self.width[j] / max(float(np.linalg.norm(rest)), 1e-300))
 
     def _refitted(self, j: int, at: float, near: Optimum, everywhere: bool) -> Optimum | None:
-        """The best fit with y_j ``at`` a value; None where the model has no answer there."""
+        """The best fit with y_j ``at`` a value; None where the model has no answer there.
+
+        It starts from ŷ; where χ² does not allow what that leads to, on the line from ŷ through
+        ``near``, and ``everywhere`` from both corners of the bounds, too.
+        """
         centre, best = self.fit.y, None
         along = near.y - centre
         line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)

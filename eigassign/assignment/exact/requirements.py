@@ -232,7 +232,7 @@ class Requirements:
                     yield rows.of, rows.curve(values[at]), slopes[at] / rows.scale[:, None]
 
     def owner(self, index: int) -> tuple[str, str]:
-        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper."""
+        """Name and side of the limit of an excess (k,); those of scenarios follow one another."""
         index %= sum(len(rows.edge) for rows in self.excesses)
         rows = next(rows for rows, at in _spans(self.excesses) if index < at.stop)
         return rows.of.name, rows.side

@@ -184,7 +184,7 @@ class ForbiddenBand(Requirement):
         return self.lower * (1.0 - margin.room), self.upper * raised
 
     def errors_by_count(self, solved: Solved, margin: Margin) -> Floats:
-        """The largest error (count + 1,) along one trajectory with 0, 1, … modes below the band."""
+        """The largest error (count + 1,) with 0, 1, … modes below the band; below 0 it is room."""
         own = self._counted(solved)
         low, high = (edge[:, None] for edge in self.drawn_out(margin))
         return np.array([e.max() for e in _by_count(own / low - 1.0, 1.0 - own / high)])
@@ -200,7 +200,7 @@ class ForbiddenBand(Requirement):
         return np.stack([solved.curve(m)[self.rows] for m in self.counted if m <= most], axis=1)
 
     def near(self, initial: Solved, exact: Solved) -> tuple[int, ...] | None:
-        """The modes near the band before or after, and at least those on either side of it."""
+        """Modes near the band before or after, one on either side at least; None if followed."""
         if self.followed:
             return None
         both = np.stack([initial.hz[self.rows], exact.hz[self.rows]])

@@ -303,7 +303,7 @@ class Requirement(Brief):
     def value(
         self, y: Floats, found: Frequencies, terms: Terms | None = None
     ) -> tuple[Floats, Floats]:
-        """Its curve (n,) and slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
+        """Its curve (n,) and slopes (n, n_y) at y (n_y,), or those of other ``terms``."""
         value: Floats | float = 0.0
         slopes: Floats | float = 0.0
         for term, c in self.terms if terms is None else terms:

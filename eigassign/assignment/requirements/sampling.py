@@ -211,7 +211,7 @@ def _along(path: Trajectories, rows: slice) -> Iterator[tuple[str, slice]]:
 
 
 def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:
-    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time."""
+    """Frequencies (n,) in Hz at ``rows``, by each one's time; linear between points, not beyond."""
     if not isinstance(curve, FrequencyProfile):
         return np.full(rows.stop - rows.start, float(curve))
     found, knots = [], np.array(curve.time)

@@ -306,7 +306,7 @@ def one_shot_has_a_quadratic_program(document: Document) -> Iterator[Finding]:
 
 
 def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
-    """What is to be light, high or wide has limits beside it, no wanted frequencies."""
+    """What is to be light, high or wide has limits (or bands, gaps), no wanted frequencies."""
     name = document.assignment.named_objective
     one_shot = document.assignment.method == "one_shot"  # which takes none of them
     if name not in ("lightest", "highest", "widest") or one_shot:

@@ -100,19 +100,16 @@ def substitution(
     axes = np.vstack([n, np.linalg.svd(n[None])[2][1:]])  # N
     b = along(ends.in_world(split(held.node)), n)
     z = reference(case, parameters)
-    beside = z + 0.01 * np.sin(1.0 + np.arange(len(z))) * (
-        np.arange(len(z)) < len(case.coordinates)
-    )
+    k = np.arange(len(z))
+    beside = z + 0.01 * np.sin(1.0 + k) * (k < len(case.coordinates))
 
     def numbers(*rows: MotionRow) -> list[Floats]:
         arrays = (np.array([*row.values()], dtype=object) for row in rows)
         return parameters.compiled(*arrays)(np.array([z, beside]).T)
 
     for link, mesh in nodes.meshes.items():
-        for name, slots in mesh.nodes.items():
-            own = (
-                nodes.own[link][slots[: len(n)]] if "@origin" not in mesh.nodes else np.array([-1])
-            )
+        for name, slots in mesh.nodes.items() if "@origin" not in mesh.nodes else ():
+            own = nodes.own[link][slots[: len(n)]]
             if (own < 0).any() or not b.keys() & set(own.tolist()):
                 continue
             moved = ends.in_world((link, name))
@@ -126,12 +123,8 @@ def substitution(
     most = [[*b][k] for k in np.argsort(-size, kind="stable")[:2].tolist()]
     p, r = b[most[0]], b[most[-1]] if len(most) > 1 else 0.0
     by = (p * p + r * r) ** -0.5
-    return _turned(
-        b,
-        most,
-        [{most[0]: p * by, most[-1]: r * by}, {most[0]: r * by * -1.0, most[-1]: p * by}],
-        by,
-    )
+    both = [{most[0]: p * by, most[-1]: r * by}, {most[0]: r * by * -1.0, most[-1]: p * by}]
+    return _turned(b, most, both, by)
 
 
 def _turned(

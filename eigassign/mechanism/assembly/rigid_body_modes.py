@@ -250,7 +250,7 @@ def _rows(
 
 
 def _at_poses(table: CompiledArrays, case: CaseFile, parameters: ModelParameters) -> Floats:
-    """Values (n_poses, …) at random places about the reference, else twice there."""
+    """Values (n_poses, …) at random within a rad or m and half of each range, else twice there."""
     z, n, rng = reference(case, parameters), len(parameters.coordinates), np.random.default_rng(0)
     half = [0.5 * (high - low) for low, high in case.box]
     span = np.append(np.ones(n), parameters.to_z[n:, n:] @ half)

@@ -92,7 +92,7 @@ class Strand(NamedTuple):
 
 
 def element_motion(motion: Floats, axes: Floats) -> Floats:
-    """Motion (n, 12, count) of both nodes of each element of a row, in its axes."""
+    """Motion (n, 12, count) of both nodes of each element from that of nodes (n + 1, 6, count)."""
     turned = np.concatenate([axes @ motion[:, :3], axes @ motion[:, 3:]], axis=1)
     return np.concatenate([turned[:-1], turned[1:]], axis=1)
 
@@ -180,7 +180,7 @@ class Entries:
 
 
 def chain_dofs(count: int, space: str) -> Ints:
-    """The six slots of each of ``count`` nodes one after the other, (count, 6)."""
+    """The six slots of each of ``count`` nodes in turn, (count, 6); −1 for what a plane has not."""
     kept = list(DOFS[space])
     slots = np.full((count, 6), -1)
     slots[:, kept] = np.arange(count * len(kept)).reshape(count, -1)
@@ -222,7 +222,7 @@ def add_bodies(
     nodes: Mapping[str, Ints],
     arms: Mapping[str, Objects] = MappingProxyType({}),
 ) -> None:
-    """The point masses and rigid bodies fixed to a link's nodes."""
+    """The bodies fixed to a link's nodes; those at ``arms`` hang on the origin rigidly."""
     for key, body in case.mechanism.bodies.items():
         link, _, node = body.at.partition(".")
         if link == name:
@@ -266,7 +266,7 @@ def rigid_link(case: CaseFile, parameters: ModelParameters, tree: Topology, name
 def copies_of(
     case: CaseFile, parameters: ModelParameters, tree: Topology
 ) -> dict[str, tuple[object, ...]]:
-    """By name of a plain beam all that its mesh depends on, equal for those that are copies."""
+    """By name of a beam without bodies or riders all that its mesh depends on, equal for copies."""
     loaded = {body.at.partition(".")[0] for body in case.mechanism.bodies.values()}
     found: dict[str, tuple[object, ...]] = {}
     for name, link in case.mechanism.links.items():

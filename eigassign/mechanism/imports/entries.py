@@ -201,7 +201,7 @@ def read_matlab(data: bytes) -> Contents | None:
 
 
 def _sent(data: bytes) -> bytes:
-    """What the other process makes of the file."""
+    """What the other process makes of the file; raises UnfitError, ValueError if it dies of it."""
     room = int(raised(MATRIX))
     memory = int(_START + _ENTRY * raised(ENTRIES) + 2 * len(data))
     seconds = int(max(_SECONDS, raised(_SECONDS)) + len(data) / _PACE)

@@ -257,7 +257,7 @@ def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
 
 
 def _own(ik: TipProblem, u: Floats) -> Floats:
-    """States with the passive freedoms that the model itself has, coming from its reference."""
+    """States with the model's own passive freedoms; raises SingularityError if it has none."""
     if ik.chain.assembly is None:
         return u
     q = ik.coordinates(u)

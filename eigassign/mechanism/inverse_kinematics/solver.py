@@ -71,7 +71,7 @@ class TipProblem(NamedTuple):
         return change(reduced(self.evaluate(u), self.n_q), task[:, :, None])[:, :, 0]
 
     def evaluate(self, u: Floats, by_design: bool = False) -> TipEvaluation:
-        """The chain's evaluation with metres and radians in one measure."""
+        """The chain's evaluation, m and rad in one measure; slopes by y come after those by q."""
         chain, scale, z = self.chain, self.scale, u * self.scale
         seen = chain.evaluate(z, by_design=True) if by_design else chain.evaluate(z)
         if by_design:
@@ -178,7 +178,7 @@ def prepare(
 def _spread(
     chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
 ) -> Floats:
-    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows."""
+    """Evenly spread q (n_seeds, n_q), a Kronecker sequence: over a turn, or about ``near``."""
     (matrix, offset), n_q = chain.relative_map, chain.n_q
     middle = matrix @ (np.zeros(n_q) if near is None else near[:n_q]) + offset
     seen = chain.evaluate(np.zeros((1, len(chain.kinds))))
@@ -257,7 +257,7 @@ class Corrected(NamedTuple):
 
 
 def newton(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Corrected:
-    """Newton for tip(u) = target with closed loops."""
+    """Newton for tip(u) = target with closed loops; for n_q < m it settles on the nearest point."""
     for _ in range(8 if ik.n_q == target.point.shape[1] + len(ik.chain.turned_by) else 40):
         seen = ik.evaluate(u)
         motion = reduced(seen, ik.n_q)
@@ -291,7 +291,7 @@ def change(motion: Reduced, tasks: Floats) -> Floats:
 
 
 def handedness(ik: TipProblem, u: Floats) -> Floats:
-    """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch."""
+    """The signs of det J and det ∂F/∂p (n, 2), which flip between branches; 0 if not square."""
     seen = ik.evaluate(u)
     return _signs(ik, seen, reduced(seen, ik.n_q))
 

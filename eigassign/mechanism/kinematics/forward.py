@@ -251,7 +251,10 @@ class _Placing:
 def walked(
     case: CaseFile, parameters: ModelParameters, tree: Topology, name: str, backwards: bool = False
 ) -> JointMotion:
-    """Motion of a joint with its mounting and position, from base to follower or backwards."""
+    """Motion of a joint with its mounting and position, from base to follower or backwards.
+
+    Between nodes that are turned by R_b and R_f: R_b R R_fᵀ, R_b d, R_f A.
+    """
     joint, path = case.mechanism.joints[name], f"joints.{name}"
     mount = mounting(parameters.angles(path, joint))
     values = [parameters.freedom(k) for k in tree.of_joint(name)]

@@ -214,7 +214,7 @@ ALL_AT_ONCE = 64  # unknowns up to which all eigenpairs cost no more than the wa
 
 
 def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
-    """λ (count,), ascending, and modes (n_dof, count) with φᵀMφ = 1 for θ (n_theta, 1)."""
+    """λ (count,) ascending and φ (n_dof, count) for θ; φᵀMφ = 1, the largest entry positive."""
     order, n = pencil.elastic_first, len(pencil.elastic)
     A, C, coupling = _standard(pencil, theta)
     mu, v = _largest(A, count)

@@ -288,6 +288,6 @@ def junit_xml(tests: Iterable[Test]) -> bytes:
 
 
 def _escaped(text: str) -> str:
-    """``text`` as content or attribute, on one line."""
+    """``text`` as content or attribute, on one line; what XML cannot hold as ``\\x1b``."""
     shown = _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
     return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", shown)

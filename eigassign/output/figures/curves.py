@@ -251,7 +251,10 @@ def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
 
 
 def campbell(results: RunResults) -> FigurePlan:
-    """Where the modes lie along the trajectory, over speed, with the orders that targets name."""
+    """Where the modes lie along the trajectory, over speed, with the orders that targets name.
+
+    Order h excites h n/60 Hz at n rpm; it meets a mode at speeds between 60/h times its ends.
+    """
     speeds = sorted({60.0 * hz for _, hz, _ in results.orders})
     rpm, marks, meets = np.array([0.0, 1.3 * speeds[-1]]), list[Mark](), list[Mark]()
     orders = {f"order {h:g}": h / 60.0 for h, *_ in sorted(results.orders)}

@@ -209,7 +209,7 @@ def drawn(
 
 
 def silhouette(flat: Floats, faces: NDArray[np.intp]) -> Floats:
-    """Where faces (m, 4) turn away from the viewer: segments between ``flat`` points (n, 2)."""
+    """Where faces (m, 4) of ``flat`` points (n, 2) turn away: segments (3 k, 2), NaN between."""
     a, b, c = (flat[faces[:, k]] for k in range(3))
     front = np.linalg.det(np.stack([b - a, c - a], axis=1)) > 0.0
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
@@ -236,7 +236,7 @@ def _aligned(points: Floats, along: Floats) -> Floats:
 
 
 def _thick(held: Extent, flat: Floats, ends: tuple[float, float], colour: str) -> Iterator[Curve]:
-    """A line as thick as its section, but no hair; a taper in eight pieces."""
+    """A line as thick as its section, a taper in eight; white around it where links cross."""
     if len(flat) < 2 or not np.ptp(flat, axis=0).any():
         return
     start, end = (max(72.0 * thick / held.per_inch, THINNEST) for thick in ends)

@@ -38,7 +38,7 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
 
 
 def _plotted(*ys: Floats, most: int = 600) -> NDArray[np.intp]:
-    """The samples that are plotted, at most about as many as a screen has pixels across."""
+    """Samples that are plotted: all, or of many stretches those where a ``y`` is at its ends."""
     every = np.arange(len(ys[0]))
     if every.size <= most:
         return every

@@ -361,7 +361,7 @@ def write_page(
     document: tuple[str, bytes],
     **how: Any,
 ) -> None:
-    """The file of all numbers, the figures in these formats, and report.html unless it is none."""
+    """The file of all numbers, the figures, and report.html by ``kind``: full, light or none."""
     (folder / document[0]).write_bytes(document[1])
     files = write_figures(plans, folder, formats)
     if kind != "none":

@@ -94,7 +94,7 @@ def write_record(folder: Path, run: RunOf, token: str, outcome: Mapping[str, Any
 
 
 def _seal(folder: Path, content: Mapping[str, Any]) -> str:
-    """SHA-256 of ``content`` and of the files that it lists."""
+    """SHA-256 of ``content`` and its files; raises OSError for links and for over a gigabyte."""
     found = hashlib.sha256(json.dumps(content).encode())
     for name in content["files"]:
         if (folder / name).is_symlink():
@@ -274,7 +274,7 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
 
 
 def _settle(hidden: Path, target: Path) -> None:
-    """Delete a run that was never published or has been replaced; else put back or keep aside."""
+    """Delete an unpublished or replaced run, else put back or aside; by renames: two may race."""
     with contextlib.suppress(FileNotFoundError):
         if hidden.suffix != ".tmp":
             record = read_record(hidden)
@@ -300,7 +300,7 @@ def _settle(hidden: Path, target: Path) -> None:
 
 
 def _is_replaced(old: Path, target: Path) -> bool:
-    """Whether ``target`` has a run of the case of ``old``, in which nobody changed anything."""
+    """Whether ``target`` has a run of the case of ``old``, which is empty or as it was written."""
     if not old.is_dir():
         return False
     record, new = read_record(old), read_record(target)

@@ -146,7 +146,7 @@ def _searched(scene: Scene, found: Found) -> dict[str, Any]:
 
 
 def _decided(scene: Scene, answer: Answer) -> Conflict | None:
-    """The limits that contradict, unless one of them is not decided for all designs."""
+    """The limits that contradict, unless one is not decided for all designs; of lists by trial."""
     open_ = {one.name for one in scene.limits if not one.is_decided}
     settled = answer.found is not None and _is_settled(answer.found)
     found = answer.conflict
@@ -232,7 +232,7 @@ def _deviated(
 def _missed_between(
     scene: Scene, designs: Sequence[Floats], targets: Sequence[TargetStudy], accepted: float
 ) -> Iterator[str]:
-    """Say which targets are missed between samples, by how much at worst."""
+    """Targets missed between samples, by how much, of the answer (first) or its deviations."""
     y, own = designs[0], followers(scene, scene.wanted)
     statics = [one for one in scene.followed_limits if one.violation(one.amount(y), 0.0) <= ON]
     for one in (*(target.asked for target in targets if target.satisfied), *statics):
@@ -252,7 +252,7 @@ def _missed_between(
 
 
 def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
-    """Say which static targets are met by the mesh and reduced links, and missed by finer ones."""
+    """Static targets missed by finer meshes; beyond twice the elements a third more at most."""
     q = scene.path.at(y)[0]
     for one in scene.statics if scene.model.is_meshed else ():
         w, finer = (one.way.at(q[one.rows], y, each) for each in (False, True))

@@ -139,7 +139,12 @@ def solver_row(assignment: Assignment) -> SolverRow:
 def _between_samples(
     scene: Scene, starts: Sequence[Floats], progress: Progress
 ) -> tuple[Found, RobustRow | None, list[str]]:
-    """The optimum for samples, and for instants between them where its limits would be missed."""
+    """The optimum for samples, and for instants between them where its limits would be missed.
+
+    Each optimum is looked at between the samples; where a limit that it keeps at samples is missed
+    there, or what shall be high is lower, these instants are samples of one more scene, in which it
+    is sought anew.
+    """
     more = (progress, deadline_of(scene.file))
     (found, robust), notes = _optimum(scene, starts, *more), list[str]()
     for _ in range(FINER):

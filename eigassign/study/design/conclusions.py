@@ -113,7 +113,7 @@ def _bound(found: Found, outlook: Outlook, least: float, enough: float, most: in
 def _of_boxes(
     variant: PosedProblem, outlook: Outlook, lower: Floats, upper: Floats, missed: bool
 ) -> Iterator[float]:
-    """Yield what no design of each box is below, F or where ``missed`` the violation."""
+    """Yield what no design of a box is below, F or violation; infinite if none keeps the limits."""
     problem = variant.problem
     kept = can_be_kept(problem.constraints, lower, upper)
     known = outlook(outlook.levels - 1, lower, upper)
@@ -148,7 +148,11 @@ def _rounded(value: float) -> float:
 def aim_row(
     found: Found, of_model: Mapping[int, float], worst: ViolationRow | None
 ) -> AimRow | None:
-    """What is light, high or wide before and after; None where the objective is an error."""
+    """What is light, high or wide before and after; None where the objective is an error.
+
+    ``of_model`` is how much too high mesh and reduced links put modes at most, relative; ``worst``
+    what limits are violated by.
+    """
     scene = found.task.scene
     aim, kept, wanted = scene.file.assignment.named_objective, ")", scene.wanted
     designs = scene.initial, found.best.y
@@ -261,7 +265,7 @@ def conflict(found: Found, steps: int, of_design: Sequence[LimitedQuantity]) -> 
 
 
 def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
-    """The amount nearest to a limit that no design within the bounds keeps; None where one does."""
+    """The amount nearest to a limit that no design keeps; None if one does, of catalogues too."""
     if scene.file.design.catalogues:
         return None
     (lower, upper), n = scene.bounds, len(y)

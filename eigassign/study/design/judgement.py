@@ -271,7 +271,7 @@ def _all(far: Sequence[str]) -> str:
 
 
 def _far(target: TargetStudy) -> str:
-    """Where the target ends, how far off: ``mode 1 at 48 Hz: 45.11 Hz, 6.02 % off at worst``."""
+    """Where the target ends, of a band a mode in it: ``mode 1 at 48 Hz: 45.11 Hz, 6.02 % off``."""
     asked, worst = target.asked, f"{100 * target.error.exact.max_relative:.3g} %"
     said = f"{worst} off at worst" if asked.is_goal else f"violated by {worst} at worst"
     if not asked.terms:

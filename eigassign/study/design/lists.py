@@ -82,7 +82,7 @@ def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
 
 
 def price_of_one(file: CaseFile) -> float:
-    """The price that is F = 1: beside errors prices are in %² of them, in the worst case in %."""
+    """The price that is F = 1; 1 is as 1 %² of errors, 1 % of the worst or of room, 1 Hz."""
     aim = file.assignment.objective
     if aim == "widest":
         return 1e2

@@ -120,7 +120,11 @@ def robust_optimum(
 
 
 class _Deviations:
-    """The deviations about an optimum, and what is missed there, relative."""
+    """The deviations about an optimum, and what is missed there, relative.
+
+    Of goals that is their error, of limits their violation, of what shall be high or wide what it
+    is short of what the optimum has in all its scenarios, or of what another one ``had``.
+    """
 
     def __init__(self, found: Found, had: float | None = None) -> None:
         self.found, self.task, self.y = found, found.task, found.best.y

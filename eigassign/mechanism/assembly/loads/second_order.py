@@ -275,7 +275,7 @@ def _rotation(nodes: Sequence[tuple[Floats, Floats]], kept: Sequence[int]) -> Fl
 
 
 def _momentum(mesh: LinkMesh, space: str) -> tuple[Floats, Floats, float]:
-    """(M r)ᵀ (3, n_local) of the part, its first moment m c (3,), and m, all without bodies."""
+    """(M r)ᵀ (3, n_local) of the part, m c (3,) and m, without bodies; no mass, no weight."""
     whole, kept = mesh.whole, list(DOFS[space])
     N = np.zeros((whole.n_local, 6))
     N[:, kept] = sum(term.matrix.toarray() for term in whole.rigid)

@@ -79,7 +79,7 @@ class Loaded:
 
     @cached_property
     def sites(self) -> Mapping[NodeName, Objects]:
-        """The mass matrix (6, 6) of the bodies at each node that carries any."""
+        """The masses (6, 6) of bodies at nodes that have any; a rigid link's all at its origin."""
         found: dict[NodeName, Objects] = {}
         for name, link in self.links.items():
             J, kept = np.zeros((6, 6), dtype=object), list(DOFS[self.nodes.space])

@@ -420,7 +420,7 @@ def can_be_met(found: Found, names: Sequence[str], most: int, steps: int) -> boo
 def _drawn_in(
     margins: tuple[Margin, ...], rows: Sequence[ClearanceRow], more: float
 ) -> tuple[Margin, ...]:
-    """Margins by the room that was lacking."""
+    """Margins by the room that lacked: first by what the model raises modes, then a little more."""
     found = []
     for (room, raised), row in zip(margins, rows, strict=True):
         if not row.clear and row.raised is not None:

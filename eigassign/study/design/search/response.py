@@ -347,7 +347,7 @@ class Designs:
 def solved_below(
     scene: Scene, bands: Sequence[ForbiddenBand], own: tuple[Named, ...], y: Floats
 ) -> Solved:
-    """The lowest frequencies of a design (n_y,), all that matter to the bands and have mass."""
+    """The frequencies of a design (n_y,) that matter to the bands, at all samples, and followed."""
     q = scene.path.at(y)[0]
     available = scene.model.n_dof - scene.model.n_rigid
     beyond = max((float(band.upper.max()) for band in bands), default=0.0)

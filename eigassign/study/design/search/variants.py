@@ -131,7 +131,7 @@ def thinned(whole: Task, few: int) -> Task | None:
 
 
 def _few(whole: Task, few: int) -> NDArray[np.intp]:
-    """About so many samples, and the instants between samples at which most is asked."""
+    """About so many samples, and of each target first, last, lowest and highest edge."""
     path = whole.scene.path
     most = [
         one.rows.start + row
@@ -213,7 +213,11 @@ def _appraise(task: Task, asked: Requirements, response: DesignResponse) -> Appr
 
 
 def cost_of(scene: Scene, unit: float) -> Cost | None:
-    """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing."""
+    """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing.
+
+    What is chosen of lists with a price each counts in full. Of the lightest design the mass is
+    all that counts, in kg.
+    """
     design, mass, n = scene.file.design, scene.model.total_mass, len(scene.initial)
     if scene.file.assignment.objective == "lightest":
         return Cost(np.zeros(n), scene.initial, 1.0, mass, is_affine=mass.is_affine)
@@ -392,7 +396,7 @@ def _refined(
 
 
 def _is_enough(search: Searched) -> bool:
-    """True where more starts hardly lead to more optima, or exact solves are used up."""
+    """True where hardly more optima are expected, solves are used up, or nothing can be better."""
     if search.tally is None:
         return False
     (violation, value), problem = worth(search.optima[0]), search.variant.problem
