@@ -352,11 +352,11 @@ def _robustness(results: RunResults) -> Iterator[Table]:
 
 def _responses(results: RunResults) -> Iterator[Table]:
     """The least dynamic stiffness of each response, and speeds that are free."""
-    caption = f"Dynamic stiffness 1/|H|, the least along {results.along} and over its frequencies."
+    caption = f"Dynamic stiffness 1/|H|, the least at samples of {results.along} and over frequencies."
     yield facts_table(
         "Responses", results.responses, "name handy least at_hz at_s before real mesh", caption
     )
-    caption = "No harmonic of the passing of teeth comes within f (1 ± ζ) of a mode on the way."
+    caption = "No harmonic of the passing of teeth comes within f (1 ± ζ) of a mode at the samples."
     free = [one for row in results.responses for one in row.free]
     yield facts_table("Free speeds of the spindle", free, "of lowest highest", caption)
 

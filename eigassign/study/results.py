@@ -297,7 +297,7 @@ class FreeSpeeds:
 
 @dataclass(frozen=True, repr=False)
 class ResponseRow(InOneUnit, Brief):
-    """A response at n samples and k frequencies; of a range of damping the worse end of both."""
+    """A response at n samples and k frequencies; of ranges of damping the worst choice of ends."""
 
     name: Annotated[Key, Fact(heading="response")]
     unit: str
@@ -319,7 +319,7 @@ class ResponseRow(InOneUnit, Brief):
 
     @property
     def stiffness(self) -> Floats:
-        """1/|H| (n, k) in N/m, of the worse end."""
+        """1/|H| (n, k) in N/m, of the worst damping."""
         size = np.abs(self.response).max(axis=0)
         return np.asarray(1.0 / np.maximum(size, np.finfo(float).tiny))
 
