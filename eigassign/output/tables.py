@@ -352,7 +352,7 @@ def _robustness(results: RunResults) -> Iterator[Table]:
 
 def _responses(results: RunResults) -> Iterator[Table]:
     """The least dynamic stiffness of each response, and speeds that are free."""
-    caption = f"Dynamic stiffness 1/|H|, the least at samples of {results.along} and over frequencies."
+    caption = f"Dynamic stiffness 1/|H|, the least at samples of {results.along} by frequency."
     yield facts_table(
         "Responses", results.responses, "name handy least at_hz at_s before real mesh", caption
     )
