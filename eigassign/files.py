@@ -26,6 +26,7 @@ from typing import Any
 from eigassign.errors import UsageError
 
 VARIABLE = "EIGASSIGN_LIMITS"
+UPDATED = "updated.yaml"  # in the folder of an update
 CASE = 10_000_000  # bytes of a case file
 TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
 MATRIX = 1_000_000_000  # of a matrix of a superelement

@@ -33,6 +33,7 @@ from eigassign.case.reader import (
     Source,
     Tree,
     dotted,
+    entries,
     key_path,
     read_mapping,
     read_yaml,
@@ -65,7 +66,8 @@ from eigassign.case.rules.properties import (
     quantities,
     value_at,
     walk,
-    with_value,
+    with_properties,
+    with_uncertain,
 )
 from eigassign.case.schema.design import RESERVED, Design, Parameter, Tolerance
 from eigassign.case.schema.document import Document, validated
@@ -85,6 +87,7 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
+from eigassign.case.schema.uncertain import BESIDE, Uncertain, UnknownColumn
 from eigassign.case.units import SI, Given
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, file_digest, objection, read_bytes, seen_from
@@ -125,9 +128,10 @@ def to_yaml(content: Mapping[str, object]) -> str:
 
 def plain(value: object) -> object:
     """Objects → mappings, lists, numbers and text, in the shape of the file."""
-    if isinstance(value, Design):
-        limits = {k: getattr(value, k) for k in RESERVED}
-        return plain({**value.entries, **{k: v for k, v in limits.items() if v}})
+    if isinstance(value, Design | Uncertain):
+        beside = {k: getattr(value, k, None) for k in (*RESERVED, *BESIDE)}
+        own = {k: v for k, v in value.entries.items() if not isinstance(v, UnknownColumn)}
+        return plain({**own, **{k: v for k, v in beside.items() if v}})
     if isinstance(value, Tolerance):
         return value.written()
     if isinstance(value, Part):
@@ -179,6 +183,7 @@ class CaseFile:
     damping: DampingForm | None
     trajectory: TrajectoryForm | tuple[TrajectoryForm, ...] | None
     design: Design
+    uncertain: Uncertain | None
     expansion: ExpansionKeys
     targets: tuple[TargetForm, ...]
     response: ResponseForm | None
@@ -378,15 +383,9 @@ class CaseFile:
 
     def with_design(self, y: Iterable[float]) -> CaseFile:
         """The case with these values (SI) of its design parameters written into the mechanism."""
-        mechanism, coordinates = self.mechanism, self.coordinates
-        for column, value in zip(self.design.parameters.values(), y, strict=True):
-            for path, factor in column.factors.items():
-                head, *rest = path.split(".")
-                if head == "coordinates":
-                    coordinates = with_value(coordinates, rest, factor * float(value))
-                else:
-                    mechanism = with_value(mechanism, [head, *rest], factor * float(value))
-        return replace(self, mechanism=mechanism, coordinates=coordinates)
+        both = zip(self.design.parameters.values(), y, strict=True)
+        values = {p: f * float(value) for own, value in both for p, f in own.factors.items()}
+        return replace(self, **with_properties(self, values))
 
     def with_every_property(self, places: bool = True) -> CaseFile:
         """The case with all numbers that may vary, and are not 0, as parameters at their values.
@@ -493,15 +492,20 @@ def checked(
     bad = [] if allow_outside else [*not_allowed(named, path.parent)]
     bad = bad or [*unreadable([each for each in named if not each.spare])]
     unread = {place for place, _ in bad}
+    if not bad:
+        source = source._replace(tree=_with_updates(source.tree, named))
     document, found = validated(source.tree, path.parent)
     found = [*islice(keys_have_values(source.tree), MOST_PROBLEMS), *found]
     findings = bad + [finding for finding in found if finding[0] not in unread]
     if document is not None and not findings:
+        designed, document = document.design, with_uncertain(document)
         findings = [*islice(inconsistent(document), MOST_PROBLEMS)]
     problems = [*source.problems, *(source.problem(*each) for each in told_once(findings))]
     if problems or document is None:
         raise CaseError(tuple(dict.fromkeys(problems))[:MOST_PROBLEMS])
     doubts = [*implausible(document), *unreadable([each for each in named if each.spare])]
+    if not document.assignment.robust:  # what is not known does not count
+        document = document.model_copy(update={"design": designed})
     warnings = [source.problem(*finding) for finding in doubts]
     case = CaseFile(
         **{name: getattr(document, name) for name in Document.model_fields},
@@ -517,6 +521,16 @@ def checked(
         bare = [source.problem(*each) for each in bare_lengths_are_of_machines(document)]
         raise CaseError(tuple((bare or impossible)[:MOST_PROBLEMS]))
     return case
+
+
+def _with_updates(tree: Tree, named: Sequence[NamedFile]) -> Tree:
+    """The tree with what is uncertain in place of the name of the file that says it."""
+    for each in named:
+        if each.path == ("uncertain", "file"):
+            body = {**entries(tree, "uncertain")}
+            told = entries(read_yaml(read_bytes(each.file, CASE), each.file).tree, "uncertain")
+            tree = {**tree, "uncertain": {**told, **{k: v for k, v in body.items() if k != "file"}}}
+    return tree
 
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:

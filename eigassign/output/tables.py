@@ -334,7 +334,7 @@ def _robustness(results: RunResults) -> Iterator[Table]:
     yield facts_table("Clearance", bands, "label below room raised clear", caption)
     if row is not None and (robust := row.robust) is not None:
         caption = (
-            "Missed at the worst deviation that a search found within the tolerances, and at the "
+            f"Missed at the worst deviation that a search found within {robust.within}, and at the "
             f"worst of {robust.draws} random ones; of what is as high or wide as can be, what it "
             "is short of the robust design's. Alone: the optimum without deviations. From alone "
             f"to robust: {robust.words}."

@@ -682,6 +682,39 @@ class RobustRow(Brief):
     price_nominal: float | None
     price: float | None
     targets: tuple[RobustTarget, ...]
+    probability: Annotated[float | None, Fact("that all limits hold, as random values have it")]
+    judged: Annotated[int | None, Fact("random values of what is uncertain")]
+    probability_nominal: Annotated[float | None, Fact("of the optimum without deviations")]
+    wanted: Annotated[float | None, Fact("probability that was asked for")]
+    within: Annotated[str, Fact("what deviations lie in, in words")]
+
+    @property
+    def deviation(self) -> Annotated[float | None, Fact("standard, of the probability")]:
+        """√(p(1 − p)/n) of n random values, one more failing than did."""
+        if self.probability is None or not self.judged:
+            return None
+        failing = (1.0 - self.probability + 1.0 / self.judged) / (1.0 + 1.0 / self.judged)
+        return float((failing * (1.0 - failing) / self.judged) ** 0.5)
+
+    @property
+    def is_rarer(self) -> bool:
+        """True where the limits hold less often than was asked, by three standard deviations."""
+        p, wanted, deviation = self.probability, self.wanted, self.deviation
+        return None not in (p, wanted, deviation) and p + 3.0 * deviation < wanted  # type: ignore
+
+    @property
+    def chance(self) -> str:
+        """With which probability all limits hold, in words; empty where nothing is uncertain."""
+        if self.probability is None or self.deviation is None or self.wanted is None:
+            return ""
+        alone = "" if self.probability_nominal is None else percent(self.probability_nominal)
+        return (
+            f"all limits hold together with a probability of {percent(self.probability)} "
+            f"± {percent(self.deviation)} (asked: {100.0 * self.wanted:g} %"
+            + f"; the optimum without deviations: {alone})"
+            if alone
+            else ")"
+        )
 
     @property
     def words(self) -> str:
@@ -700,7 +733,8 @@ class RobustRow(Brief):
         pairs += [(f"mass {number(self.mass_nominal)}", f"{number(self.mass)} kg")]
         if self.price is not None and self.price_nominal is not None:
             pairs += [(f"price {number(self.price_nominal)}", number(self.price))]
-        return ", ".join(" → ".join(pair) for pair in pairs)
+        chance = f"; {self.chance}" if self.chance else ""
+        return ", ".join(" → ".join(pair) for pair in pairs).replace("-", "−") + chance
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

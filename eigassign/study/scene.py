@@ -32,12 +32,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.requirements import Tolerances
+from eigassign.assignment.exact.requirements import Ellipsoid, Tolerances
 from eigassign.assignment.program import LinearConstraint, frozen
 from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity, StaticLimit
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import design_limits, requirements_of
-from eigassign.brief import Brief
+from eigassign.brief import Brief, counted
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, EigassignError, MissingMassError
 from eigassign.facts import percent
@@ -164,14 +164,44 @@ class Scene:
 
     @cached_property
     def tolerances(self) -> Tolerances:
-        """How far the parameters may deviate from what they are made to be."""
-        each = [column.tolerance for column in self.file.design.parameters.values()]
+        """How far the parameters may deviate from what they are made to be, or are known to be."""
+        columns, y = self.file.design.parameters, self.initial
+        each = [column.tolerance for column in columns.values()]
         share, amount = (
             np.array([one.amount if one and one.relative == of else 0.0 for one in each])
             for of in (True, False)
         )
-        quantities = self.file.design_quantities
-        return Tolerances(share, amount, np.array([0 in (q.at_least, q.above) for q in quantities]))
+        natural = np.array([0 in (q.at_least, q.above) for q in self.file.design_quantities])
+        middle, numbers = np.zeros(len(columns)), {name: k for k, name in enumerate(columns)}
+        if (known := self.file.uncertain) is None or numbers.keys().isdisjoint(known.entries):
+            return Tolerances(share, amount, natural)
+        for name, one in known.entries.items():
+            k = numbers[name]
+            if one.min is not None and one.max is not None:
+                amount[k] = 0.5 * (one.max - one.min)
+                middle[k] = (0.5 * (one.max + one.min) - y[k]) / amount[k]
+        at = [numbers[name] for name in known.spread]
+        if not at:
+            return Tolerances(share, amount, natural, middle)
+        both = known.explained({name: float(y[numbers[name]]) for name in known.spread})
+        centres, covariances = map(np.array, zip(*both, strict=True))
+        amount[at] = np.sqrt(np.diag(covariances[0]))
+        more = natural[at], self.file.assignment.probability
+        return Tolerances(
+            share, amount, natural, middle, Ellipsoid.of(at, centres, covariances, *more)
+        )
+
+    @property
+    def deviating(self) -> str:
+        """What deviations lie within, in words."""
+        own, known = self.file.design.parameters.values(), self.file.uncertain
+        each = ["the tolerances"] if any(column.tolerance for column in own) else []
+        if known is not None and len(known.spread) < len(known.entries):
+            each.append("the ranges of what is uncertain")
+        if (ball := self.tolerances.ellipsoid) is not None:
+            share = f"{100.0 * self.file.assignment.probability:g} %"
+            each.append(f"the {share} ellipsoid of {counted(len(ball.columns), 'uncertain value')}")
+        return " and ".join(each)
 
     @cached_property
     def wanted(self) -> tuple[Requirement, ...]:

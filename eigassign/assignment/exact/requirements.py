@@ -45,15 +45,59 @@ Appraise = Callable[[Floats], Appraisal]
 
 
 @dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """What the ``columns`` (n,) of y may be with a stated probability, about each of some centres.
+
+    With z of n independent normal numbers, p = c + L z, or p = c exp(L z) of those that cannot be
+    below 0, ``positive`` (n,): |z|² ≤ r² holds with the probability, r² being its quantile of χ² of
+    n degrees of freedom. L Lᵀ is the covariance, of logarithms that divided by the values.
+    """
+
+    columns: NDArray[np.intp]
+    centres: Floats  # (n_e, n): of several explanations each
+    factors: Floats  # (n_e, n, n): L
+    positive: NDArray[np.bool_]
+    radius: float
+
+    @classmethod
+    def of(
+        cls,
+        columns: Sequence[int],
+        centres: Floats,
+        covariances: Floats,
+        positive: NDArray[np.bool_],
+        probability: float,
+    ) -> Ellipsoid:
+        """That of covariances (n_e, n, n) in SI units."""
+        from scipy.special import gammaincinv  # loaded only where something is not known
+
+        unit = np.where(positive, centres, 1.0)
+        factors = np.linalg.cholesky(covariances / (unit[:, :, None] * unit[:, None, :]))
+        radius = float(np.sqrt(2.0 * gammaincinv(0.5 * len(columns), probability)))
+        return cls(np.array(columns, dtype=np.intp), centres, factors, positive, radius)
+
+    def placed(self, y: Floats, z: Floats, e: int = 0) -> tuple[Floats, Floats]:
+        """y (n_y,) with what z (n,) stands for about centre e, and ∂p/∂z (n, n)."""
+        off, y = self.factors[e] @ z, y.copy()
+        p = np.where(self.positive, self.centres[e] * np.exp(off), self.centres[e] + off)
+        y[self.columns] = p
+        return y, np.where(self.positive, p, 1.0)[:, None] * self.factors[e]
+
+
+@dataclass(frozen=True, eq=False)
 class Tolerances:
     """How far parameters may deviate either way, ``share`` of |y| and ``amount`` (n_y,) in SI.
 
-    ``natural`` (n_y,) are those that cannot be below 0, such as masses.
+    ``natural`` (n_y,) are those that cannot be below 0, such as masses. A range need not lie about
+    y: ``middle`` (n_y,) is how far from it, in units of ``amount``. What is known by a deviation
+    lies on an ``ellipsoid``, and not in the box; its amounts are units of σ alone.
     """
 
     share: Floats
     amount: Floats
     natural: NDArray[np.bool_]
+    middle: Floats | float = 0.0
+    ellipsoid: Ellipsoid | None = None
 
     @property
     def given(self) -> NDArray[np.bool_]:
@@ -71,7 +115,9 @@ class Tolerances:
     def box(self, y: Floats) -> tuple[Floats, Floats]:
         """The least and the largest values (n_y,) of the designs about y."""
         ones = np.ones(len(y))
-        return self.deviated(y, -ones)[0], self.deviated(y, ones)[0]
+        if self.ellipsoid is not None:
+            ones[self.ellipsoid.columns] = 0.0
+        return self.deviated(y, self.middle - ones)[0], self.deviated(y, self.middle + ones)[0]
 
     def scenario(self, y: Floats, design: Floats) -> Floats:
         """σ (n_y,) of a design in the box about y."""

@@ -41,7 +41,7 @@ from eigassign.case.schema.trajectory import (
     named_trajectories,
 )
 from eigassign.case.units import written
-from eigassign.files import MATRIX, MESH, TABLE, objection, printable
+from eigassign.files import CASE, MATRIX, MESH, TABLE, UPDATED, objection, printable
 
 _SPARE = ("measurements", "sweep")
 _VARIABLE = re.compile(r"(.*\.\w+):([A-Za-z]\w{0,62}(?:\.[A-Za-z]\w{0,62})?)", re.DOTALL)
@@ -69,6 +69,8 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
             file, variable = os.path.abspath(folder / name), ""
             if path[-1] in ("stiffness", "mass"):
                 file, variable = split_variable(file)
+            if path == ("uncertain", "file") and os.path.isdir(file):
+                file = os.path.join(file, UPDATED)
             found.append(NamedFile(path, file, limit, path[0] in _SPARE, variable))
     return found
 
@@ -85,6 +87,8 @@ def _limit(tree: Any, path: KeyPath) -> int:
             return TABLE * ("tip" not in motion)
         case ("targets" | "measurements" | "sweep", *_, "file"):
             return TABLE
+        case ("uncertain", "file"):
+            return CASE
     return 0
 
 
@@ -136,7 +140,7 @@ def names_mean_something(document: Document) -> Iterator[Finding]:
 
 def lists_are_as_long_as_what_they_list(document: Document) -> Iterator[Finding]:
     """Points of trajectories and other poses are as long as q, `expansion.y` as the design."""
-    coordinates, parameters = [*document.coordinates], [*document.design.parameters]
+    coordinates, parameters = [*document.coordinates], [*document.design.chosen]
     rows = [(path, row, "coordinate", coordinates) for path, row in coordinate_lists(document)]
     if isinstance(document.expansion.y, tuple):
         rows.append((("expansion", "y"), document.expansion.y, "design parameter", parameters))
@@ -343,7 +347,7 @@ def damping_is_stated_once(document: Document) -> Iterator[Finding]:
 def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
     """Something deviates where deviations count."""
     deviates = any(entry.tolerance for entry in document.design.entries.values())
-    if document.assignment.robust and not deviates:
+    if document.assignment.robust and not deviates and not document.uncertain:
         message = "no parameter has a tolerance: give at least one, such as tolerance: 2 %"
         yield ("assignment", "robust"), message
 

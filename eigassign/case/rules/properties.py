@@ -14,7 +14,7 @@ from functools import cache, reduce
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
-from eigassign.case.schema.design import Choices, Design, Tolerance, column_names
+from eigassign.case.schema.design import RESERVED, Choices, Design, Tolerance, column_names
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import RigidLink, SolidLink
 from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism, NutJoint
@@ -199,6 +199,17 @@ def with_value(part: Any, path: Sequence[str | int], value: float) -> Any:
     return part.model_copy(update={key: with_value(getattr(part, str(key)), rest, value)})
 
 
+def with_properties(case: Any, values: Mapping[str, float]) -> dict[str, Any]:
+    """The `mechanism` and `coordinates` of a case with numbers (SI) by their paths in them."""
+    found = {"mechanism": case.mechanism, "coordinates": case.coordinates}
+    for path, value in values.items():
+        head, *rest = path.split(".")
+        moved = head == "coordinates"
+        owner = "coordinates" if moved else "mechanism"
+        found[owner] = with_value(found[owner], rest if moved else [head, *rest], value)
+    return found
+
+
 # --- Looking into a document
 
 
@@ -213,8 +224,8 @@ def _walk(part: object, path: KeyPath, found: list[tuple[KeyPath, object]]) -> N
     found.append((path, part))
     if isinstance(part, Part):
         for key, field in type(part).model_fields.items():
-            apart = key == "entries" and isinstance(part, Design)  # they stand in it directly
-            _walk(getattr(part, key), path if apart else (*path, field.alias or key), found)
+            inner = path if key == "entries" else (*path, field.alias or key)  # they stand in it
+            _walk(getattr(part, key), inner, found)
     elif isinstance(part, dict):
         for key, each in part.items():
             _walk(each, (*path, key), found)
@@ -287,11 +298,11 @@ def places(design: Design) -> dict[str, dict[str, KeyPath]]:
             for column, path in zip(columns, entry.properties, strict=True):
                 found[column] = {path: (*first, path)}
         elif isinstance(entry.parameter, str):
-            found[name] = {entry.parameter: ("design", name, "parameter")}
+            found[name] = {entry.parameter: (entry.group, name, "parameter")}
         else:
             found[name] = {}
             for k, own in enumerate(entry.parameter):
-                place: KeyPath = ("design", name, "parameter", k)
+                place: KeyPath = (entry.group, name, "parameter", k)
                 found[name] |= (
                     {own: place} if isinstance(own, str) else {p: (*place, p) for p in own}
                 )
@@ -366,7 +377,12 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
             return amount(of(own[0]) if own else parameter(name), rate=True)
         case ["design", name, "tolerance", *own]:
             return amount(of(own[0]) if own else parameter(name), above=0)
-        case ["design", name, _]:
+        case ["uncertain", name, "standard_deviation"]:
+            return amount(parameter(name), above=0)
+        case ["uncertain", "others", key, name]:
+            kind = parameter(name)
+            return kind if key == "values" else amount(kind, above=0)
+        case ["design" | "uncertain", name, _]:
             return parameter(name)
         case ["measurements", "deviation"]:
             return amount(FREQUENCY, above=0)
@@ -390,6 +406,30 @@ def _kind_at(document: Document, path: KeyPath) -> Quantity | None:
             return drive_quantity(document.mechanism, moved[name], key)
     names, k = [*moved], int(path[-1])
     return coordinate(names[k]) if k < len(names) else ANY
+
+
+# --- What is not known
+
+
+def with_uncertain(document: Document) -> Document:
+    """The document with the likeliest values of what is not known, and a column of y for each."""
+    known, own = document, document.uncertain
+    if own is None:
+        return document
+    entries: dict[str, Any] = {**document.design.entries}
+    for name, one in own.entries.items():
+        factors = one.column(0.0).factors
+        value, first = one.value, next(iter(factors))
+        if value is None:  # of an unknown property a rule says so
+            value = 0.0 if known_property(document, first) is None else value_at(document, first)
+        elif all(known_property(document, path) for path in factors):
+            values = {path: factor * value for path, factor in factors.items()}
+            known = known.model_copy(update=with_properties(known, values))
+        entries[name] = one.column(value)
+    limits = {key: getattr(document.design, key) for key in RESERVED}
+    given = document.design.model_fields_set
+    design = Design.model_construct(given, entries=FrozenDict(entries), **limits)
+    return known.model_copy(update={"design": design})
 
 
 # --- Rules

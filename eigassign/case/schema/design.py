@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import AfterValidator, Field, field_validator
 from pydantic_core import core_schema
@@ -105,6 +105,11 @@ Factor: TypeAlias = Annotated[
 OneOfSeveral: TypeAlias = ValueOr[str, Annotated[Mapping[str, Factor], Field(min_length=1), Frozen]]
 
 
+PropertyPaths: TypeAlias = OneOrList[
+    str, Annotated[tuple[OneOfSeveral, ...], Field(min_length=2), AfterValidator(_several)]
+]
+
+
 class Parameter(Part):
     """One design parameter: a property of the mechanism between bounds, or of listed values.
 
@@ -124,10 +129,9 @@ class Parameter(Part):
 
     model_config = needs_one_of(("min", "max"), ("values",))
     other_keys = ("choices",)
+    group: ClassVar[str] = "design"  # the key of the file that it stands under
 
-    parameter: OneOrList[
-        str, Annotated[tuple[OneOfSeveral, ...], Field(min_length=2), AfterValidator(_several)]
-    ]
+    parameter: PropertyPaths
     min: YValue | None = None
     max: YValue | None = None
     values: (
@@ -300,6 +304,7 @@ class DesignColumn:
     max: float
     price: float | None = None
     tolerance: Tolerance | None = None
+    is_designed: bool = True  # no property that is not known
 
     @property
     def parameter(self) -> str:
@@ -370,10 +375,16 @@ class Design(Part):
                     own = FrozenDict({path: 1.0})
                     found[column] = DesignColumn(own, min(values), max(values), *more)
             else:
-                found[name] = DesignColumn(
-                    entry.factors, *entry.range, entry.price, entry.tolerance
-                )
+                low, high = entry.range
+                more = entry.price, entry.tolerance
+                chosen = entry.group == "design"
+                found[name] = DesignColumn(entry.factors, low, high, *more, chosen)
         return FrozenDict(found)
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """The names of those that a design chooses: without what is not known, which follow."""
+        return tuple(name for name, column in self.parameters.items() if column.is_designed)
 
     @cached_property
     def varied(self) -> Mapping[str, tuple[tuple[int, float], ...]]:

@@ -16,7 +16,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from eigassign.case.reader import COMMA, Finding, Tree, shown, suggestion, unspaced
 from eigassign.case.schema.design import RESERVED, Design, is_entry
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
-from eigassign.case.schema.parts import TAG, FrozenDict, Named, Part, must
+from eigassign.case.schema.parts import TAG, FrozenDict, Mistakes, Named, Part, must, wrong
 from eigassign.case.schema.study import (
     AssignmentKeys,
     DampingForm,
@@ -27,6 +27,7 @@ from eigassign.case.schema.study import (
 )
 from eigassign.case.schema.targets import ResponseForm, TargetForm
 from eigassign.case.schema.trajectory import TrajectoryForms
+from eigassign.case.schema.uncertain import BESIDE, Uncertain
 
 P = TypeVar("P", bound=Part)
 typed = cache(TypeAdapter)  # what reads values of a type
@@ -45,6 +46,7 @@ class Document(Part):
         damping: ratios of modes, for responses; loss factors stand with materials and drives
         trajectory: q over time; one, or a list of them
         design: the design parameters y, in this order, and limits that they share
+        uncertain: properties that are not known exactly: robust designs hold for all they may be
         expansion: the power series
         targets: wanted frequencies, limits, bands to keep out of, gaps
         response: responses to draw; one, or a list of them
@@ -62,6 +64,7 @@ class Document(Part):
     damping: DampingForm | None = None
     trajectory: TrajectoryForms | None = None
     design: Design = Design.model_construct()
+    uncertain: Uncertain | None = None
     expansion: ExpansionKeys = ExpansionKeys.model_construct()
     targets: tuple[TargetForm, ...] = ()
     response: ResponseForm | None = None
@@ -69,6 +72,12 @@ class Document(Part):
     measurements: Measurements | None = None
     validation: ValidationKeys = ValidationKeys.model_construct()
     sweep: Sweep | None = None
+
+    def _mistakes(self, space: str | None) -> Mistakes:
+        for name in self.uncertain.entries if self.uncertain else ():
+            if name in self.design.entries:
+                message = "is designed: how far it deviates is its tolerance, or name it otherwise"
+                yield wrong(message, "uncertain", name)
 
 
 # --- Errors of the schema as findings
@@ -105,7 +114,7 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
             continue
         loc = each["loc"] = (*below, *each["loc"])
         path = tuple(p for p in loc if not str(p).startswith(TAG) and p != "[key]")
-        if path[:2] == ("design", "entries"):
+        if path[0] in WITHOUT_ENTRIES and path[1:2] == ("entries",):
             path = (path[0], *path[2:])
         more = each.get("ctx", {})
         words = _WORDS.get(each["type"], each["msg"].replace("{", "").replace("}", ""))
@@ -115,14 +124,19 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
     return found
 
 
+# In the file entries stand directly under these keys, beside the reserved names
+WITHOUT_ENTRIES = {"design": RESERVED, "uncertain": BESIDE}
+
+
 def _with_entries_apart(tree: Tree) -> Tree:
-    """In the file the entries stand directly under `design`, beside the reserved names."""
-    design = tree.get("design")
-    if not isinstance(design, Mapping):
-        return tree
-    apart = {key: design[key] for key in RESERVED if key in design and not is_entry(design[key])}
-    entries = {name: body for name, body in design.items() if name not in apart}
-    return {**tree, "design": {"entries": entries, **apart}}
+    """The tree with the key `entries` that the models have."""
+    whole = {**tree}
+    for group, reserved in WITHOUT_ENTRIES.items():
+        if isinstance(body := tree.get(group), Mapping):
+            apart = {key: body[key] for key in reserved if key in body and not is_entry(body[key])}
+            entries = {name: each for name, each in body.items() if name not in apart}
+            whole[group] = {"entries": entries, **apart}
+    return whole
 
 
 _MAPPINGS = ["model_type", "model_attributes_type", "dict_type", "mapping_type", "is_instance_of"]
@@ -193,9 +207,9 @@ def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12); quantities are numbers (SI) or text with a unit."""
     schema = _without_null(Document.model_json_schema(schema_generator=_Quiet))
     definitions = schema["$defs"]
-    design = definitions["Design"]
-    entries = design["properties"].pop("entries")
-    design["additionalProperties"] = entries["additionalProperties"]
+    for model in ("Design", "Uncertain"):
+        entries = definitions[model]["properties"].pop("entries")
+        definitions[model]["additionalProperties"] = entries["additionalProperties"]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -115,7 +115,8 @@ class AssignmentKeys(Part):
         max_error: how far a frequency may be from its target; 2 % unless given. If it is given, a
             larger error sets the exit code
         robust: whether all that is asked holds for every deviation within the tolerances of the
-            parameters, not only for the design itself
+            parameters, not only for the design itself, and for what is `uncertain`
+        probability: with which all limits hold together, of what is `uncertain` with a deviation
     """
 
     method: Literal["sequential", "one_shot"] = "sequential"
@@ -125,6 +126,7 @@ class AssignmentKeys(Part):
     seconds: Annotated[float, DURATION] | None = None
     max_error: MaxError | None = None
     robust: bool = False
+    probability: Annotated[float, Quantity(PLAIN, above=0, below=1)] = 0.95
 
     @property
     def named_objective(self) -> str:

@@ -96,7 +96,7 @@ def assignment_row(
             merits=merits,
             limits=limits,
             deviated=deviated,
-            robust=answer.robust is not None,
+            robust="" if answer.robust is None else answer.robust.within,
             doubts=doubts,
             unproved=[*coarse, *_unproved(scene, own, largest)],
             unreachable=beyond,
@@ -220,13 +220,15 @@ def _deviated(
     limits: Sequence[LimitRow],
     largest: float,
 ) -> Iterator[str]:
-    """Say what the design itself meets, and some deviation within the tolerances does not."""
+    """Say what the design itself meets, and some deviation does not; or too many of all do not."""
     if robust is None:
         return
     met = {one.label for one in targets if one.satisfied} | {r.words for r in limits if r.satisfied}
     for one in robust.targets:
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
-            yield f"{one.label}: missed by {_percent(one.most)} within the tolerances"
+            yield f"{one.label}: missed by {_percent(one.most)} within {robust.within}"
+    if robust.is_rarer:
+        yield robust.chance
 
 
 def _missed_between(
@@ -300,7 +302,7 @@ def _in_words(scene: Scene, answer: Answer, contradiction: Conflict | None, prov
     if not contradiction.smallest:
         return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
-    deviating = " for all deviations within the tolerances" if answer.robust is not None else ""
+    deviating = f" for all deviations within {answer.robust.within}" if answer.robust else ""
     return f"no design within the bounds {meets} {listed}{together}{deviating}"
 
 

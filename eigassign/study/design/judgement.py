@@ -171,9 +171,10 @@ class Facts(NamedTuple):
 
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
     why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
-    so; ``unreachable`` which targets are out of reach; ``deviated`` what is met and is not within
-    the tolerances, of a ``robust`` design; ``conflict`` which limits contradict, ``of_frequencies``
-    whether some of these are on frequencies, and ``held`` which bounds the answer lies on;
+    so; ``unreachable`` which targets are out of reach; ``deviated`` what is met, and not by all
+    deviations, ``robust`` what these lie in, if there are any; ``conflict`` which limits
+    contradict, ``of_frequencies`` whether some of these are on frequencies, and ``held`` which
+    bounds the answer lies on;
     ``unfinished`` how a search was ended before it was done. ``max_error`` is the largest error
     accepted where the case says it. ``aim`` says what an objective that is no error has come to,
     and ``is_optimal`` whether that is first-order optimal.
@@ -186,7 +187,7 @@ class Facts(NamedTuple):
     unproved: Sequence[str] = ()
     unreachable: Sequence[str] = ()
     deviated: Sequence[str] = ()
-    robust: bool = False
+    robust: str = ""
     conflict: str = ""
     held: str = ""
     of_frequencies: bool = True
@@ -231,8 +232,8 @@ def _word(facts: Facts) -> tuple[str, str]:
         if facts.unproved:
             return "do_not_use", "; ".join(facts.unproved)
         if facts.is_optimal:
-            checked = ", also for all deviations within the tolerances that were checked"
-            return "reached", (facts.aim or "every target is met") + checked * facts.robust
+            checked = f", also for all deviations within {facts.robust} that were checked"
+            return "reached", (facts.aim or "every target is met") + checked * bool(facts.robust)
         far = [f"{facts.aim}; a better design may be near (not first-order optimal)"]
     (before_violation, before), (violation, after) = facts.merits
     gain = IMPROVED * before

@@ -5,11 +5,17 @@ sought, from corners of the box of tolerances and from the design itself; where 
 scenarios so far, it is one more (`assignment.exact.requirements`), and the design is sought anew.
 A scenario less leaves more designs, so that each objective is a bound of that of the robust design,
 as far as a search finds optima. At last random deviations are solved.
+
+What is known by a covariance lies on an ellipsoid, |z| ≤ r (`Ellipsoid`). There the worst point of
+a limit that is linear in p is p = c − r C∇g / √(∇gᵀC∇g): the search goes there, solves again, and
+goes on as long as that is worse.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from time import monotonic
@@ -19,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.exact.requirements import Ellipsoid
 from eigassign.assignment.exact.sequential import End, minimise
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import EdgeRows
@@ -44,6 +51,9 @@ LOST = (
 DRAWS = 128  # random deviations, at all samples
 MANY = 10_000  # more of them, of small models, at so many samples
 AT = 6
+AGREE = 0.98  # of few designs: what is linear judges them as exact solves do
+SHARES = (1.0, 0.5, 0.25, 0.1)  # of the way to the worst of what is linear
+GAINED = 1e-7  # relative: less worse is no worse
 AT_ONCE = 100  # of these, solved together
 
 
@@ -102,7 +112,9 @@ def robust_optimum(
     before = _by_name((rows.of.name, alone.worst_at(rows, one.design)[0]) for rows, one in both)
     draws = DRAWS + look.many
     progress(f"robust: {draws} random deviations")
-    targets = tuple(look.rows(worst, before, look.drawn(worst), nominal.best.y))
+    drawn, holds = look.drawn(worst)
+    before_holds = alone.drawn(first)[1] if first else None  # none where some have no modes
+    targets = tuple(look.rows(worst, before, drawn, nominal.best.y))
     row = RobustRow(
         scenarios=len(found.task.scenarios),
         draws=draws,
@@ -115,6 +127,11 @@ def robust_optimum(
         price_nominal=cost(scene, nominal.best.y),
         price=cost(scene, found.best.y),
         targets=targets,
+        probability=None if holds is None else float(holds.mean()),
+        judged=None if holds is None else len(holds),
+        probability_nominal=None if before_holds is None else float(before_holds.mean()),
+        wanted=None if holds is None else scene.file.assignment.probability,
+        within=scene.deviating,
     )
     return found, row
 
@@ -137,8 +154,10 @@ class _Deviations:
         self.had = own if had is None else had
         self.lower, self.upper = self.scene.tolerances.box(self.y)
         few = self.task.followers or self.scene.path.follows_design  # each is followed anew
-        small = self.scene.model.pencil.is_dense and not few
-        self.many = MANY if small and any(rows.of.mode_terms for rows in self.edges) else 0
+        self.small = self.scene.model.pencil.is_dense and not few
+        self.ellipsoid = self.scene.tolerances.ellipsoid
+        solved = self.small and any(rows.of.mode_terms for rows in self.edges)
+        self.many = MANY if solved or self.ellipsoid is not None else 0
 
     def missed(self, rows: EdgeRows, value: Floats) -> tuple[Floats, Floats]:
         """What is missed where rows have some values, and the slopes of that in these."""
@@ -187,10 +206,40 @@ class _Deviations:
 
             problem = DesignProblem(appraise, *box, objective=Objective.LARGEST)
             corner = max(self.corners, key=lambda one: self.worst_at(rows, one)[0])
-            ends = (minimise(problem, start, STEPS).y for start in (corner, self.y))
+            starts = (corner, self.y) if (self.upper > self.lower).any() else ()
+            ends = [minimise(problem, start, STEPS).y for start in starts] or [self.y]
+            if (ball := self.ellipsoid) is not None:
+                every = itertools.product(ends, range(len(ball.centres)))
+                ends = [self._outwards(rows, start, ball, e) for start, e in every]
             design = max(ends, key=lambda one: self.worst_at(rows, one)[0])
             found.append(WorstDeviation(rows, *self.worst_at(rows, design)[:2], design))
         return tuple(found)
+
+    def _outwards(self, rows: EdgeRows, start: Floats, ball: Ellipsoid, e: int) -> Floats:
+        """The worst design found on an ellipsoid, and at corners of the box, from a start."""
+        z = np.zeros(len(ball.columns))
+        best, dp = ball.placed(start, z, e)
+        most = self.worst_at(rows, best)[0]
+        for _ in range(STEPS):
+            value, slopes = rows.at(best, self.response(best))
+            missed, unit = self.missed(rows, value)
+            slopes = unit[:, None] * slopes
+            g = slopes[:, ball.columns] @ dp
+            size = np.linalg.norm(g, axis=1)
+            aside = np.where(slopes > 0.0, self.upper, self.lower) - best
+            aside[:, ball.columns] = 0.0
+            ahead = missed - g @ z + ball.radius * size + (slopes * aside).sum(axis=1)
+            k = int(ahead.argmax())
+            way = ball.radius * g[k] / (size[k] or 1.0) - z
+            for share in SHARES:
+                tried, turned = ball.placed(best + share * aside[k], z + share * way, e)
+                with suppress(EigassignError):  # one without an answer is none
+                    if (worse := self.worst_at(rows, tried)[0]) > most + GAINED:
+                        best, dp, z, most = tried, turned, z + share * way, worse
+                        break
+            else:
+                break
+        return best
 
     def cuts(self, worst: Sequence[WorstDeviation]) -> Iterator[Floats]:
         """Yield the deviations that miss more than is known of the scenarios.
@@ -208,29 +257,67 @@ class _Deviations:
                 made.append(sigma)
                 yield sigma
 
-    def drawn(self, worst: Sequence[WorstDeviation]) -> dict[str, float]:
-        """The worst of random deviations by name.
+    def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, NDArray[np.bool_]]:
+        """Random designs (n, n_y), of explanations by turns; and which are in the ellipsoids."""
+        designs = rng.uniform(self.lower, self.upper, (n, len(self.y)))
+        if (ball := self.ellipsoid) is None:
+            return designs, np.ones(n, dtype=bool)
+        z = rng.standard_normal((n, len(ball.columns)))
+        both = enumerate(zip(designs, z, strict=True))
+        found = [ball.placed(y, own, k % len(ball.centres))[0] for k, (y, own) in both]
+        return np.reshape(found, designs.shape), np.linalg.norm(z, axis=1) <= ball.radius
 
-        Many more of small ones are solved where the ``worst`` of what is asked of frequencies have
-        least room. Raises EigassignError where one has no answer.
+    def drawn(self, worst: Sequence[WorstDeviation]) -> tuple[dict[str, float], Floats | None]:
+        """The worst of random deviations by name; whether all limits hold in each of many, (n,).
+
+        Frequencies of small models are solved where they have least room, other limits are linear
+        about the ``worst``: where these judge few designs at all samples otherwise than exact
+        solves, those are all. Raises EigassignError where one has no answer.
         """
-        rng, (model, path) = np.random.default_rng(0), (self.scene.model, self.scene.path)
-        designs = rng.uniform(self.lower, self.upper, (DRAWS, len(self.y)))
-        found = [(rows.of.name, self.worst_at(rows, y)[0]) for y in designs for rows in self.edges]
+        rng, first = np.random.default_rng(0), len(self.asked.residuals)
+        limits = [*enumerate(worst)][first:]
+        designs, inside = self.draw(rng, DRAWS)
+        missed = np.array([[self.worst_at(rows, y)[0] for rows in self.edges] for y in designs])
+        found = [*zip(self.edges, missed[inside].max(axis=0, initial=0.0), strict=True)]
+        holds = missed[:, first:].max(axis=1, initial=-np.inf) <= CUT
+        about = [self._about(one, designs) for _, one in limits]
+        agree = np.mean((np.max(about, axis=0) <= CUT) == holds) if about else 0.0
+        designs, inside = self.draw(rng, self.many)
+        solved = dict(self._solved(worst, designs)) if self.small and self.many else {}
+        found += [(self.edges[k], own[inside].max(initial=0.0)) for k, own in solved.items()]
+        if agree > AGREE or (limits and solved.keys() >= dict(limits).keys()):
+            each = [solved[k] if k in solved else self._about(one, designs) for k, one in limits]
+            holds = np.max(each, axis=0) <= CUT
+        by_name = _by_name((rows.of.name, float(most)) for rows, most in found)
+        counts = self.ellipsoid is not None and limits
+        return by_name, np.asarray(holds, dtype=np.float64) if counts else None
+
+    def _about(self, worst: WorstDeviation, designs: Floats) -> Floats:
+        """What designs (n, n_y) miss (n,) of an edge, linear about its worst."""
+        missed, _, slopes = self.worst_at(worst.rows, worst.design)
+        return np.asarray(missed + (designs - worst.design) @ slopes)
+
+    def _solved(
+        self, worst: Sequence[WorstDeviation], designs: Floats
+    ) -> Iterator[tuple[int, Floats]]:
+        """Yield what designs (n, n_y) miss (n,) of edges of frequencies, by their number.
+
+        By exact solves at the samples where the ``worst`` have least room.
+        """
+        model, path = self.scene.model, self.scene.path
         least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
         at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
-        designs = rng.uniform(self.lower, self.upper, (self.many, len(self.y)))
-        for some in np.split(designs, range(AT_ONCE, self.many, AT_ONCE)) if self.many else ():
+        hz = np.full((len(designs), len(path.q), self.asked.modes), np.nan)
+        for start in range(0, len(designs), AT_ONCE):
+            some = designs[start : start + AT_ONCE]
             q = np.concatenate([path.at(y)[0][at] for y in some])
-            hz = np.full((len(some), len(path.q), self.asked.modes), np.nan)
             solved = model.frequencies(q, np.repeat(some, len(at), axis=0), self.asked.modes)
-            hz[:, at] = solved.reshape(len(some), len(at), -1)
-            for rows in self.edges:
-                if terms := rows.of.mode_terms:
-                    own = sum(c * hz[:, rows.of.rows, m - 1 if m > 0 else m] for m, c in terms)
-                    missed, _ = self.missed(rows, rows.scale * (own - rows.edge))
-                    found.append((rows.of.name, float(np.nanmax(missed, initial=0.0))))
-        return _by_name(found)
+            hz[start : start + len(some), at] = solved.reshape(len(some), len(at), -1)
+        for k, rows in enumerate(self.edges):
+            if terms := rows.of.mode_terms:
+                own = sum(c * hz[:, rows.of.rows, m - 1 if m > 0 else m] for m, c in terms)
+                missed, _ = self.missed(rows, rows.scale * (own - rows.edge))
+                yield k, np.nanmax(missed, axis=1, initial=-np.inf)
 
     def rows(
         self,

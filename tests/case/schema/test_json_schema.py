@@ -23,7 +23,7 @@ def nodes(node: Any) -> Iterator[dict[str, Any]]:
 def test_it_has_exactly_the_top_keys_of_the_file() -> None:
     keys = {field.name for field in fields(CaseFile) if field.name in SCHEMA["properties"]}
     assert set(SCHEMA["properties"]) == keys
-    assert len(keys) == 15
+    assert len(keys) == 16
     assert SCHEMA["required"] == ["title", "mechanism"]
     assert SCHEMA["additionalProperties"] is False
 
