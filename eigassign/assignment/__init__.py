@@ -15,7 +15,8 @@ __all__, __getattr__, __dir__ = face(
     {
         "exact.design_problem": "Appraisal Cost DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
-        "exact.requirements": "Requirements Tolerances with_scenarios",
+        "exact.ranges": "Explained explain",
+        "exact.requirements": "Ellipsoid Requirements Tolerances with_scenarios",
         "exact.sequential": "End Optimum StepRecord Tally minimise with_end",
         "exact.design_point": "first_order",
         "one_shot": (

@@ -6,13 +6,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eigassign.brief import cut
+from eigassign.files import UPDATED
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.reports.update import update_figures, update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
+from eigassign.study.updating.fit import (
+    UpdateResults,
+    collect_update,
+    solve_update,
+    update_problem,
+)
+from eigassign.study.updating.updated import updated_case
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,7 +62,7 @@ def update(path: str | Path, options: Options) -> Updated:
         options.progress("writing the report")
         write_update(found.results, folder.hidden, options.figures, options.report)
         updated = found.case.file.resolved()
-        (folder.hidden / "updated.yaml").write_text(updated, encoding="utf-8")
+        (folder.hidden / UPDATED).write_text(updated, encoding="utf-8")
     return replace(found, folder=folder.path)
 
 
@@ -74,4 +81,4 @@ def update_case(case: BuiltCase, options: Options = DEFAULT) -> Updated:
             found = solve_update(problem)
         with stages("checks", "checking mesh and neighbouring modes"):
             results = collect_update(problem, found, stages.timing_s)
-    return Updated(results, BuiltCase(case.file.with_design(found.y)))
+    return Updated(results, updated_case(case, results))

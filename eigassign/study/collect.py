@@ -132,7 +132,8 @@ def _answer(
     """The fields of results that an answer has."""
     answer, targets, solved = assigned.answer, assigned.targets, assigned.solved
     row = assignment_row(scene, assigned, accuracy, motion)
-    rows, limits, mass = design_rows(scene, answer.y), scene.file.design.mass, scene.model.mass
+    limits, mass = scene.file.design.mass, scene.model.mass
+    rows = design_rows(scene, answer.y)[: len(scene.file.design.chosen)]  # not what is uncertain
     asked = (None,) * 3 if limits is None else (limits.min, limits.max, limits.price)
     name = "total mass" if any(one.name == "mass" for one in rows) else "mass"
     on = {limit.name: limit.side for limit in row.active if limit.kind == "bound"}

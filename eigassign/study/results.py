@@ -703,17 +703,16 @@ class RobustRow(Brief):
         return None not in (p, wanted, deviation) and p + 3.0 * deviation < wanted  # type: ignore
 
     @property
-    def chance(self) -> str:
-        """With which probability all limits hold, in words; empty where nothing is uncertain."""
+    def checked(self) -> str:
+        """What deviations lie in, and the probability that all limits hold, in words."""
+        words = f"{self.within} that were checked"
         if self.probability is None or self.deviation is None or self.wanted is None:
-            return ""
-        alone = "" if self.probability_nominal is None else percent(self.probability_nominal)
+            return words
+        alone = self.probability_nominal
+        other = "" if alone is None else f", the optimum without deviations {percent(alone)}"
         return (
-            f"all limits hold together with a probability of {percent(self.probability)} "
-            f"± {percent(self.deviation)} (asked: {100.0 * self.wanted:g} %"
-            + f"; the optimum without deviations: {alone})"
-            if alone
-            else ")"
+            f"{words}; all limits hold together with {percent(self.probability)} (± "
+            f"{100.0 * self.deviation:.1g} %; {100.0 * self.wanted:g} % asked{other})"
         )
 
     @property
@@ -733,8 +732,7 @@ class RobustRow(Brief):
         pairs += [(f"mass {number(self.mass_nominal)}", f"{number(self.mass)} kg")]
         if self.price is not None and self.price_nominal is not None:
             pairs += [(f"price {number(self.price_nominal)}", number(self.price))]
-        chance = f"; {self.chance}" if self.chance else ""
-        return ", ".join(" → ".join(pair) for pair in pairs).replace("-", "−") + chance
+        return ", ".join(" → ".join(pair) for pair in pairs).replace("-", "−")
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

@@ -98,6 +98,7 @@ class Identified:
     unidentified: Floats  # (k, n_y) directions, the largest entry 1 of its range of bounds
     rounds: int  # fits from better and better starts
     minima: tuple[Optimum, ...]  # distinct ones that explain the measurements, the best first
+    covariances: tuple[Floats, ...]  # at each of them
     starts: int
     met: int  # distinct minima that the starts led to
 
@@ -173,6 +174,7 @@ def identify(
         minima = joined(minimise(problem, profile.best.y))
     held = _held(fit, len(start))
     covariance, rank = _covariance(problem, fit, held)
+    known = tuple(sorted(filter(explains, minima), key=lambda found: found.objective))
     hz, chi_squared = response(fit.y)[0], fit.objective
     degrees = len(hz) - rank
     return Identified(
@@ -190,7 +192,8 @@ def identify(
         held=held,
         unidentified=frozen(_unidentified(problem, fit, held)),
         rounds=rounds,
-        minima=tuple(sorted(filter(explains, minima), key=lambda found: found.objective)),
+        minima=known,
+        covariances=tuple(_covariance(problem, m, _held(m, len(start)))[0] for m in known),
         starts=starts,
         met=len(minima),
     )

@@ -175,7 +175,7 @@ class Measurement(Part):
         trajectory: name of the trajectory, where there are several
         mode: its number, counted from the lowest elastic one; without it that of the model as it is
             written whose frequency is nearest, no two of a pose alike
-        frequency: what was measured
+        frequency: what was measured, or `[10.1 Hz, 10.4 Hz]`, what it lies between: in all or none
         deviation: its standard deviation; a share is one of the frequency
     """
 
@@ -183,9 +183,19 @@ class Measurement(Part):
     q: Coordinates | None = None
     trajectory: str | None = None
     mode: Mode | None = None
-    frequency: Frequency
-    deviation: Tolerance
+    frequency: OneOrList[Frequency, tuple[Frequency, Frequency]]
+    deviation: Tolerance | None = None
     one_of = ("time", "q")
+
+    def _mistakes(self, space: str | None) -> Mistakes:
+        if isinstance(self.frequency, tuple):
+            if self.frequency[0] >= self.frequency[1]:
+                yield wrong("is not below the second", "frequency", 0)
+            if self.deviation is not None:
+                yield wrong("a range has none: leave it out", "deviation")
+        elif self.deviation is None:
+            message = "required key is missing: give one, or a range such as [10.1 Hz, 10.4 Hz]"
+            yield wrong(message, "deviation")
 
 
 class MeasurementFile(Part):
@@ -193,7 +203,7 @@ class MeasurementFile(Part):
 
     Keys:
         file: relative to the case file; columns of the same names, and one for each coordinate
-            instead of `q`
+            instead of `q`; of ranges `lower` and `upper` instead of the frequency
         columns: what the header calls them, where that is something else
         deviation: of rows for which the file gives none
     """

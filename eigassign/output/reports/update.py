@@ -22,22 +22,17 @@ _AFTER = Look(graph.BLACK, 0.0, marker="o")
 _STEM = Look(graph.BLACK, 1.2)
 _OUTLIER = Look(graph.GREY, 0.9, "dashed")
 _INTERVAL = Look(graph.SKY, 5.0)
+_OUTER = Look(graph.GREY, 3.0)
 
 
 def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
     """Measurements against the model, and the intervals of the parameters."""
     after = max((abs(row.residual) for row in results.measurements), default=0.0)
-    return (
-        FigurePlan(
-            "measurements",
-            "Measured frequencies and the model",
-            "The model's frequencies against the measured ones, whose bars are one standard "
-            f"deviation. The worst is {after:.2g} standard deviations off after updating.",
-            "Measured frequencies with error bars, and those of the model before and after.",
-            _measurements(results),
-            "answer",
-        ),
-        FigurePlan(
+    unit = "standard deviation" if results.fit else "half the width of its range"
+    last = (
+        _ranges(results)
+        if results.fit is None
+        else FigurePlan(
             "parameters",
             "Parameters with their 95 % intervals",
             "Of each parameter the interval of values that the measurements allow while the others "
@@ -45,7 +40,56 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             "One line for each parameter about its value, with its interval.",
             _parameters(results),
             "parameters",
+        )
+    )
+    return (
+        FigurePlan(
+            "measurements",
+            "Measured frequencies and the model",
+            f"The model's frequencies against the measured ones, whose bars are {unit}. The worst "
+            f"is {after:.2g} times that off after updating.",
+            "Measured frequencies with error bars, and those of the model before and after.",
+            _measurements(results),
+            "answer",
         ),
+        last,
+    )
+
+
+def _ranges(results: UpdateResults) -> FigurePlan:
+    """The range of each parameter beside its bounds, in % of the way between these."""
+    rows = [row for row in results.parameters if row.upper > row.lower]
+    at = -np.arange(float(len(rows)))
+    least, width = np.array([[row.lower, row.upper - row.lower] for row in rows]).T
+    inner, outer, initial = (
+        100.0 * (np.array(amounts).T - least) / width
+        for amounts in (
+            [(row.low, row.high) for row in rows],
+            [row.ends for row in rows],
+            [row.initial for row in rows],
+        )
+    )
+    bounds = np.zeros(len(rows)), np.full(len(rows), 100.0)
+    curves = (
+        graph.segments(at, bounds[0], bounds[1], _STEM, "bounds", lying=True),
+        graph.segments(at, outer[0], outer[1], _OUTER, "none is outside", lying=True),
+        graph.segments(at, inner[0], inner[1], _INTERVAL, "found", lying=True),
+        Curve(at, _BEFORE, "before", initial),
+    )
+    names = tuple(f"{row.name}: {row.lower / size:.4g} … {row.upper / size:.4g} {unit}".rstrip()
+                  for row in rows for unit, size in [row.handy])  # fmt: skip
+    room = np.array([0.5, 0.5 - len(rows)])
+    panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
+    title = "What the parameters may be"
+    whole = Graph(title, "between the bounds [%]", np.zeros(0), (panel,), x_limits=(-2.0, 102.0))
+    return FigurePlan(
+        "parameters",
+        title,
+        "The values that explain all measured ranges, beside the bounds of each parameter: those "
+        "that were found, and the range that no value which explains them lies outside of.",
+        "One line for each parameter from bound to bound, with its ranges.",
+        whole,
+        "parameters",
     )
 
 
@@ -63,7 +107,7 @@ def _measurements(results: UpdateResults) -> Graph:
     initial = (Rule(0.0, LEVEL), Curve(before, _BEFORE, "model before", names=names))
     above: tuple[Mark, ...] = (
         Rule(0.0, LEVEL),
-        graph.segments(at, -bars, bars, _INTERVAL, "measured ± standard deviation"),
+        graph.segments(at, -bars, bars, _INTERVAL, "measured"),
         Curve(after, _AFTER, "model after", names=names),
     )
     residual = np.array([row.residual for row in rows])
@@ -77,7 +121,7 @@ def _measurements(results: UpdateResults) -> Graph:
     panels = (
         Panel("before, off [%]", initial, 1.2, holds=(np.zeros(1),)),
         Panel("after, off [%]", above, 2.2),
-        Panel("residual [σ]", below, 1.6, holds=(room,)),
+        Panel("residual [σ]" if results.fit else "off [range]", below, 1.6, holds=(room,)),
     )
     ends = 0.4, at.size + 0.6
     title = "Measured frequencies and the model"
@@ -129,6 +173,13 @@ def _found(results: UpdateResults) -> Iterator[Table]:
         "Deviation: standard deviation of the linear model. Interval: 95 % by the profile "
         "likelihood, with the other parameters fitted again at each value."
     )
+    if results.fit is None:
+        caption = (
+            "From, to: of designs found that explain all ranges; none does outside the others."
+        )
+        names = "name handy initial low high outer_low outer_high lower upper parameter"
+        yield facts_table("Parameters", results.parameters, names, caption)
+        return
     held = [row.name for row in results.parameters if row.held]
     if held and any(row.deviation is not None for row in results.parameters):
         caption += f" The deviations assume {' and '.join(held)} at the bound."
@@ -151,14 +202,15 @@ def _fit(results: UpdateResults, most: int | None) -> Iterator[Table]:
         "χ²: sum of the squared residuals in standard deviations. p: the chance of a χ² this large "
         "if the model and the stated deviations are right."
     )
-    yield facts_table("Fit", [results.fit], names, caption)
+    yield facts_table("Fit", [results.fit] if results.fit else (), names, caption)
     shown = list(results.measurements)
     caption = "Residuals after updating, in standard deviations of the measurement."
     if most is not None and len(shown) > most:
         worst = sorted(shown, key=lambda row: -abs(row.residual))[:most]
         caption += f" The {most} worst of {len(shown)}."
         shown = [row for row in shown if row in worst]
-    names = "label mode measured_hz deviation_hz initial_hz updated_hz residual is_outlier"
+    names = "label mode measured_hz deviation_hz initial_hz updated_hz residual"
+    names += " is_outlier" * (results.fit is not None)
     yield facts_table("Measurements", shown, names, caption)
 
 

@@ -96,7 +96,7 @@ def assignment_row(
             merits=merits,
             limits=limits,
             deviated=deviated,
-            robust="" if answer.robust is None else answer.robust.within,
+            robust="" if answer.robust is None else answer.robust.checked,
             doubts=doubts,
             unproved=[*coarse, *_unproved(scene, own, largest)],
             unreachable=beyond,
@@ -228,7 +228,7 @@ def _deviated(
         if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
             yield f"{one.label}: missed by {_percent(one.most)} within {robust.within}"
     if robust.is_rarer:
-        yield robust.chance
+        yield f"within {robust.checked}"
 
 
 def _missed_between(

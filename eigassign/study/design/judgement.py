@@ -172,7 +172,7 @@ class Facts(NamedTuple):
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
     why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
     so; ``unreachable`` which targets are out of reach; ``deviated`` what is met, and not by all
-    deviations, ``robust`` what these lie in, if there are any; ``conflict`` which limits
+    deviations, ``robust`` what these lie in, and what more is known of them; ``conflict`` which limits
     contradict, ``of_frequencies`` whether some of these are on frequencies, and ``held`` which
     bounds the answer lies on;
     ``unfinished`` how a search was ended before it was done. ``max_error`` is the largest error
@@ -232,7 +232,7 @@ def _word(facts: Facts) -> tuple[str, str]:
         if facts.unproved:
             return "do_not_use", "; ".join(facts.unproved)
         if facts.is_optimal:
-            checked = f", also for all deviations within {facts.robust} that were checked"
+            checked = f", also for all deviations within {facts.robust}"
             return "reached", (facts.aim or "every target is met") + checked * bool(facts.robust)
         far = [f"{facts.aim}; a better design may be near (not first-order optimal)"]
     (before_violation, before), (violation, after) = facts.merits

@@ -118,7 +118,7 @@ def robust_optimum(
     row = RobustRow(
         scenarios=len(found.task.scenarios),
         draws=draws,
-        nominal=nominal.best.y,
+        nominal=nominal.best.y[: len(scene.file.design.chosen)],
         measured=scene.file.assignment.named_objective,
         objective_nominal=nominal.variant.problem.measure(nominal.best.seen.residual),
         objective=look.had,

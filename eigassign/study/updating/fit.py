@@ -1,5 +1,7 @@
 """Parameters of a case from measured frequencies, and what the measurements say of them.
 
+Of frequencies that are known to lie between two there is no best fit: each parameter has a range.
+
 The unknowns are the design parameters between their bounds, starting from the values in the file.
 Modes are numbered by size, as measured. Linear constraints, the limit on the mass, targets and
 prices are about what shall be, not about what is: they are left aside, and lists of values count as
@@ -10,26 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.exact.identification import (
     POOR,
     Identified,
     MeasuredFrequencies,
     identify,
 )
+from eigassign.assignment.exact.ranges import Explained, explain
 from eigassign.assignment.exact.sequential import PAYS, unseen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
-from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds
+from eigassign.errors import CaseError
+from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, Unwritten
 from eigassign.modal.exact.solver import in_hz
 from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
-from eigassign.study.design.search.response import spread_designs
+from eigassign.study.design.search.response import corners, effects, spread_designs
 from eigassign.study.results import CaseRow, InOneUnit, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
@@ -49,7 +54,11 @@ Outlier = Annotated[
 
 @dataclass(frozen=True)
 class UpdatedParameter(InOneUnit):
-    """One parameter before and after, in SI units; its interval holds it with 95 %."""
+    """One parameter before and after, in SI units; its interval holds it with 95 %.
+
+    Of ranges that were measured ``value`` is one that explains them, and the interval holds all of
+    these that were found; no other has one outside the ``outer`` one, where that is known.
+    """
 
     name: Key
     parameter: Annotated[str, Fact("its key path in the case file")]
@@ -64,6 +73,14 @@ class UpdatedParameter(InOneUnit):
     lower: InUnit
     upper: InUnit
     held: Annotated[str, Fact("the bound that holds it, lower or upper; or empty")]
+    outer_low: Annotated[InUnit | None, Fact("none is below", "none below")] = None
+    outer_high: Annotated[InUnit | None, Fact("none is above", "none above")] = None
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """What it may be: its outer range where that is known, else its interval."""
+        low = self.low if self.outer_low is None else self.outer_low
+        return low, self.high if self.outer_high is None else self.outer_high
 
     @property
     def remark(self) -> str:
@@ -117,6 +134,7 @@ class ExplainingMinimum:
     values: Annotated[Mapping[str, float], Fact("SI, by their names")]
     amounts: Annotated[str, Fact(heading="values", unwritten=True)]  # as people read them
     chi_squared: Annotated[float, Fact(heading="χ²", digits=".4g")]
+    covariance: Annotated[Floats, Fact("of the parameters there, SI", may_lack=True)]
 
 
 @dataclass(frozen=True)
@@ -142,11 +160,12 @@ class UpdateResults(Origin):
     minima: Annotated[
         tuple[ExplainingMinimum, ...], Fact("distinct ones that explain the measurements")
     ]
-    fit: FitRow
+    fit: FitRow | None  # None of ranges
     measurements: tuple[ExplainedMeasurement, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
+    unexplained: Unwritten[str] = ""  # how that is known of ranges
 
     @property
     def headline(self) -> Annotated[str, Fact("the verdict in words", name="headline")]:
@@ -157,6 +176,8 @@ class UpdateResults(Origin):
             value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
             found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
         of, why = self.fit, [direction.words for direction in self.unidentified]
+        if of is None:
+            return self._of_ranges
         if len(self.minima) > 1:
             why.append(f"{len(self.minima)} distinct sets of values explain the measurements")
         chance = "" if of.p_value is None else f", p = {of.p_value:.2g}"
@@ -169,6 +190,25 @@ class UpdateResults(Origin):
             "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
         }[self.verdict]
         return f"{verdict}. {', '.join(found)}."
+
+    @property
+    def _of_ranges(self) -> str:
+        """The verdict of ranges: what each parameter may be, or which measurement stands out."""
+        if self.verdict != "fitted":
+            worst = max(self.measurements, key=lambda row: abs(row.residual))
+            return (
+                f"NOT EXPLAINED: no design {self.unexplained} lies in all {len(self.measurements)} "
+                f"ranges; the nearest misses that of {worst.label}, mode {worst.mode}, by "
+                f"{(abs(worst.residual) - 1.0) * worst.deviation_hz:.3g} Hz."
+            )
+        found = []
+        for row in self.parameters:  # k1 from 50.2 to 54.3 kN m/rad (none below 50.1 or above 54.4)
+            unit, size = row.handy
+            low, high = (f"{end / size:.4g}" for end in (row.low, row.high))
+            ends = (f"{end / size:.4g}" for end in row.ends)
+            none = "" if row.outer_low is None else " (none below {} or above {})".format(*ends)
+            found.append(f"{row.name} from {low} to {high} {unit}".rstrip() + none)
+        return f"Explained: designs lie in all {len(self.measurements)} ranges. {', '.join(found)}."
 
     @property
     def design(self) -> dict[str, float]:
@@ -197,6 +237,9 @@ def require_updatable(file: CaseFile) -> None:
         "measurements": (file.measurements is not None, "frequencies that were measured"),
     }
     file.require("update", needs)
+    if file.uncertain is not None:
+        message = "update finds what is not known: write it under design, with bounds"
+        raise CaseError((file.problem("uncertain", message),))
 
 
 @dataclass(frozen=True)
@@ -216,6 +259,24 @@ class UpdateProblem:
     def model(self) -> Model:
         """The model of the case."""
         return self.case.model()
+
+    @property
+    def is_ranged(self) -> bool:
+        """True where each frequency is known to lie between two."""
+        return self.measured[0].is_range
+
+    def between(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+        """r (n, m) that no design of boxes (n, n_y) is below, and that none is above.
+
+        Of parameters that raise or lower every frequency, by two corners of each.
+        """
+        count, measured = int(self.columns.max()) + 1, self.frequencies
+        each = []
+        for y in corners(self.case.file, low, low, high):
+            q, own = np.tile(self.q, (len(y), 1)), np.repeat(y, len(self.q), axis=0)
+            hz = self.model.frequencies(q, own, count).reshape(len(y), len(self.q), count)
+            each.append(measured.standardised(hz[:, self.rows, self.columns]))
+        return each[0], each[1]
 
     @property
     def frequencies(self) -> MeasuredFrequencies:
@@ -253,10 +314,22 @@ def update_problem(case: BuiltCase) -> UpdateProblem:
     return problem
 
 
-def solve_update(problem: UpdateProblem) -> Identified:
-    """The most likely parameters; raises EigassignError where the start has no answer."""
+def solve_update(problem: UpdateProblem) -> Identified | Explained:
+    """The most likely parameters; raises EigassignError where the start has no answer.
+
+    Of ranges all that explain them.
+    """
     start, limits = problem.case.initial_design, (problem.lower, problem.upper)
     others = spread_designs(limits, STARTS - 1, 0) if len(start) else ()
+    if problem.is_ranged:
+        measured, known = problem.frequencies, effects(problem.case.file) != 0.0
+
+        def standardised(y: Floats) -> tuple[Floats, Floats]:
+            hz, slopes = problem.response(y)
+            return measured.standardised(hz), slopes / measured.deviation[:, None]
+
+        between = problem.between if (known | (limits[0] == limits[1])).all() else None
+        return explain(standardised, *limits, [start, *others], between)
 
     def enough(starts: int, found: int) -> bool:
         return unseen(starts, found) <= PAYS
@@ -265,34 +338,58 @@ def solve_update(problem: UpdateProblem) -> Identified:
 
 
 def collect_update(
-    problem: UpdateProblem, found: Identified, timing_s: Mapping[str, float]
+    problem: UpdateProblem, found: Identified | Explained, timing_s: Mapping[str, float]
 ) -> UpdateResults:
     """Everything that was found, as plain numbers and words."""
-    case = problem.case
-    directions = tuple(_direction(row, found.y, problem) for row in found.unidentified)
+    case, model = problem.case, problem.model
     q, modes = (
-        judged_poses(problem.model, problem.q, WEIGHT_POSES),
+        judged_poses(model, problem.q, WEIGHT_POSES),
         {each.mode for each in problem.measured},
     )
-    weight = study_weight(case.file, problem.model, sorted(modes), q, found.y, "updated")
+    weight = study_weight(case.file, model, sorted(modes), q, found.y, "updated")
+    start = np.clip(case.initial_design, problem.lower, problem.upper)
+    both = (problem.response(y)[0].tolist() for y in (start, found.y))
+    measurements = tuple(
+        ExplainedMeasurement(
+            *(each.label, each.trajectory, each.time_s, tuple(each.q.tolist())),
+            *(each.mode, each.hz, each.deviation_hz, *hz),
+        )
+        for each, *hz in zip(problem.measured, *both, strict=True)
+    )
+    common: dict[str, Any] = {
+        "case": CaseRow.of(case.file),
+        "measurements": measurements,
+        "warnings": (
+            *map(str, case.file.warnings),
+            *_warnings(problem, found.y, np.array([row.updated_hz for row in measurements])),
+            *weight.warnings,
+        ),
+        "timing_s": dict(timing_s),
+    }
+    if isinstance(found, Explained):
+        n = len(found.y)
+        return UpdateResults(
+            **common,
+            verdict="poor_fit" if found.inner is None else "fitted",
+            parameters=tuple(_ranges(problem, found)),
+            covariance=np.full((n, n), np.nan),
+            unidentified=(),
+            minima=(),
+            fit=None,
+            notes=(*problem.notes, *_range_notes(problem, found), *weight.lines),
+            unexplained="within the bounds" + " (proved)" * found.is_impossible,
+        )
+    directions = tuple(_direction(row, found.y, problem) for row in found.unidentified)
+    each = zip(found.minima, found.covariances, strict=True)
     return UpdateResults(
-        case=CaseRow.of(case.file),
+        **common,
         parameters=tuple(_parameters(problem, found, directions)),
         covariance=found.covariance,
-        measurements=tuple(
-            ExplainedMeasurement(
-                *(each.label, each.trajectory, each.time_s, tuple(each.q.tolist())),
-                *(each.mode, each.hz, each.deviation_hz, *hz),
-            )
-            for each, *hz in zip(
-                problem.measured, found.initial_hz.tolist(), found.hz.tolist(), strict=True
-            )
-        ),
         unidentified=directions,
         minima=tuple(
-            ExplainingMinimum(values, _listed(problem, values), one.objective)
-            for one in found.minima
-            for values in [dict(zip(problem.model.y_names, one.y.tolist(), strict=True))]
+            ExplainingMinimum(values, _listed(problem, values), one.objective, covariance)
+            for one, covariance in each
+            for values in [dict(zip(model.y_names, one.y.tolist(), strict=True))]
         ),
         fit=FitRow(
             *(found.initial_chi_squared, found.chi_squared, found.degrees, found.p_value),
@@ -301,8 +398,6 @@ def collect_update(
         ),
         verdict=found.verdict,
         notes=(*problem.notes, *_notes(problem, found), *weight.lines),
-        warnings=(*map(str, case.file.warnings), *_warnings(problem, found), *weight.warnings),
-        timing_s=dict(timing_s),
     )
 
 
@@ -331,6 +426,42 @@ def _parameters(
             lower=column.min,
             upper=column.max,
             held=found.held[k],
+        )
+
+
+def _ranges(problem: UpdateProblem, found: Explained) -> Iterator[UpdatedParameter]:
+    """What each parameter may be; where nothing explains the measurements, what is nearest."""
+    file, start = problem.case.file, problem.case.initial_design
+    low, high = (found.y, found.y) if found.inner is None else found.inner
+    outer = np.full((2, len(low)), None) if found.outer is None else found.outer.tolist()
+    for k, (name, column) in enumerate(file.design.parameters.items()):
+        near = ON * (column.max - column.min)
+        yield UpdatedParameter(
+            name=name,
+            parameter=column.said,
+            unit=file.design_units[k],
+            initial=float(start[k]),
+            value=float(found.y[k]),
+            deviation=None,
+            low=float(low[k]),
+            high=float(high[k]),
+            low_is_bound=bool(low[k] <= column.min + near),
+            high_is_bound=bool(high[k] >= column.max - near),
+            lower=column.min,
+            upper=column.max,
+            held="",
+            outer_low=outer[0][k],
+            outer_high=outer[1][k],
+        )
+
+
+def _range_notes(problem: UpdateProblem, found: Explained) -> Iterator[str]:
+    n = len(found.y)
+    yield f"{len(problem.measured)} measured ranges at {len(problem.q)} poses, {n} parameters"
+    if found.outer is None and not found.is_impossible:
+        yield (
+            "no range is known that no value lies outside of: not every parameter raises, or "
+            "lowers, all frequencies"
         )
 
 
@@ -413,7 +544,7 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
 MOST_PAIRS = 12  # that a warning lists
 
 
-def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
+def _warnings(problem: UpdateProblem, y: Floats, hz: Floats) -> Iterator[str]:
     pairs = [each for each in problem.measured if each.paired_hz is not None]
     if pairs:
         told = "; ".join(
@@ -426,9 +557,9 @@ def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
             f"{told}; where a pair is wrong, write its mode"
         )
     modes = sorted({each.mode for each in problem.measured})
-    error = problem.model.discretisation_error(problem.q, found.y, modes)
+    error = problem.model.discretisation_error(problem.q, y, modes)
     at = [modes.index(each.mode) for each in problem.measured]
-    share = error[problem.rows, at] * found.hz / problem.frequencies.deviation
+    share = error[problem.rows, at] * hz / problem.frequencies.deviation
     worst = int(np.argmax(share))
     if share[worst] > 0.5:  # half of what the measurement itself leaves open
         yield (

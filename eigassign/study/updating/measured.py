@@ -20,7 +20,7 @@ from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, MeasurementFile
 from eigassign.case.table import CsvColumn, CsvTable, read_table, renamed
 from eigassign.case.units import DIMENSIONS
-from eigassign.errors import MechanismError
+from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.trajectory.trajectory import TIME, Trajectories, coordinate_columns
 from eigassign.study.built_case import BuiltCase
 
@@ -38,8 +38,9 @@ class PosedMeasurement:
     trajectory: str | None
     q: Floats  # (n_q,) in rad or m
     mode: int  # 0 until it is paired
-    hz: float
-    deviation_hz: float
+    hz: float  # of a range its middle
+    deviation_hz: float  # standard; of a range half its width
+    is_range: bool = False
     paired_hz: float | None = None  # of the model as it is written, if the mode was told by that
 
 
@@ -47,7 +48,8 @@ def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tu
     """All measurements in the order given, and notes on what was ignored.
 
     Raises CaseError for a file that cannot be read or holds what is no measurement (with its line),
-    for a time outside the trajectory, and for a trajectory that cannot be followed.
+    for a time outside the trajectory, for a trajectory that cannot be followed, and for ranges
+    beside others.
     """
     given = case.file.measurements or ()
     if isinstance(given, MeasurementFile):
@@ -55,6 +57,10 @@ def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tu
             found, notes = _from_file(case, given)
             return _paired(case, found), notes
     posed = tuple(_posed(case, f"measurements[{k}]", each) for k, each in enumerate(given))
+    for k, one in enumerate(posed):
+        if one.is_range != posed[0].is_range:
+            message = "ranges and frequencies with a deviation do not go together: give one kind"
+            raise CaseError((case.file.problem(f"measurements[{k}].frequency", message),))
     return _paired(case, posed), ()
 
 
@@ -89,9 +95,18 @@ def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
             q = _at_time(case.trajectory, given.time, given.trajectory, f"{label}.time", "")
         else:
             q = _with_loads(case.file, given.q or (), given.trajectory)
-    deviation = given.deviation.deviation(given.frequency)
-    hz, where = float(given.frequency), given.trajectory
-    return PosedMeasurement(label, given.time, where, frozen(q), given.mode or 0, hz, deviation)
+    ends, of = given.frequency, given.deviation
+    if is_range := isinstance(ends, tuple):
+        hz, deviation = _middle(*ends)
+    else:
+        hz, deviation = float(ends), of.deviation(ends) if of else 0.0
+    own = given.trajectory, frozen(q), given.mode or 0, hz, deviation, is_range
+    return PosedMeasurement(label, given.time, *own)
+
+
+def _middle(low: float, high: float) -> tuple[float, float]:
+    """The middle of a range, and half its width."""
+    return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def _at_time(path: Trajectories, time: float, name: str | None, key: str, where: str) -> Floats:
@@ -125,8 +140,8 @@ def _from_file(
         CsvColumn(TIME, (DIMENSIONS["time"],), optional=True),
         CsvColumn("trajectory", optional=True),
         CsvColumn("mode", (DIMENSIONS["fraction"],), optional=True),
-        CsvColumn("frequency", (hz,)),
-        CsvColumn("deviation", (hz, DIMENSIONS["fraction"]), optional=given.deviation is not None),
+        *(CsvColumn(name, (hz,), optional=True) for name in ("frequency", "lower", "upper")),
+        CsvColumn("deviation", (hz, DIMENSIONS["fraction"]), optional=True),
         *(
             CsvColumn(column.name, column.dimensions, optional=True)
             for column in coordinate_columns(names, file.coordinate_units)
@@ -138,6 +153,11 @@ def _from_file(
             "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
         )
         raise MechanismError(_KEY, f"{table.file}: {some}")
+    own = {"frequency", "lower", "upper"} & table.numbers.keys()
+    with_deviation = given.deviation is not None or "deviation" in table.numbers
+    if own != {"lower", "upper"} and (own != {"frequency"} or not with_deviation):
+        expected = "expected the columns frequency and deviation, or of ranges lower and upper"
+        raise MechanismError(_KEY, f"{table.file}: {expected}")
     with_q = [name for name in names if name in table.numbers]
     if len(with_q) != (0 if TIME in table.numbers else len(names)):
         expected = f"either the column {TIME}, or one for each coordinate ({', '.join(names)})"
@@ -151,11 +171,17 @@ def _rows(
     known = [name for _, name, _ in case.file.trajectories]
     for k in range(len(table.lines)):
         where = f"{table.where(k)}: "
-        mode, hz = table.numbers.get("mode", {k: 0.0})[k], table.numbers["frequency"][k]
+        mode = table.numbers.get("mode", {k: 0.0})[k]
+        low, high = (table.numbers.get(key, {k: 0.0})[k] for key in ("lower", "upper"))
+        is_range = "lower" in table.numbers
+        if is_range and not low < high:
+            raise MechanismError(_KEY, f"{where}lower {low:g} is not below upper {high:g}")
+        hz, half = _middle(low, high) if is_range else (table.numbers["frequency"][k], 0.0)
         if "mode" in table.numbers and not (mode.is_integer() and 1 <= mode <= 1000):
             raise MechanismError(_KEY, f"{where}column mode: {mode:g} is not a mode (1, 2, …)")
-        if not hz > 0.0:
-            raise MechanismError(_KEY, f"{where}column frequency: must be > 0 Hz, got {hz:g}")
+        if not hz - half > 0.0:
+            message = f"{where}column {'lower' if is_range else 'frequency'}: must be > 0 Hz, got "
+            raise MechanismError(_KEY, f"{message}{hz - half:g}")
         named = table.words["trajectory"][k] if "trajectory" in table.words else ""
         if named and named not in known:
             raise MechanismError(_KEY, where + unknown("trajectory", named, known))
@@ -170,9 +196,9 @@ def _rows(
         else:
             pose = [table.numbers[name][k] for name in names]
             time, q = None, _with_loads(case.file, pose, named or None)
-        deviation = _deviation(table, k, hz, default)
-        label = table.where(k)
-        yield PosedMeasurement(label, time, named or None, frozen(q), int(mode), hz, deviation)
+        deviation = half if is_range else _deviation(table, k, hz, default)
+        own = named or None, frozen(q), int(mode), hz, deviation, is_range
+        yield PosedMeasurement(table.where(k), time, *own)
 
 
 def _deviation(table: CsvTable, k: int, hz: float, default: Tolerance | None) -> float:
