@@ -709,9 +709,9 @@ class RobustRow(Brief):
         if self.probability is None or self.deviation is None or self.wanted is None:
             return words
         alone = self.probability_nominal
-        other = "" if alone is None else f", the optimum without deviations {percent(alone)}"
+        other = "" if alone is None else f", the optimum without deviations {100.0 * alone:.3g} %"
         return (
-            f"{words}; all limits hold together with {percent(self.probability)} (± "
+            f"{words}; all limits hold together with {100.0 * self.probability:.4g} % (± "
             f"{100.0 * self.deviation:.1g} %; {100.0 * self.wanted:g} % asked{other})"
         )
 

@@ -172,7 +172,7 @@ class Facts(NamedTuple):
     ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
     why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
     so; ``unreachable`` which targets are out of reach; ``deviated`` what is met, and not by all
-    deviations, ``robust`` what these lie in, and what more is known of them; ``conflict`` which limits
+    deviations, ``robust`` what these lie in and with which probability; ``conflict`` which limits
     contradict, ``of_frequencies`` whether some of these are on frequencies, and ``held`` which
     bounds the answer lies on;
     ``unfinished`` how a search was ended before it was done. ``max_error`` is the largest error
