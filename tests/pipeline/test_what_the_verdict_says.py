@@ -206,7 +206,7 @@ def test_a_price_that_lowers_what_is_to_be_high_is_named() -> None:
     aim = {"objective": {"highest": 1}, "starts": 1}
     result = solve_case(case_of({"k1": priced, "k2": K2}, [], assignment=aim))
     _, reason = said(result)
-    assert f"; its price, {result.results.price:.4g}, counts against it, 1 as 1 Hz" in reason
+    assert f"; its price, {priced(result.results.price)}, counts against it, 1 as 1 Hz" in reason
 
 
 def test_a_mesh_that_is_too_coarse_is_to_be_made_finer(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import handy
-from eigassign.facts import about, capital, number, percent, positive_percent
+from eigassign.facts import about, capital, number, percent, positive_percent, priced
 from eigassign.files import printable
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
@@ -217,9 +217,8 @@ def _cost(results: RunResults) -> Iterator[str]:
         added = added if number(after - before) != "0" else "unchanged"
         yield f"Mass {number(before)} → {number(after)} {unit} ({added})"
     if results.price is not None:
-        listed = any(row.choice_price is not None for row in results.design)
-        what = "Price" if listed else "Price of the change"
-        yield f"{what} {number(results.price)}".replace("-", "−")
+        whole = any(row.choice_price is not None for row in results.design)
+        yield f"Price: {priced(results.price, whole)}"
 
 
 # --- The page
