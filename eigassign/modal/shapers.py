@@ -16,8 +16,8 @@ path, ZV with A(t) delays by half a period of its phase, to g(t):
 
     q_shaped(t) = A_1 q(t) + A_2 q(g(t)),   ∫_g^t ω_d ds = π,
 
-which always grows. Oscillators from 4 to 6 Hz in 1 s kept 2.4 % of their vibration, 6 % where the
-delay is half the period of the instant, and 37 % or more with any constant one.
+so that g always grows. An oscillator that went from 4 to 6 Hz in a move of 1 s kept 2.4 % of its
+vibration; 6.1 % with half the period of each instant, 37 % or more with that of 4, 5 or 6 Hz.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
+from scipy.special import comb
 
 from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 Command = Callable[[Any], tuple[Any, Any, Any]]  # q, q̇ and q̈ at times
 TOLERANCE = 0.05  # V of the EI shapers
-_EVEN = {  # impulses without damping, and the step between them in periods
-    "zv": ([1.0, 1.0], 0.5),
+_EVEN: dict[
+    str, tuple[Any, float]
+] = {  # impulses without damping, and the step between them in periods
     "mzv": ([1.0, np.sqrt(2.0), 1.0], 0.375),
-    "zvd": ([1.0, 2.0, 1.0], 0.5),
-    "zvdd": ([1.0, 3.0, 3.0, 1.0], 0.5),
-    "zvddd": ([1.0, 4.0, 6.0, 4.0, 1.0], 0.5),
+    **{f"zv{'d' * n}": (comb(n + 1, np.arange(n + 2)), 0.5) for n in range(4)},
 }
 # Largest ζ by name: of EI shapers where their fits still hold V to 5.7 %, measured.
 SHAPERS = {**dict.fromkeys(_EVEN, 0.99), "ei": 0.4, "2hump_ei": 0.3, "3hump_ei": 0.2}
-KLIPPER = ("zv", "mzv", "zvd", "ei", "2hump_ei", "3hump_ei")  # its Config_Reference
+KLIPPER = "zv", "mzv", "zvd", "ei", "2hump_ei", "3hump_ei"  # its Config_Reference
 REPRAP = {name: name for name in _EVEN if name != "zv"} | {"2hump_ei": "ei2", "3hump_ei": "ei3"}
 REPRAP_HZ = 5.73, 1000.0  # half a period is at most 65535 of 750 000 ticks a second
 FINE = 100  # steps along a path at least, between whose samples humps would hide
@@ -96,8 +96,8 @@ class Shaper:
     zeta: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        self.amplitudes.setflags(write=False)
-        self.times_s.setflags(write=False)
+        for array in (self.amplitudes, self.times_s):
+            array.setflags(write=False)
 
     @property
     def delay(self) -> float:
@@ -293,7 +293,8 @@ def klipper_lines(shapers: Mapping[str, Shaper]) -> str:
     lines = ["[input_shaper]"]
     for axis, own in shapers.items():
         if axis not in ("x", "y", "z") or own.name not in KLIPPER:
-            raise UsageError(f"Klipper has axes x, y, z with {', '.join(KLIPPER)}, no {own.name}")
+            has = f"axes x, y, z and {', '.join(KLIPPER)}"
+            raise UsageError(f"Klipper has {has}, not {axis} with {own.name}")
         lines += [f"shaper_type_{axis}: {own.name}", f"shaper_freq_{axis}: {own.hz[0]:.4f}"]
         lines += [f"damping_ratio_{axis}: {own.zeta[0]:.6f}"]
     return "\n".join(lines) + "\n"
