@@ -37,10 +37,9 @@ from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 Command = Callable[[Any], tuple[Any, Any, Any]]  # q, q̇ and q̈ at times
-TOLERANCE = 0.05  # V of the EI shapers
-_EVEN: dict[
-    str, tuple[Any, float]
-] = {  # impulses without damping, and the step between them in periods
+V = 0.05  # what EI shapers leave
+# Impulses without damping, and the step between them in damped periods.
+_EVEN: dict[str, tuple[Any, float]] = {
     "mzv": ([1.0, np.sqrt(2.0), 1.0], 0.375),
     **{f"zv{'d' * n}": (comb(n + 1, np.arange(n + 2)), 0.5) for n in range(4)},
 }
@@ -52,7 +51,6 @@ REPRAP_HZ = 5.73, 1000.0  # half a period is at most 65535 of 750 000 ticks a se
 FINE = 100  # steps along a path at least, between whose samples humps would hide
 SCAN = 300  # design frequencies looked at before the best is polished
 
-V = TOLERANCE
 # A row per impulse: coefficients of 1, ζ, ζ², ζ³ of its amplitude and of its time in periods 1/f,
 # for EI in damped ones.
 # fmt: off
@@ -171,7 +169,7 @@ class Design(NamedTuple):
 
 
 def excited_modes(
-    hz: ArrayLike, zeta: ArrayLike, weights: ArrayLike = 1.0, least: float = TOLERANCE
+    hz: ArrayLike, zeta: ArrayLike, weights: ArrayLike = 1.0, least: float = V
 ) -> tuple[ModeOnPath, ...]:
     """The modes of ``hz`` (n, m), in Hz at n samples of a path, that are excited enough to count.
 
@@ -192,7 +190,7 @@ def excited_modes(
 
 
 def worst_share(shaper: Shaper, modes: Sequence[ModeOnPath], spread: float = 0.0) -> float:
-    """Largest weighted V along the path, each frequency uncertain by ± ``spread`` of it."""
+    """Largest weighted V along the path, each frequency uncertain by ± ``spread``, at 5 values."""
     by = np.linspace(1.0 - spread, 1.0 + spread, 5 if spread else 1)[:, None]
     shares = (m.weight * residual_share(shaper, by * m.hz, m.zeta) for m in modes)
     return max(float(share.max()) for share in shares)

@@ -49,8 +49,13 @@ def undamped(name: str, V: float = 0.05) -> list[float]:
     return {"ei": ei, "2hump_ei": two, "3hump_ei": [b, c, 1 - 2 * (b + c), c, b]}[name]
 
 
-@pytest.mark.parametrize(("name", "width"), [("ei", 0.40), ("2hump_ei", 0.73), ("3hump_ei", 0.96)])
-def test_ei_shapers_hold_5_percent_in_the_band_of_the_literature(name: str, width: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "width", "top"),
+    [("ei", 0.40, 0.0495), ("2hump_ei", 0.73, 0.0500), ("3hump_ei", 0.96, 0.0536)],
+)
+def test_ei_shapers_hold_5_percent_in_the_band_of_the_literature(
+    name: str, width: float, top: float
+) -> None:
     own, f = em.shaper(name, 1.0), np.linspace(0.3, 1.7, 14001)
     share = em.residual_share(own, f)
     ends = f[share <= 0.05][[0, -1]]
@@ -62,8 +67,8 @@ def test_ei_shapers_hold_5_percent_in_the_band_of_the_literature(name: str, widt
     middle = 0.0 if name == "2hump_ei" else 0.05
     assert em.residual_share(own, 1.0) == pytest.approx(middle, abs=0.004)
     inside = np.linspace(1 - 0.5 * width, 1 + 0.5 * width, 500)  # damped, the band is wider
-    damped = em.residual_share(em.shaper(name, 1.0, 0.1), inside, 0.1)
-    assert damped.max() < 0.056  # of three humps, 0.051 of the others
+    damped = em.residual_share(em.shaper(name, 1.0, 0.2), inside, 0.2)
+    assert damped.max() == pytest.approx(top, abs=2e-4)  # the fits, measured: a slip moves more
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.05])
@@ -89,6 +94,8 @@ def test_rates_of_a_shaped_command_are_its_derivatives_in_several_coordinates() 
     q, rate, acceleration = command(t)
     assert q[[0, -1]] == pytest.approx(np.array([[0.0, 0.0], [1.0, -2.0]]), abs=1e-14)
     assert command(t[7])[0] == pytest.approx(q[7])
+    steady, _ = em.shaped(em.shaper("zv", 9.0), lambda t: (t, 1.0 + 0.0 * t, 0.0 * t), 0.3)
+    assert steady(np.array([-1.0, 0.01, 1.0]))[1] == pytest.approx([0.0, 0.5, 0.0])
     # Central differences of steps of 0.1 ms; q'' has kinks, where they are off by a step's change.
     assert np.abs(np.gradient(q, t, axis=0) - rate).max() < 1e-4 * np.abs(rate).max()
     assert np.abs(np.gradient(rate, t, axis=0) - acceleration).max() < 2e-3 * acceleration.max()
