@@ -23,6 +23,7 @@ __all__, __getattr__, __dir__ = face(
         "assembly.mode_shapes": "shapes",
         "assembly.pencil": "Pencil",
         "assembly.node_motion": "require_consistent",
+        "assembly.dynamics.inertia_forces": "InertiaForces inertia_forces",
         "assembly.dynamics.under_load": "stiffness_under_load",
         "assembly.dynamics.velocity_terms": "velocity_terms",
         "forces": "DriveForces drive_forces",

@@ -14,6 +14,7 @@ In reading order:
     response        frequency responses by modes, and their slopes
     slow_motion     how much the neglected motion would move the frequencies
     adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
+    shapers         commands of delayed copies that leave modes without vibration
 """
 
 from eigassign.faces import face
@@ -32,6 +33,11 @@ __all__, __getattr__, __dir__ = face(
         "taylor.rayleigh": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
         "response": "Damping ModalResponse Shaken dampings modal_response unit_forces",
+        "shapers": (
+            "SHAPERS Design ModeOnPath Shaper best_design best_designs convolved "
+            "csv_rows excited_modes klipper_lines reprap_line residual_share shaped shaped_along "
+            "shaper worst_share"
+        ),
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "

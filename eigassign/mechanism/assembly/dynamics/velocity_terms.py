@@ -298,6 +298,14 @@ class Pattern:
         columns, starts = self._compressed
         return sparse.csr_array((data, columns, starts), shape=self.shape)
 
+    def times(self, c: Floats, v: Floats, transposed: bool = False) -> Floats:
+        """A v (n, n_rows), or Aᵀ v, of vectors v (n, …) and numbers c (n, n_coefficients)."""
+        sides = np.divmod(self.places, self.shape[1])
+        to, of = sides[::-1] if transposed else sides
+        entries = (np.ones(len(to)), (to, np.arange(len(to))))
+        sums = sparse.csr_array(entries, shape=(self.shape[transposed], len(to)))
+        return np.asarray(sums @ (np.asarray(self.weights @ c.T) * v.T[of])).T
+
     @cached_property
     def _compressed(self) -> tuple[Ints, Ints]:
         """Columns of the entries, and where each row starts."""
