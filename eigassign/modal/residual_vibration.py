@@ -1,0 +1,402 @@
+"""Residual vibration of a move: what a prescribed motion q(t) leaves of the tip's error.
+
+The drives are held by their stiffness or locked; x = [u; deflections of held drives] obeys
+
+    M(q) ẍ + C ẋ + K(q) x = −f(q, q̇, q̈),      C = M Φ diag(2ζω) ΦᵀM,
+
+f being the forces of inertia of the rigid motion (`mechanism.assembly.dynamics.inertia_forces`),
+Φ and ω the modes of the pose and ζ as the case states it, of loss factors φᵀK_lossφ/2λ. Velocity
+terms of the vibration itself are left out. Nothing vibrates before the motion; where q̇ jumps,
+M Δẋ = −f(q, 0, Δq̇).
+
+One basis V for the whole path, modes of some poses and what f does at rest at others, makes of it
+r equations. In τ = t/T, dots being derivatives in τ, f = f_0(τ)/T², so that one preparation serves
+all durations T of the same path and law:
+
+    M_r ẍ + T C_r ẋ + T² K_r x = −f_0(τ).
+
+Over a step of τ the pose rests, as it is in the middle, and f_0 is the parabola through three Gauss
+points. The modes x = Φ η part, and each of them is solved exactly; the next step takes over
+
+    η ← Φ₊ᵀ M₊ Φ η,    η̇ likewise.
+
+That errs by the square of the step. After the stop the pose rests, and so each mode vibrates freely
+for good, d(t) = Σ_i b·φ_i Re Z_i exp((−ζ_i + i√(1 − ζ_i²)) ω_i t).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from eigassign.mechanism import InertiaForces, Trajectory, inertia_forces
+from eigassign.mechanism.forces import Forces
+from eigassign.mechanism.trajectory.motion import Motion, TipMotion
+from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.model import Model
+from eigassign.modal.reduced import ritz_pairs
+from eigassign.modal.response import Damping, unit_forces
+from eigassign.modal.taylor.rayleigh import project
+from eigassign.modal.under_load import displaced
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Complex = NDArray[np.complex128]
+BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
+SAME = 1e-9  # of the largest: what a vector of the basis has that no other has, squared
+LEAST_STEPS = 4  # between breaks, of a spline
+JUMP = 1e-6  # of the largest q̇: less is no blow
+PERIODS, PER_PERIOD = 20, 40  # of the lowest mode that are looked at; instants in one of the highest
+FINER = 20  # instants between two of these, beside the largest
+UNSEEN = 5e-4  # of all that vibrates: modes that are left out of the search, from the highest on
+NUMBERS = 2_000_000  # looked at together: 16 MB
+
+
+class Sizes(NamedTuple):
+    """How finely a move is solved."""
+
+    modes: int = 6  # of each pose
+    poses: int = 3
+    loads: int = 9  # instants of f at rest
+    steps: int = 64
+
+    def doubled(self) -> Sizes:
+        """Twice the basis, the same steps."""
+        return Sizes(2 * self.modes, 2 * self.poses - 1, 2 * self.loads - 1, self.steps)
+
+
+SIZES = Sizes()
+
+
+class Accuracy(NamedTuple):
+    """By how much residuals change, of the largest one of each node."""
+
+    sizes: Sizes
+    by_steps: float  # with half of the steps
+    by_basis: float  # with twice the modes, poses and loads
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A motion of a mechanism, with nodes that are watched; built once, solved for designs."""
+
+    model: Model
+    motion: Motion | TipMotion
+    span: tuple[float, float]  # s, from rest to rest
+    inertia: InertiaForces
+    tips: Forces
+    groups: tuple[slice, ...]  # of the forces, of each node
+    damping: Damping
+
+    def at(self, y: ArrayLike, sizes: Sizes = SIZES) -> ReducedMove:
+        """The move of a design y (n_y,), SI.
+
+        Raises TrajectoryError where the design cannot follow its path, UsageError for a wrong
+        shape, and MechanismError where a pose has no modes.
+        """
+        own = np.asarray(y, dtype=np.float64)
+        edges, blown = self._edges(sizes.steps)
+        V, n = self._basis(own, sizes), len(edges)
+        middle = np.append(0.5 * (edges[:-1] + edges[1:]), 1.0)
+        x = self._x(own, np.concatenate([middle, edges]))
+        K, M = self._projected(V, x)
+        mu, z = ritz_pairs(K[:n], M[:n])
+        phi = z / np.sqrt(mu)[:, None, :]
+        inverse = np.swapaxes(phi, 1, 2) @ M[:n]  # Φ⁻¹
+        blows = np.zeros((n, V.shape[1]))
+        push = (self._blows(own, edges[blown]) @ V)[..., None]
+        blows[blown] = -np.linalg.solve(M[n:][blown], push)[..., 0]
+        still, steps = self._at_rest(own, edges, blown, V, K[n:])
+        return ReducedMove(
+            groups=self.groups,
+            edges=edges,
+            omega=1.0 / np.sqrt(mu),
+            zeta=self._ratios(x[:n], V, phi, mu),
+            phi=phi,
+            turn=inverse[1:] @ phi[:-1],
+            still=still,
+            force=np.einsum("nrs,nks->nkr", inverse[:-1], still[:, 1:]),
+            steps=np.einsum("nrs,nks->nkr", inverse, steps),
+            blows=np.einsum("nrs,ns->nr", inverse, blows),
+            tip=self._tips(x[n:]) @ V,
+        )
+
+    def _at_rest(
+        self, y: Floats, edges: Floats, breaks: Ints, V: Floats, K: Floats
+    ) -> tuple[Floats, Floats]:
+        """w = K_r⁻¹ f_0 along the path by splines between breaks.
+
+        w, ẇ, ẅ where a step begins and ẅ where it ends, (n, 4, r), and by how much w and ẇ jump
+        where one begins, and at the stop, (n + 1, 2, r).
+        """
+        still, steps = np.zeros((len(edges) - 1, 4, len(K[0]))), np.zeros((len(edges), 2, len(K[0])))
+        for first, last in pairwise(breaks.tolist()):
+            tau = edges[first : last + 1]
+            f = self._forces(y, np.clip(tau, tau[0] + BESIDE, tau[-1] - BESIDE)) @ V
+            w = np.linalg.solve(K[first : last + 1], f[..., None])[..., 0]
+            curve = CubicSpline(tau, w)
+            rate, push = curve(tau, 1), curve(tau, 2)
+            still[first:last] = np.stack([w[:-1], rate[:-1], push[:-1], push[1:]], axis=1)
+            steps[first] += w[0], rate[0]
+            steps[last] -= w[-1], rate[-1]
+        return still, steps
+
+    def _edges(self, steps: int) -> tuple[Floats, Ints]:
+        """τ of the ends of all steps (n,), and which of them are breaks or ends of the motion."""
+        first, last = self.span
+        tau = (np.asarray(self.motion.breaks_s) - first) / (last - first)
+        ends = np.concatenate([[0.0], tau[(tau > BESIDE) & (tau < 1.0 - BESIDE)], [1.0]])
+        counts = np.maximum(np.ceil(np.diff(ends) * steps - 1e-6).astype(int), LEAST_STEPS)
+        pieces = [
+            np.linspace(a, b, n, endpoint=False)
+            for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)
+        ]
+        return np.append(np.concatenate(pieces), 1.0), np.cumsum([0, *counts])
+
+    def _moving(self, y: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
+        """q and its derivatives in τ, (n, n_q) each."""
+        T = self.span[1] - self.span[0]
+        q, rate, push = self.motion.moving(self.span[0] + T * tau, y)
+        return q, T * rate, T * T * push
+
+    def _x(self, y: Floats, tau: Floats) -> Floats:
+        return self.model.x(self._moving(y, tau)[0], y)
+
+    def _forces(self, y: Floats, tau: Floats) -> Floats:
+        """f_0 (n, n_dof)."""
+        q, rate, push = self._moving(y, tau)
+        return self.inertia.at(q, y, rate, push)
+
+    def _blows(self, y: Floats, tau: Floats) -> Floats:
+        """f(q, 0, Δq̇) (n, n_dof) where q̇ may jump: first and last from rest and to rest."""
+        q, before, _ = self._moving(y, np.maximum(tau - BESIDE, 0.0))
+        after = self._moving(y, np.minimum(tau + BESIDE, 1.0))[1]
+        size = max(np.abs(before).max(), np.abs(after).max())
+        before[0], after[-1] = 0.0, 0.0
+        jump = after - before
+        jump[np.abs(jump) < JUMP * size] = 0.0
+        return self.inertia.at(q, y, np.zeros_like(q), jump)
+
+    def _basis(self, y: Floats, sizes: Sizes) -> Floats:
+        """V (n_dof, r), with VᵀMV = I in the middle of the path."""
+        pencil = self.model.pencil
+        theta = pencil.theta(self._x(y, np.linspace(0.0, 1.0, sizes.poses)))
+        phi = lowest_modes(pencil, theta, 1, sizes.modes - 1).phi
+        tau = (np.arange(sizes.loads) + 0.5) / sizes.loads
+        f = self._forces(y, tau)[..., None]
+        still = displaced(pencil, pencil.theta(self._x(y, tau)), f)
+        W = np.concatenate([*phi, *still], axis=1)
+        M = self._projected(W, self._x(y, np.array([0.5])))[1][0]
+        size = np.sqrt(np.diag(M))
+        own = size > 0.0
+        W, M = W[:, own] / size[own], M[np.ix_(own, own)] / np.outer(size[own], size[own])
+        s, U = np.linalg.eigh(M)
+        kept = s > SAME * s[-1]
+        return np.asarray(W @ (U[:, kept] / np.sqrt(s[kept])))
+
+    def _projected(self, V: Floats, x: Floats) -> tuple[Floats, Floats]:
+        """K_r and M_r (n, r, r) at x (n, n_x)."""
+        theta, r = self.model.pencil.theta(x).T, V.shape[1]
+        K, M = (
+            (theta @ terms.reshape(len(terms), -1)).reshape(-1, r, r)
+            for terms in project(self.model.pencil, V)
+        )
+        return K, M
+
+    def _ratios(self, x: Floats, V: Floats, phi: Floats, mu: Floats) -> Floats:
+        """ζ (n, r)."""
+        loss, r = self.damping.loss, V.shape[1]
+        if loss is None:
+            return np.tile(self.damping.zeta(r), (len(x), 1))
+        lost = np.tensordot(loss.theta(x).T, project(loss, V)[0], 1)
+        return np.asarray(0.5 * mu * np.einsum("nir,nij,njr->nr", phi, lost, phi, optimize=True))
+
+    def _tips(self, x: Floats) -> Floats:
+        """b (n, m, n_dof) of every node and direction."""
+        b = np.zeros((len(x), len(self.tips.unknowns), self.model.n_dof))
+        known = zip(self.tips.unknowns, self.tips.at(x, np.arange(0)), strict=True)
+        for k, (places, (values, _)) in enumerate(known):
+            b[:, k, places] = values
+        return b
+
+    def accuracy(self, y: ArrayLike, durations: ArrayLike, sizes: Sizes = SIZES) -> Accuracy:
+        """What half of the steps, and twice the basis, would change of residuals."""
+        others = sizes._replace(steps=sizes.steps // 2), sizes.doubled()
+        found = self.at(y, sizes).residuals(durations)
+        largest = np.maximum(found.max(axis=0), np.finfo(float).tiny)
+        changes = (self.at(y, one).residuals(durations) - found for one in others)
+        return Accuracy(sizes, *(float((np.abs(each) / largest).max()) for each in changes))
+
+
+def move(
+    model: Model,
+    trajectory: Trajectory,
+    nodes: Mapping[str, Sequence[Sequence[float]]],
+    damping: Damping = Damping(),  # noqa: B008
+) -> Move:
+    """The motion of a trajectory, and nodes ``link.node`` whose way is watched.
+
+    Each along its directions of the ground, which are unit vectors square to each other: what
+    counts is the length of its way among them. Raises MechanismError where a coordinate is free,
+    and for superelements and solids.
+    """
+    tips = unit_forces(model, nodes)
+    ends = np.cumsum([0, *map(len, nodes.values())]).tolist()
+    groups = tuple(slice(a, b) for a, b in pairwise(ends))
+    own = inertia_forces(model.poses.case, model.poses.parameters, model.motion)
+    span = float(trajectory.time_s[0]), float(trajectory.time_s[-1])
+    return Move(model, trajectory.motion, span, own, tips, groups, damping)
+
+
+# --- of one design, in its modes
+
+
+class Free(NamedTuple):
+    """Free vibration after the stop, d(t) = Re Σ_i tip_mi Z_i exp(s_i t), t from the stop."""
+
+    Z: Complex  # (n_T, r)
+    s: Complex  # (r,) in rad/s
+    tip: Floats  # (m, r)
+
+    def at(self, t: Floats) -> Floats:
+        """d (n_T, m, n_t) at times (n_t,)."""
+        waves = np.exp(self.s[:, None] * t)
+        return np.asarray(((self.Z[:, None] * self.tip) @ waves).real)
+
+    def seen(self) -> NDArray[np.bool_]:
+        """The modes (r,) that count: all but the highest, as far as these are `UNSEEN`."""
+        tall = np.abs(self.Z) * np.linalg.norm(self.tip, axis=0)
+        above = np.cumsum(tall[:, ::-1], axis=1)[:, ::-1]  # of a mode and all higher ones
+        return np.asarray((above > UNSEEN * above[:, :1]).any(axis=0))
+
+    def largest(self) -> Floats:
+        """The largest |d| (n_T,) over time."""
+        omega = np.abs(self.s[self.seen()])
+        if not len(omega):
+            return np.zeros(len(self.Z))
+        step = 2.0 * np.pi / (PER_PERIOD * omega.max())
+        t = np.arange(0.0, PERIODS * 2.0 * np.pi / omega.min() + step, step)
+        rows = max(1, NUMBERS // (len(t) * len(self.tip)))
+        parts = [self._replace(Z=self.Z[i : i + rows]) for i in range(0, len(self.Z), rows)]
+        return np.concatenate([part._largest(t, step) for part in parts])
+
+    def _largest(self, t: Floats, step: float) -> Floats:
+        """By squares at times t, at finer ones beside the largest, and a parabola through three."""
+        first = t[(self.at(t) ** 2).sum(axis=1).argmax(axis=1)]
+        near = np.maximum(first[:, None] + np.linspace(-step, step, 2 * FINER + 1), 0.0)
+        waves = np.exp(self.s[:, None] * near[:, None])  # (n_T, r, n)
+        squares = (((self.Z[:, None] * self.tip) @ waves).real ** 2).sum(axis=1)
+        rows, k = np.arange(len(squares)), squares.argmax(axis=1)
+        a, b, c = (squares[rows, np.clip(k + i, 0, 2 * FINER)] for i in (-1, 0, 1))
+        inner = (a < b) & (c < b)
+        more = np.divide((a - c) ** 2, 8.0 * (2.0 * b - a - c), out=np.zeros_like(b), where=inner)
+        return np.asarray(np.sqrt(b + more))
+
+
+class Error(NamedTuple):
+    """The error of the tips while they move, (n_t, m) in m along each direction, at times in s."""
+
+    time_s: Floats  # from the start
+    error: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedMove:
+    """The move of one design over n steps, in the r modes of each; last those of the end pose."""
+
+    groups: tuple[slice, ...]
+    edges: Floats  # τ (n + 1,)
+    omega: Floats  # (n + 1, r) in rad/s
+    zeta: Floats
+    phi: Floats  # (n + 1, r, r)
+    turn: Floats  # (n, r, r) from the modes of a step to those of the next
+    still: Floats  # (n, 4, r): w, ẇ and ẅ where a step begins, ẅ where it ends
+    force: Floats  # (n, 3, r): of ẇ, ẅ and ẅ their parts in the modes, Φ⁻¹
+    steps: Floats  # (n + 1, 2, r): by how much w and ẇ jump, in the modes
+    blows: Floats  # (n + 1, r): Δη̇
+    tip: Floats  # (n + 1, m, r): Vᵀb where a step begins
+
+    def residuals(self, durations: ArrayLike, last: float = 0.0) -> Floats:
+        """The largest way (n_T, n_nodes) in m of each node from the stop on, for durations in s.
+
+        With ``last`` also during that share of the move, its end.
+        """
+        T = np.atleast_1d(np.asarray(durations, dtype=np.float64))
+        free = self.free(T)
+        found = [free._replace(tip=free.tip[own]).largest() for own in self.groups]
+        after = np.stack(found, axis=1)
+        if last <= 0.0:
+            return after
+        during = []
+        for each in T:
+            error = self.error(each, last).error
+            ways = [np.linalg.norm(error[:, own], axis=1) for own in self.groups]
+            during.append(np.max(ways, axis=1))
+        return np.maximum(after, np.array(during))
+
+    def error(self, duration: float, last: float = 1.0) -> Error:
+        """The error of the tips in the last share of a move of some duration, s."""
+        T, h = np.array([duration]), np.diff(self.edges)
+        free, states = self.free(T), self._states(T)
+        highest = np.abs(free.s[free.seen()]).max(initial=0.0)
+        parts = int(np.ceil(PER_PERIOD * h.max() * duration * highest / (2.0 * np.pi))) + 1
+        tau, error = [self.edges[-1:]], [self.tip[-1] @ self.phi[-1] @ states[-1, 0, 0]]
+        for share in np.arange(parts) / parts:
+            sigma = h[:, None] * share
+            P, offset = self._stepped(T, sigma)
+            eta = (P[:, 0, 0] * states[:-1, 0]).sum(axis=1) + offset[:, 0, 0]
+            w, rate, push, end = np.moveaxis(self.still, 1, 0)
+            w = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
+            x = (self.phi[:-1] @ eta[..., None])[..., 0] - w / duration**2
+            tip = self.tip[:-1] + share * np.diff(self.tip, axis=0)
+            tau.append(self.edges[:-1] + sigma[:, 0])
+            error.append((tip @ x[..., None])[..., 0])
+        at, ways = np.concatenate(tau), np.vstack(error)
+        order = np.argsort(at)
+        order = order[at[order] >= 1.0 - last]
+        return Error(duration * at[order], ways[order])
+
+    def free(self, T: Floats) -> Free:
+        """The vibration from the stop on, after durations T (n_T,)."""
+        eta, rate = np.moveaxis(self._states(T)[-1], 1, 0)
+        omega, zeta = self.omega[-1], self.zeta[-1]
+        s = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+        Z = eta - 1j * (rate / T[:, None] + zeta * omega * eta) / s.imag
+        return Free(Z, s, self.tip[-1] @ self.phi[-1])
+
+    def _states(self, T: Floats) -> Floats:
+        """Of z in the modes η and η̇ (n + 1, n_T, 2, r) where each step begins, after its jump."""
+        P, offset = self._stepped(T, np.diff(self.edges)[:, None])
+        states = self.steps[:, None] / T[:, None, None] ** 2
+        states[:, :, 1] += self.blows[:, None]
+        for k, turn in enumerate(self.turn):
+            moved = (P[k] * states[k, :, None]).sum(axis=2) + offset[k]
+            states[k + 1] += moved @ turn.T
+        return states
+
+    def _stepped(self, T: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+        """P (n, n_T, 2, 2, r) and c (n, n_T, 2, r): [η, η̇] becomes P [η, η̇] + c over σ (n, 1).
+
+        η̈ + 2ζv η̇ + v²η = g_0 + g_1 σ + g_2 σ², v = ωT, has a solution a + bσ + cσ².
+        """
+        v, zeta = self.omega[:-1, None] * T[:, None], self.zeta[:-1, None]
+        rate, push, end = np.moveaxis(self.force, 1, 0)[:, :, None] / T[:, None] ** 2
+        bend = (end - push) / np.diff(self.edges)[:, None, None]
+        c = zeta * bend / v
+        b = (bend + 2.0 * zeta * v * (push - 2.0 * c)) / v**2
+        a = (push + 2.0 * zeta * v * (rate - b) - 2.0 * c) / v**2
+        t, root = sigma[..., None], v * np.sqrt(1.0 - zeta**2)
+        fall = np.exp(-zeta * v * t)
+        C, S = fall * np.cos(root * t), fall * np.sin(root * t) / root
+        P = np.moveaxis(
+            np.array([[C + zeta * v * S, S], [-(v**2) * S, C - zeta * v * S]]), (0, 1), (2, 3)
+        )
+        start = np.stack(np.broadcast_arrays(a, b), axis=2)
+        end = np.stack([a + (b + c * t) * t, b + 2.0 * c * t], axis=2)
+        return P, end - (P * start[:, :, None]).sum(axis=3)
