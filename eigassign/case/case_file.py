@@ -222,7 +222,7 @@ class CaseFile:
     @property
     def has_question(self) -> bool:
         """True where a design is asked for: by targets, or an objective that needs none."""
-        return bool(self.asked) or self.assignment.objective == "lightest"
+        return bool(self.asked) or self.assignment.objective in ("lightest", "fastest")
 
     def problem(self, key_path: str, message: str) -> Problem:
         """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,

@@ -26,7 +26,7 @@ __all__, __getattr__, __dir__ = face(
         "assembly.dynamics.inertia_forces": "InertiaForces inertia_forces",
         "assembly.dynamics.under_load": "stiffness_under_load",
         "assembly.dynamics.velocity_terms": "velocity_terms",
-        "forces": "DriveForces drive_forces",
+        "forces": "DriveForces Forces drive_forces",
         "elements.beam": "fields",
         "elements.superelement": "free_part_lines part_lines",
         "elements.links": "total",
@@ -45,7 +45,7 @@ __all__, __getattr__, __dir__ = face(
         "kinematics.topology": "JointEdge",
         "solids.mesh_file": "read_mesh",
         "solids.part": "Coupling joined solid_part",
-        "trajectory.motion": "timing_law",
+        "trajectory.motion": "Motion Moving TipMotion known_motion timing_law",
         "trajectory.trajectory": (
             "NamedTrajectory Trajectories Trajectory build_trajectory rates read_samples"
         ),

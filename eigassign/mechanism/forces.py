@@ -35,6 +35,7 @@ from eigassign.mechanism.kinematics.joints import DOFS, multiply
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import split
+from eigassign.mechanism.trajectory.motion import Moving
 from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory, rates_at
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays
@@ -147,6 +148,9 @@ class DriveForces:
     def exerted(self, trajectory: Trajectory, time_s: Floats, y: Floats) -> Floats:
         """τ (n, n_q) at any times (n,) of a trajectory, at design y (n_y,)."""
         motion = trajectory.motion.moving(time_s, y)
+        if trajectory.stretch is not None:
+            share = trajectory.stretch[1] / y[trajectory.stretch[0]]
+            motion = Moving(motion.q, share * motion.rate, share**2 * motion.acceleration)
         still = [np.zeros((*each.shape, len(y))) for each in motion]
         return self.at([*motion], still, y, slopes=False)[0]
 

@@ -12,6 +12,7 @@ In reading order:
     antiresonances  frequencies at which a force leaves its node at rest
     under_load      what the weight does to frequencies, and what gives way under forces
     response        frequency responses by modes, and their slopes
+    residual_vibration  what a move leaves of the tip's error
     slow_motion     how much the neglected motion would move the frequencies
     adaptive_order  order and expansion points of the Taylor polynomial, judged by exact solves
     shapers         commands of delayed copies that leave modes without vibration
@@ -33,11 +34,15 @@ __all__, __getattr__, __dir__ = face(
         "taylor.rayleigh": "project project_at project_terms",
         "reduced": "ReducedModel reduce ritz_pairs",
         "response": "Damping ModalResponse Shaken dampings modal_response unit_forces",
+<<<<<<< HEAD
         "shapers": (
             "SHAPERS Design ModeOnPath Shaper best_design best_designs convolved "
             "csv_rows excited_modes klipper_lines reprap_line residual_share shaped shaped_along "
             "shaper worst_share"
         ),
+=======
+        "residual_vibration": "Accuracy Move ReducedMove Sizes move",
+>>>>>>> h47a
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile, from_mapping, load
-from eigassign.case.schema.trajectory import TrajectoryForm
+from eigassign.case.schema.trajectory import DURATION_PATH, TrajectoryForm
 from eigassign.case.units import handy
 from eigassign.errors import (
     AccuracyError,
@@ -150,6 +150,10 @@ def _loaded(file: CaseFile, model: Model, k: int) -> Trajectory:
     path, _, keys = file.trajectories[k]
     loads = np.array([load.along[k] for load in file.loads.values()])
     found = _followed(file, model, keys, path, loads)
+    designed = [column.parameter for column in file.design.parameters.values()]
+    if DURATION_PATH in designed:
+        stretch = designed.index(DURATION_PATH), file.value_at(DURATION_PATH)
+        found = replace(found, stretch=stretch)
     if not len(loads):
         return found
     said = [f"{name} = {handy(load.along[k], load.unit, 6)}" for name, load in file.loads.items()]

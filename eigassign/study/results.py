@@ -629,8 +629,8 @@ class AimRow:
         return self._said(self.optimal)
 
     def _said(self, value: float) -> str:
-        """A mass rounded to four digits; frequencies and room, which are at least that, down."""
-        if self.unit == "kg":
+        """A mass or time rounded to four digits; frequencies and room, which are at least, down."""
+        if self.unit in ("kg", "s"):
             return handy(value, self.unit, 4)
         down = float(_DOWN.create_decimal(value))
         if self.unit:

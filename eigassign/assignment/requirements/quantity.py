@@ -61,6 +61,7 @@ class LimitedQuantity(Requirement):
     extreme: tuple[str, str] = ("the least found is", "the most found is")
     is_affine: bool = True
     is_decided: bool = True
+    is_residual: bool = False  # of vibration after a move
     row_place: Callable[[Floats, int], str] | None = None  # of a design's row, in words
 
     @property

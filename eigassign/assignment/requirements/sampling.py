@@ -22,6 +22,7 @@ from eigassign.assignment.requirements.quantity import (
     static_limits,
 )
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.residual import residual_limits
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted
 from eigassign.case.schema.targets import (
@@ -29,6 +30,7 @@ from eigassign.case.schema.targets import (
     AnyTarget,
     FrequencyProfile,
     NamedMode,
+    ResidualTarget,
     StaticTarget,
 )
 from eigassign.errors import CaseError
@@ -73,12 +75,13 @@ def design_limits(
     limits = list(quantity_limits(file, model, path))
     if path is not None:
         limits += static_limits(file, model, path, list(_static(file, path)))
+        limits += residual_limits(file, model, path)
     return tuple(limits)
 
 
 def _static(file: CaseFile, path: Trajectories) -> Iterator[Placed]:
     for k, target in enumerate(file.targets):
-        if isinstance(target, StaticTarget):
+        if isinstance(target, StaticTarget) and not isinstance(target, ResidualTarget):
             rows = _rows(file, f"targets[{k}]", target, path)
             yield k, target, rows, tuple(_along(path, rows)), _where(target)
 

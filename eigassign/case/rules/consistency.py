@@ -35,6 +35,7 @@ from eigassign.case.schema.targets import (
     SagTarget,
 )
 from eigassign.case.schema.trajectory import (
+    DURATION_PATH,
     FileTrajectory,
     TipTrajectory,
     TrajectoryForm,
@@ -313,8 +314,12 @@ def objectives_have_what_they_take(document: Document) -> Iterator[Finding]:
     """What is to be light, high or wide has limits (or bands, gaps), no wanted frequencies."""
     name = document.assignment.named_objective
     one_shot = document.assignment.method == "one_shot"  # which takes none of them
-    if name not in ("lightest", "highest", "widest") or one_shot:
+    if name not in ("lightest", "highest", "widest", "fastest") or one_shot:
         return
+    designed = {p for column in document.design.parameters.values() for p in column.factors}
+    if name == "fastest" and DURATION_PATH not in designed:
+        message = "fastest needs a design parameter {parameter: trajectory.duration, min, max}"
+        yield ("assignment", "objective"), message
     for k, target in enumerate(document.targets):
         if isinstance(target, FrequencyTarget):
             message = f"objective {name} takes no wanted frequency: write at_least, at_most or both"

@@ -185,7 +185,7 @@ def _given(document: Document) -> Iterator[tuple[KeyPath, str, str, float]]:
         place = place[:-1] if isinstance(place[-1], int) else place
         yield place, "trajectory", "angle", max(angles, key=abs, default=0.0)
     for place, varied, number in _varied(document):
-        group, _, key, *_ = varied.split(".")
+        group, _, key, *_ = (*varied.split("."), "")
         yield place, group, key, number
 
 

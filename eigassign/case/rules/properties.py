@@ -20,7 +20,7 @@ from eigassign.case.schema.links import RigidLink, SolidLink
 from eigassign.case.schema.mechanism import FREEDOMS, Coordinate, Mechanism, NutJoint
 from eigassign.case.schema.parts import ANGLE, PLACE, FrozenDict, Part, Quantity, Written, quantity
 from eigassign.case.schema.targets import FREQUENCY, Antiresonance, FollowedMode, NamedMode
-from eigassign.case.schema.trajectory import Added, named_trajectories
+from eigassign.case.schema.trajectory import DURATION_PATH, Added, named_trajectories
 from eigassign.case.units import DIMENSIONS, SI, QuantityError, read_quantity, read_rate, written
 
 ANY = Quantity()  # dimension unknown because of an error elsewhere
@@ -28,7 +28,8 @@ ANY = Quantity()  # dimension unknown because of an error elsewhere
 _GROUPS = ("materials", "sections", "links", "joints", "bodies", "springs", "coordinates")
 _FORMS = (
     "expected materials.<name>.<property>, or the same of sections, links, bodies and springs, "
-    "coordinates.<name>.drive.stiffness or .inertia, joints.<name>.position.0 or .angle"
+    "coordinates.<name>.drive.stiffness or .inertia, joints.<name>.position.0 or .angle, or "
+    "trajectory.duration, where there is one trajectory with a duration"
 )
 _VECTORS = {  # of which components can vary
     "joints": {"position": PLACE, "orientation": ANGLE},
@@ -56,6 +57,8 @@ def property_at(case: Any, path: str) -> Quantity:
     ``case`` has a `mechanism` and `coordinates`. Raises NoPropertyError where the path names
     nothing, or something that is not a real number.
     """
+    if path == DURATION_PATH and getattr(case.trajectory, "duration", None) is not None:
+        return Quantity(DIMENSIONS["time"], above=0)
     group, name, *keys = (*path.split("."), "", "")
     if group == "mechanism" and name in _GROUPS:
         raise NoPropertyError(f"paths start below mechanism: write {path.partition('.')[2]!r}")
@@ -138,7 +141,7 @@ def properties_of(case: Any) -> Iterator[str]:
 
 def is_place(path: str) -> bool:
     """True where a property is a length, a place or an angle of the mechanism."""
-    group, _, key, *_ = path.split(".")
+    group, _, key, *_ = (*path.split("."), "")
     return key in ("length", "angle", *_VECTORS.get(group, ()))
 
 
@@ -171,7 +174,7 @@ def drive_quantity(mechanism: Mechanism, coordinate: Coordinate, key: str) -> Qu
 
 def value_at(case: Any, path: str) -> float:
     """The number at ``path`` in the parts of a valid case, in SI."""
-    owner = case if path.startswith("coordinates.") else case.mechanism
+    owner = case if path.startswith(("coordinates.", "trajectory.")) else case.mechanism
     value = reduce(below, path.split("."), owner)
     found: float = 0.0 if value is None else value  # it is at its node, and not turned
     return found
@@ -200,13 +203,13 @@ def with_value(part: Any, path: Sequence[str | int], value: float) -> Any:
 
 
 def with_properties(case: Any, values: Mapping[str, float]) -> dict[str, Any]:
-    """The `mechanism` and `coordinates` of a case with numbers (SI) by their paths in them."""
-    found = {"mechanism": case.mechanism, "coordinates": case.coordinates}
+    """Parts of a case, by their keys, with numbers (SI) by their paths in them."""
+    found = {name: getattr(case, name) for name in ("mechanism", "coordinates", "trajectory")}
     for path, value in values.items():
         head, *rest = path.split(".")
-        moved = head == "coordinates"
-        owner = "coordinates" if moved else "mechanism"
-        found[owner] = with_value(found[owner], rest if moved else [head, *rest], value)
+        own = head in found
+        owner = head if own else "mechanism"
+        found[owner] = with_value(found[owner], rest if own else [head, *rest], value)
     return found
 
 

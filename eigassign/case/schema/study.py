@@ -38,7 +38,7 @@ from eigassign.case.units import PLAIN, QuantityError, number_and_unit
 
 Auto: TypeAlias = Literal["auto"]
 MaxError: TypeAlias = Annotated[float, Quantity(PLAIN, above=0, at_most=1)]  # 2 is meant as 2 %
-Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest"]
+Word: TypeAlias = Literal["least_squares", "worst_case", "lightest", "widest", "fastest"]
 MOST_MEASUREMENTS = 10_000  # of one case
 
 
@@ -106,7 +106,8 @@ class AssignmentKeys(Part):
             limits
         objective: what is made small or large: `least_squares` the mean square error, `worst_case`
             the largest weighted error, `lightest` the mass, `{highest: 1}` the least frequency of a
-            mode, `widest` the least relative room of all bands and gaps, of numbered modes
+            mode, `widest` the least relative room of all bands and gaps, of numbered modes,
+            `fastest` the design parameter `trajectory.duration`
         starts: number of designs to start from; the first are the initial design and the one shot,
             the others by turns the most promising of a sample and spread ones. `auto` goes on
             while more than half an optimum is expected unseen, to 100 starts at most

@@ -20,6 +20,7 @@ from eigassign.case.schema.parts import (
     OneOrList,
     Part,
     Quantity,
+    Share,
     Told,
     ValueOr,
     distinct,
@@ -541,6 +542,41 @@ class ResponseTarget(StaticTarget):
     at_least: Annotated[float, quantity("stiffness", above=0)]
 
 
+class MovedNode(Node):
+    """Where vibration is left over.
+
+    Keys:
+        direction: along which the way counts, in the axes of the ground; its length unless given
+        last: share of the motion, at its end, in which the way counts too; after the stop it always
+            does
+    """
+
+    direction: OneOrList[Literal["any"], Direction] = "any"
+    last: Share = 0.0
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        if isinstance(self.direction, str):
+            return self.at
+        return f"{self.at} along [{', '.join(f'{v:g}' for v in self.direction)}]"
+
+
+class ResidualTarget(StaticTarget):
+    """A node does not vibrate more than this after the motion.
+
+    Keys:
+        residual: where, and along which direction
+        at_most: way of the node from where it rests then
+    """
+
+    kind = "residual"
+    noun = "residual vibration"
+    limit = "at_most"
+    residual: MovedNode
+    at_most: Annotated[float, quantity("length", above=0)]
+
+
 class DrawnResponse(ShakenNode):
     """A response along the trajectory: the way of a node over the force that shakes one.
 
@@ -599,7 +635,8 @@ TargetForm: TypeAlias = Annotated[
     | StiffnessTarget
     | ComplianceTarget
     | SagTarget
-    | ResponseTarget,
+    | ResponseTarget
+    | ResidualTarget,
     Told(_which_target),
 ]
 # By the key that says the kind, which the limit of what is static does not.

@@ -36,6 +36,7 @@ from eigassign.case.schema.parts import (
 from eigassign.case.units import written
 
 DURATION = quantity("time", above=0)
+DURATION_PATH = "trajectory.duration"  # of the only trajectory, as a design parameter
 TIME = quantity("time")
 
 

@@ -131,6 +131,24 @@ def sampled_motion(time_s: Floats, q: Floats) -> Motion:
     return Motion(Curve(time_s, c), np.zeros(0))
 
 
+def known_motion(time_s: Floats, known: Moving) -> Motion:
+    """The quintics through q, q̇ and q̈ (n, n_q) at times (n,), as of commands that were shaped.
+
+    A time that is given twice is a break: first what is before it, then what is behind.
+    """
+    own = np.flatnonzero(np.diff(time_s) > 0.0)
+    h = np.diff(time_s)[own, None]
+    (q, v, a), (q_end, v_end, a_end) = ([each[own + side] for each in known] for side in (0, 1))
+    D = q_end - q - (v + 0.5 * a * h) * h
+    E, F = (v_end - v - a * h) * h, 0.5 * (a_end - a) * h**2
+    third = (10.0 * D - 4.0 * E + F) / h**3
+    fourth = (-15.0 * D + 7.0 * E - 2.0 * F) / h**4
+    fifth = (6.0 * D - 3.0 * E + F) / h**5
+    knots = np.append(time_s[own], time_s[-1])
+    twice = time_s[1:][np.diff(time_s) == 0.0]
+    return Motion(Curve(knots, np.array([q, v, 0.5 * a, third, fourth, fifth])), twice)
+
+
 # --- along a path of the tip
 
 

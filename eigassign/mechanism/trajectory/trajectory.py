@@ -67,7 +67,8 @@ FINELY = 200
 class Trajectory(Brief):
     """Where the mechanism is when, at the initial design.
 
-    ``sampled`` is the trajectory without the instants that were put between its samples.
+    ``sampled`` is the trajectory without the instants that were put between its samples. Where a
+    design has its duration, the same path takes another time.
     """
 
     time_s: Floats  # (n,) strictly increasing; one alone is a pose at rest
@@ -75,6 +76,7 @@ class Trajectory(Brief):
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
     known: Motion | TipMotion | None = None  # None where it is known at its samples only
     sampled: Trajectory | None = None
+    stretch: tuple[int, float] | None = None  # which entry of y is its duration, and that here
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.q):
@@ -110,7 +112,7 @@ class Trajectory(Brief):
     def chosen(self, samples: Ints) -> Trajectory:
         """Some of the samples only, given by ascending numbers."""
         some = self.time_s[samples], self.q[samples]
-        return Trajectory(*some, self.notes, self.motion)
+        return Trajectory(*some, self.notes, self.motion, stretch=self.stretch)
 
     @property
     def given(self) -> Trajectory:
@@ -129,7 +131,7 @@ class Trajectory(Brief):
             return self
         q = self.motion.poses(time_s)
         q[np.isin(time_s, self.time_s)] = self.q
-        return Trajectory(time_s, q, self.notes, self.motion, self.given)
+        return Trajectory(time_s, q, self.notes, self.motion, self.given, self.stretch)
 
 
 def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
@@ -517,4 +519,11 @@ def rates_at(trajectory: Trajectory, y: Floats, slopes: bool = True) -> tuple[Ra
                     sides[side] = rates(trajectory, y + side * step)
             pairs = zip(sides.get(1, found)[1:], sides.get(-1, found)[1:], strict=True)
             by_y[..., j] = [(a - b) / (max(len(sides), 1) * step[j]) for a, b in pairs]
+    if trajectory.stretch is not None:
+        k, duration = trajectory.stretch
+        share = duration / y[k]
+        rate, push = share * found.rate, share**2 * found.acceleration
+        found = found._replace(rate=rate, acceleration=push)
+        by_y *= np.array([1.0, share, share**2])[:, None, None, None]
+        by_y[1, ..., k], by_y[2, ..., k] = -rate / y[k], -2.0 * push / y[k]
     return found, Rates(found.samples, *by_y)

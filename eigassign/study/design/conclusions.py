@@ -29,6 +29,7 @@ from eigassign.assignment.program import can_be_kept, smallest
 from eigassign.assignment.requirements.kinds import ModeGap
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
+from eigassign.case.schema.trajectory import DURATION_PATH
 from eigassign.case.units import handy
 from eigassign.errors import EigassignError
 from eigassign.facts import priced
@@ -166,6 +167,12 @@ def aim_row(
         before, after = map(scene.model.mass, designs)
         row = AimRow("as light as can be", before, after, scene.file.mass_unit)
         return _in_words(row, f"lightest design found: {row.after}", kept)
+    if aim == "fastest":
+        columns = scene.file.design.parameters.values()
+        column = [own.parameter for own in columns].index(DURATION_PATH)
+        before, after = (float(y[column]) for y in designs)
+        row = AimRow("as fast as can be", before, after, "s")
+        return _in_words(row, f"fastest motion found: {row.after}", kept)
     if (paid := cost(scene, found.best.y)) is not None:
         one = "1 Hz" if aim == "highest" else "1 % of room"
         kept += f"; its price, {priced(paid)}, counts against it, 1 as {one}"

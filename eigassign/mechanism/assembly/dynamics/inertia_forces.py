@@ -73,7 +73,9 @@ class InertiaForces:
         g = stack.masses.times(m, a + self._turned(spin, s))
         for slots, owner, J in zip(self.slots, self.owners, np.moveaxis(sites, 1, 0), strict=True):
             w, there = spin[:, owner], slots >= 0
-            pull = np.cross(w, np.cross(w, first_moment(J[0])))  # bodies differ with the design alone
+            pull = np.cross(
+                w, np.cross(w, first_moment(J[0]))
+            )  # bodies differ with the design alone
             g[:, slots[there]] += np.hstack([pull, np.cross(w, w @ J[0, 3:, 3:])])[:, there]
         g = g if stack.basis is None else g @ stack.basis
         rigid = stack.twist.times(T, stack.spread.times(N, g, transposed=True), transposed=True)
@@ -107,7 +109,9 @@ def inertia_forces(
     heavy = {name: link for name, link in named.items() if whole_mass(link)}
     moving = all_moving(case, parameters, motion)
     stack, _ = stacked(list(heavy.items()), nodes, moving, motion)
-    first = dict(zip(heavy, np.cumsum([0, *map(whole_size, heavy.values())]).tolist(), strict=False))
+    first = dict(
+        zip(heavy, np.cumsum([0, *map(whole_size, heavy.values())]).tolist(), strict=False)
+    )
     known = parameters.with_passive(motion.passive)
     scene = Loaded(case, known, motion, named, nodes)
     slots = [

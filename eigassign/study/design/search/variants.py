@@ -47,6 +47,7 @@ from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin, ModeG
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.trajectory import DURATION_PATH
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Named, followers
@@ -216,9 +217,12 @@ def cost_of(scene: Scene, unit: float) -> Cost | None:
     """What designs cost more than the initial one, in ``unit`` for 1 of the file; None: nothing.
 
     What is chosen of lists with a price each counts in full. Of the lightest design the mass is
-    all that counts, in kg.
+    all that counts, in kg, of the fastest the motion time, in s.
     """
     design, mass, n = scene.file.design, scene.model.total_mass, len(scene.initial)
+    if scene.file.assignment.objective == "fastest":
+        of_time = [c.parameter == DURATION_PATH for c in design.parameters.values()]
+        return Cost(np.array(of_time, dtype=np.float64), np.zeros(n))
     if scene.file.assignment.objective == "lightest":
         return Cost(np.zeros(n), scene.initial, 1.0, mass, is_affine=mass.is_affine)
     prices = np.array([column.price or 0.0 for column in design.parameters.values()])
@@ -252,6 +256,7 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
 
 
 STARTS = 100  # with `starts: auto`, at most
+LOBES = 12  # of residuals, over the motion time, that the fastest motion is sought in
 # Of each of several choices: those that cannot meet the limits have many optima. Of 150 random
 # problems with lists beside continuous parameters none was worse than with ten each.
 OF_SEVERAL = 20
@@ -293,6 +298,8 @@ def coarse_to_fine(whole: Task) -> tuple[Task, ...]:
 def most_starts(file: CaseFile, alone: bool = True) -> int:
     """The number of designs to start from, of a choice that is ``alone`` or of each of several."""
     asked = file.assignment.starts
+    if asked == "auto" and file.assignment.objective == "fastest":
+        return LOBES
     return asked if not isinstance(asked, str) else STARTS if alone else OF_SEVERAL
 
 

@@ -1,0 +1,439 @@
+"""Residual vibration of a move: what a prescribed motion q(t) leaves of the tip's error.
+
+The drives are held by their stiffness or locked; x = [u; deflections of held drives] obeys
+
+    M(q) ẍ + C ẋ + K(q) x = −f(q, q̇, q̈),      C = M Φ diag(2ζω) ΦᵀM,
+
+f being the forces of inertia of the rigid motion (`mechanism.assembly.dynamics.inertia_forces`),
+Φ and ω the modes of the pose and ζ as the case states it, of loss factors φᵀK_lossφ/2λ. Velocity
+terms of the vibration itself are left out. Nothing vibrates before the motion; where q̇ jumps,
+M Δẋ = −f(q, 0, Δq̇).
+
+One basis V for the whole path, modes of some poses and what f does at rest at others, makes of it
+few equations. In τ = t/T, dots being derivatives in τ, f = f_0(τ)/T², so that one preparation
+serves all durations T of the same path and law. What f does at rest is apart,
+
+    x = z − w/T²,   w = K_r⁻¹ f_0,      M_r z̈ + T C_r ż + T² K_r z = (M_r ẅ + T C_r ẇ)/T²,
+
+w by splines between the breaks of the motion. z is in the p slowest modes of each pose: others
+follow at rest, as far as they are fast. Over a step of τ the pose rests, as it is in its middle,
+the modes z = Φ η part, and each of them is solved exactly. The next step takes over
+η ← Φ₊ᵀ M₊ Φ η and η̇ likewise: of R = exp(hA), this matrix for all modes, exp(hA_pp). That slow
+modes must follow their shapes as these turn, softens them, ω²T² − B, B = A_fpᵀ A_fp of the fast
+ones f. (Were these followed in steps, which are long beside their periods, each step would ring
+them anew.) All that errs by the square of the step.
+
+After the stop the pose rests, so that each mode vibrates freely, for good, with Z_i from η and η̇:
+
+    d(t) = Re Σ_i b·φ_i Z_i exp(s_i t),   s_i = (−ζ_i + i√(1 − ζ_i²)) ω_i .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from eigassign.mechanism.assembly.dynamics.inertia_forces import InertiaForces, inertia_forces
+from eigassign.mechanism.forces import Forces
+from eigassign.mechanism.trajectory.motion import Motion, TipMotion
+from eigassign.mechanism.trajectory.trajectory import Trajectory
+from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.model import Model
+from eigassign.modal.reduced import ritz_pairs
+from eigassign.modal.response import Damping, unit_forces
+from eigassign.modal.taylor.rayleigh import project
+from eigassign.modal.under_load import displaced
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Complex = NDArray[np.complex128]
+BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
+SAME = 1e-9  # of the largest: what a vector of the basis has that no other has, squared
+LEAST_STEPS = 4  # between breaks, of a spline
+JUMP = 1e-6  # of the largest q̇: less is no blow
+PERIODS, PER_PERIOD = (
+    20,
+    40,
+)  # of the lowest mode that are looked at; instants in one of the highest
+FINER = 20  # instants between two of these, beside the largest
+UNSEEN = 5e-4  # of all that vibrates: modes that are left out of the search, from the highest on
+NUMBERS = 2_000_000  # looked at together: 16 MB
+
+
+class Sizes(NamedTuple):
+    """How finely a move is solved.
+
+    Against integrations of the whole: a planar arm and a palletiser err by 1e-4 of their largest
+    residual with 2 to 4 modes, 64 to 256 steps. From 6 modes on, of 400 Hz, it is up to 4e-3.
+    """
+
+    modes: int = 4  # that are followed, and of each pose in the basis
+    poses: int = 3
+    loads: int = 9  # instants of f at rest
+    steps: int = 128
+
+
+SIZES = Sizes()
+
+
+class Accuracy(NamedTuple):
+    """By how much residuals change, of the largest one of each node."""
+
+    by_steps: float  # with half of the steps
+    by_modes: float  # with two modes more
+    by_basis: float  # with twice the poses and loads
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A motion of a mechanism, with nodes that are watched; built once, solved for designs."""
+
+    model: Model
+    motion: Motion | TipMotion
+    span: tuple[float, float]  # s, from rest to rest
+    inertia: InertiaForces
+    tips: Forces
+    groups: tuple[slice, ...]  # of the forces, of each node
+    damping: Damping
+
+    def at(self, y: ArrayLike, sizes: Sizes = SIZES) -> ReducedMove:
+        """The move of a design y (n_y,), SI.
+
+        Raises TrajectoryError where the design cannot follow its path, UsageError for a wrong
+        shape, and MechanismError where a pose has no modes.
+        """
+        own = np.asarray(y, dtype=np.float64)
+        edges, blown = self._edges(sizes.steps)
+        V, n = self._basis(own, sizes), len(edges)
+        middle = np.append(0.5 * (edges[:-1] + edges[1:]), 1.0)
+        x = self._x(own, np.concatenate([middle, edges]))
+        K, M = self._projected(V, x)
+        mu, z = ritz_pairs(K[:n], M[:n])
+        phi = z / np.sqrt(mu)[:, None, :]
+        inverse = np.swapaxes(phi, 1, 2) @ M[:n]  # Φ⁻¹
+        p = min(sizes.modes, V.shape[1])
+        turn, pull = _followed(inverse[1:] @ phi[:-1], np.diff(middle), p)
+        omega, phi, inverse = 1.0 / np.sqrt(mu[:, :p]), phi[..., :p], inverse[:, :p]
+        blows = np.zeros((n, V.shape[1]))
+        push = (self._blows(own, edges[blown]) @ V)[..., None]
+        blows[blown] = -np.linalg.solve(M[n:][blown], push)[..., 0]
+        still, steps = self._at_rest(own, edges, blown, V, K[n:])
+        return ReducedMove(
+            groups=self.groups,
+            edges=edges,
+            omega=omega,
+            zeta=self._ratios(x[:n], V, phi, omega),
+            pull=pull,
+            phi=phi,
+            turn=turn,
+            still=still,
+            force=np.einsum("nrs,nks->nkr", inverse[:-1], still[:, 1:]),
+            steps=np.einsum("nrs,nks->nkr", inverse, steps),
+            blows=np.einsum("nrs,ns->nr", inverse, blows),
+            tip=self._tips(x[n:]) @ V,
+        )
+
+    def _at_rest(
+        self, y: Floats, edges: Floats, breaks: Ints, V: Floats, K: Floats
+    ) -> tuple[Floats, Floats]:
+        """w = K_r⁻¹ f_0 along the path by splines between breaks.
+
+        w, ẇ, ẅ where a step begins and ẅ where it ends, (n, 4, r), and by how much w and ẇ jump
+        where one begins, and at the stop, (n + 1, 2, r).
+        """
+        still, steps = (
+            np.zeros((len(edges) - 1, 4, len(K[0]))),
+            np.zeros((len(edges), 2, len(K[0]))),
+        )
+        for first, last in pairwise(breaks.tolist()):
+            tau = edges[first : last + 1]
+            f = self._forces(y, np.clip(tau, tau[0] + BESIDE, tau[-1] - BESIDE)) @ V
+            w = np.linalg.solve(K[first : last + 1], f[..., None])[..., 0]
+            curve = CubicSpline(tau, w)
+            rate, push = curve(tau, 1), curve(tau, 2)
+            still[first:last] = np.stack([w[:-1], rate[:-1], push[:-1], push[1:]], axis=1)
+            steps[first] += w[0], rate[0]
+            steps[last] -= w[-1], rate[-1]
+        return still, steps
+
+    def _edges(self, steps: int) -> tuple[Floats, Ints]:
+        """τ of the ends of all steps (n,), and which of them are breaks or ends of the motion."""
+        first, last = self.span
+        tau = (np.asarray(self.motion.breaks_s) - first) / (last - first)
+        ends = np.concatenate([[0.0], tau[(tau > BESIDE) & (tau < 1.0 - BESIDE)], [1.0]])
+        counts = np.maximum(np.ceil(np.diff(ends) * steps - 1e-6).astype(int), LEAST_STEPS)
+        pieces = [
+            np.linspace(a, b, n, endpoint=False)
+            for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)
+        ]
+        return np.append(np.concatenate(pieces), 1.0), np.cumsum([0, *counts])
+
+    def _moving(self, y: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
+        """q and its derivatives in τ, (n, n_q) each."""
+        T = self.span[1] - self.span[0]
+        q, rate, push = self.motion.moving(self.span[0] + T * tau, y)
+        return q, T * rate, T * T * push
+
+    def _x(self, y: Floats, tau: Floats) -> Floats:
+        return self.model.x(self._moving(y, tau)[0], y)
+
+    def _forces(self, y: Floats, tau: Floats) -> Floats:
+        """f_0 (n, n_dof)."""
+        q, rate, push = self._moving(y, tau)
+        return self.inertia.at(q, y, rate, push)
+
+    def _blows(self, y: Floats, tau: Floats) -> Floats:
+        """f(q, 0, Δq̇) (n, n_dof) where q̇ may jump: first and last from rest and to rest."""
+        q, before, _ = self._moving(y, np.maximum(tau - BESIDE, 0.0))
+        after = self._moving(y, np.minimum(tau + BESIDE, 1.0))[1]
+        size = max(np.abs(before).max(), np.abs(after).max())
+        before[0], after[-1] = 0.0, 0.0
+        jump = after - before
+        jump[np.abs(jump) < JUMP * size] = 0.0
+        return self.inertia.at(q, y, np.zeros_like(q), jump)
+
+    def _basis(self, y: Floats, sizes: Sizes) -> Floats:
+        """V (n_dof, r), with VᵀMV = I in the middle of the path."""
+        pencil = self.model.pencil
+        theta = pencil.theta(self._x(y, np.linspace(0.0, 1.0, sizes.poses)))
+        phi = lowest_modes(pencil, theta, 1, sizes.modes - 1).phi
+        tau = (np.arange(sizes.loads) + 0.5) / sizes.loads
+        f = self._forces(y, tau)[..., None]
+        still = displaced(pencil, pencil.theta(self._x(y, tau)), f)
+        W = np.concatenate([*phi, *still], axis=1)
+        M = self._projected(W, self._x(y, np.array([0.5])))[1][0]
+        size = np.sqrt(np.diag(M))
+        own = size > 0.0
+        W, M = W[:, own] / size[own], M[np.ix_(own, own)] / np.outer(size[own], size[own])
+        s, U = np.linalg.eigh(M)
+        kept = s > SAME * s[-1]
+        return np.asarray(W @ (U[:, kept] / np.sqrt(s[kept])))
+
+    def _projected(self, V: Floats, x: Floats) -> tuple[Floats, Floats]:
+        """K_r and M_r (n, r, r) at x (n, n_x)."""
+        theta, r = self.model.pencil.theta(x).T, V.shape[1]
+        K, M = (
+            (theta @ terms.reshape(len(terms), -1)).reshape(-1, r, r)
+            for terms in project(self.model.pencil, V)
+        )
+        return K, M
+
+    def _ratios(self, x: Floats, V: Floats, phi: Floats, omega: Floats) -> Floats:
+        """ζ (n, p)."""
+        loss, r = self.damping.loss, phi.shape[2]
+        if loss is None:
+            return np.tile(self.damping.zeta(r), (len(x), 1))
+        lost = np.tensordot(loss.theta(x).T, project(loss, V)[0], 1)
+        return np.asarray(
+            0.5 / omega**2 * np.einsum("nir,nij,njr->nr", phi, lost, phi, optimize=True)
+        )
+
+    def _tips(self, x: Floats) -> Floats:
+        """b (n, m, n_dof) of every node and direction."""
+        b = np.zeros((len(x), len(self.tips.unknowns), self.model.n_dof))
+        known = zip(self.tips.unknowns, self.tips.at(x, np.arange(0)), strict=True)
+        for k, (places, (values, _)) in enumerate(known):
+            b[:, k, places] = values
+        return b
+
+    def accuracy(self, y: ArrayLike, durations: ArrayLike, sizes: Sizes = SIZES) -> Accuracy:
+        """What other sizes would change of the residuals of a design."""
+        others = (
+            sizes._replace(steps=sizes.steps // 2),
+            sizes._replace(modes=sizes.modes + 2),
+            sizes._replace(poses=2 * sizes.poses, loads=2 * sizes.loads),
+        )
+        found = self.at(y, sizes).residuals(durations)
+        largest = np.maximum(found.max(axis=0), np.finfo(float).tiny)
+        changes = (self.at(y, one).residuals(durations) - found for one in others)
+        return Accuracy(*(float((np.abs(each) / largest).max()) for each in changes))
+
+
+def _followed(turn: Floats, apart: Floats, p: int) -> tuple[Floats, Floats]:
+    """What p slow modes take over (n, p, p), and B (n, p) of each step, from whole Φ⁻¹₊Φ.
+
+    From exp(hA): exp(hA_pp) to second order, and the mean of A_phᵀA_ph at both ends of a step.
+    """
+    lost, back = turn[:, p:, :p], turn[:, :p, p:]
+    pull = (lost**2).sum(axis=1) / apart[:, None] ** 2
+    pull = 0.5 * (pull + np.concatenate([pull[:1], pull[:-1]]))
+    return turn[:, :p, :p] - 0.5 * back @ lost, pull
+
+
+def move(
+    model: Model,
+    trajectory: Trajectory,
+    nodes: Mapping[str, Sequence[Sequence[float]]],
+    damping: Damping = Damping(),  # noqa: B008
+) -> Move:
+    """The motion of a trajectory, and nodes ``link.node`` whose way is watched.
+
+    Each along its directions of the ground, which are unit vectors square to each other: what
+    counts is the length of its way among them. Raises MechanismError where a coordinate is free,
+    and for superelements and solids.
+    """
+    tips = unit_forces(model, nodes)
+    ends = np.cumsum([0, *map(len, nodes.values())]).tolist()
+    groups = tuple(slice(a, b) for a, b in pairwise(ends))
+    own = inertia_forces(model.poses.case, model.poses.parameters, model.motion)
+    span = float(trajectory.time_s[0]), float(trajectory.time_s[-1])
+    return Move(model, trajectory.motion, span, own, tips, groups, damping)
+
+
+# --- of one design, in its modes
+
+
+class Free(NamedTuple):
+    """Free vibration after the stop, d(t) = Re Σ_i tip_mi Z_i exp(s_i t), t from the stop."""
+
+    Z: Complex  # (n_T, p)
+    s: Complex  # (p,) in 1/s
+    tip: Floats  # (m, p)
+
+    def at(self, t: Floats) -> Floats:
+        """d (n_T, m, n_t) at times (n_t,)."""
+        waves = np.exp(self.s[:, None] * t)
+        return np.asarray(((self.Z[:, None] * self.tip) @ waves).real)
+
+    def seen(self) -> NDArray[np.bool_]:
+        """The modes (p,) that count: all but the highest, as far as these are `UNSEEN`."""
+        tall = np.abs(self.Z) * np.linalg.norm(self.tip, axis=0)
+        above = np.cumsum(tall[:, ::-1], axis=1)[:, ::-1]  # of a mode and all higher ones
+        return np.asarray((above > UNSEEN * above[:, :1]).any(axis=0))
+
+    def largest(self) -> Floats:
+        """The largest |d| (n_T,) over time."""
+        omega = np.abs(self.s[self.seen()])
+        if not len(omega):
+            return np.zeros(len(self.Z))
+        step = 2.0 * np.pi / (PER_PERIOD * omega.max())
+        t = np.arange(0.0, PERIODS * 2.0 * np.pi / omega.min() + step, step)
+        rows = max(1, NUMBERS // (len(t) * len(self.tip)))
+        parts = [self._replace(Z=self.Z[i : i + rows]) for i in range(0, len(self.Z), rows)]
+        return np.concatenate([part._largest(t, step) for part in parts])
+
+    def _largest(self, t: Floats, step: float) -> Floats:
+        """By squares at times t, at finer ones beside the largest, and a parabola through three."""
+        first = t[(self.at(t) ** 2).sum(axis=1).argmax(axis=1)]
+        near = np.maximum(first[:, None] + np.linspace(-step, step, 2 * FINER + 1), 0.0)
+        waves = np.exp(self.s[:, None] * near[:, None])  # (n_T, p, n)
+        squares = (((self.Z[:, None] * self.tip) @ waves).real ** 2).sum(axis=1)
+        rows, k = np.arange(len(squares)), squares.argmax(axis=1)
+        a, b, c = (squares[rows, np.clip(k + i, 0, 2 * FINER)] for i in (-1, 0, 1))
+        inner = (a < b) & (c < b)
+        more = np.divide((a - c) ** 2, 8.0 * (2.0 * b - a - c), out=np.zeros_like(b), where=inner)
+        return np.asarray(np.sqrt(b + more))
+
+
+class Error(NamedTuple):
+    """The error of the tips while they move, (n_t, m) in m along each direction, at times in s."""
+
+    time_s: Floats  # from the start
+    error: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedMove:
+    """The move of one design over n steps, in p modes of each; last those of the end pose.
+
+    r is the number of vectors in V, m that of directions of all nodes.
+    """
+
+    groups: tuple[slice, ...]
+    edges: Floats  # τ (n + 1,)
+    omega: Floats  # (n + 1, p) in rad/s
+    zeta: Floats
+    pull: Floats  # (n, p): B
+    phi: Floats  # (n + 1, r, p)
+    turn: Floats  # (n, p, p) from the modes of a step to those of the next
+    still: Floats  # (n, 4, r): w, ẇ and ẅ where a step begins, ẅ where it ends
+    force: Floats  # (n, 3, p): ẇ, ẅ and ẅ of these in the modes
+    steps: Floats  # (n + 1, 2, p): by how much w and ẇ jump, in the modes
+    blows: Floats  # (n + 1, p): by how much η̇ jumps with q̇
+    tip: Floats  # (n + 1, m, r): Vᵀb where a step begins
+
+    def residuals(self, durations: ArrayLike, last: float = 0.0) -> Floats:
+        """The largest way (n_T, n_nodes) in m of each node from the stop on, for durations in s.
+
+        With ``last`` also during that share of the move, its end.
+        """
+        T = np.atleast_1d(np.asarray(durations, dtype=np.float64))
+        free = self.free(T)
+        found = [free._replace(tip=free.tip[own]).largest() for own in self.groups]
+        after = np.stack(found, axis=1)
+        if last <= 0.0:
+            return after
+        during = []
+        for each in T:
+            error = self.error(each, last).error
+            ways = [np.linalg.norm(error[:, own], axis=1) for own in self.groups]
+            during.append(np.max(ways, axis=1))
+        return np.maximum(after, np.array(during))
+
+    def error(self, duration: float, last: float = 1.0) -> Error:
+        """The error of the tips in the last share of a move of some duration, s."""
+        T, h = np.array([duration]), np.diff(self.edges)
+        free, states = self.free(T), self._states(T)
+        highest = np.abs(free.s[free.seen()]).max(initial=0.0)
+        parts = int(np.ceil(PER_PERIOD * h.max() * duration * highest / (2.0 * np.pi))) + 1
+        tau, error = [self.edges[-1:]], [self.tip[-1] @ self.phi[-1] @ states[-1, 0, 0]]
+        for share in np.arange(parts) / parts:
+            sigma = h[:, None] * share
+            P, offset = self._stepped(T, sigma)
+            eta = (P[:, 0, 0] * states[:-1, 0]).sum(axis=1) + offset[:, 0, 0]
+            w, rate, push, end = np.moveaxis(self.still, 1, 0)
+            w = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
+            x = (self.phi[:-1] @ eta[..., None])[..., 0] - w / duration**2
+            tip = self.tip[:-1] + share * np.diff(self.tip, axis=0)
+            tau.append(self.edges[:-1] + sigma[:, 0])
+            error.append((tip @ x[..., None])[..., 0])
+        at, ways = np.concatenate(tau), np.vstack(error)
+        order = np.argsort(at)
+        order = order[at[order] >= 1.0 - last]
+        return Error(duration * at[order], ways[order])
+
+    def free(self, T: Floats) -> Free:
+        """The vibration from the stop on, after durations T (n_T,)."""
+        eta, rate = np.moveaxis(self._states(T)[-1], 1, 0)
+        omega, zeta = self.omega[-1], self.zeta[-1]
+        s = omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+        Z = eta - 1j * (rate / T[:, None] + zeta * omega * eta) / s.imag
+        return Free(Z, s, self.tip[-1] @ self.phi[-1])
+
+    def _states(self, T: Floats) -> Floats:
+        """η and η̇ of z, (n + 1, n_T, 2, p), where each step begins, after its jump."""
+        P, offset = self._stepped(T, np.diff(self.edges)[:, None])
+        states = self.steps[:, None] / T[:, None, None] ** 2
+        states[:, :, 1] += self.blows[:, None]
+        for k, turn in enumerate(self.turn):
+            moved = (P[k] * states[k, :, None]).sum(axis=2) + offset[k]
+            states[k + 1] += moved @ turn.T
+        return states
+
+    def _stepped(self, T: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+        """P (n, n_T, 2, 2, p) and c (n, n_T, 2, p): [η, η̇] becomes P [η, η̇] + c over σ (n, 1).
+
+        η̈ + 2ζv η̇ + v²η = g_0 + g_1 σ + g_2 σ², v² = ω²T² − B, has a solution a + bσ + cσ².
+        """
+        v, zeta = self.omega[:-1, None] * T[:, None], self.zeta[:-1, None]
+        v = np.sqrt(np.maximum(v**2 - self.pull[:, None], 0.25 * v**2))
+        rate, push, end = np.moveaxis(self.force, 1, 0)[:, :, None] / T[:, None] ** 2
+        bend = (end - push) / np.diff(self.edges)[:, None, None]
+        c = zeta * bend / v
+        b = (bend + 2.0 * zeta * v * (push - 2.0 * c)) / v**2
+        a = (push + 2.0 * zeta * v * (rate - b) - 2.0 * c) / v**2
+        t, root = sigma[..., None], v * np.sqrt(1.0 - zeta**2)
+        fall = np.exp(-zeta * v * t)
+        C, S = fall * np.cos(root * t), fall * np.sin(root * t) / root
+        P = np.moveaxis(
+            np.array([[C + zeta * v * S, S], [-(v**2) * S, C - zeta * v * S]]), (0, 1), (2, 3)
+        )
+        start = np.stack(np.broadcast_arrays(a, b), axis=2)
+        end = np.stack([a + (b + c * t) * t, b + 2.0 * c * t], axis=2)
+        return P, end - (P * start[:, :, None]).sum(axis=3)

@@ -1,0 +1,335 @@
+"""Residual vibration: closed forms, forces of inertia by differences, and the whole integrated."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from calibration import Floats
+from numpy.polynomial import Polynomial
+from scipy.integrate import simpson
+from scipy.interpolate import CubicSpline
+from scipy.linalg import eigh
+
+import eigassign as ea
+from eigassign.errors import MechanismError
+from eigassign.mechanism import Moving, inertia_forces, known_motion, shapes, timing_law
+from eigassign.modal import Damping, Move, move
+
+AXES = ((1.0, 0.0), (0.0, 1.0))
+
+
+def first(case: ea.Case) -> Any:
+    return case.trajectories[0].trajectory
+
+
+# --- one degree of freedom
+
+HZ, REACH, TURN = 7.0, 0.8, 0.6
+
+
+def arm(law: str = "quintic", duration: float = 0.3, drive: Any = None) -> ea.Case:
+    """A rigid arm with a mass at its end, on a drive of 7 Hz."""
+    inertia = 3.0 * REACH**2
+    return ea.load_case(
+        {
+            "title": "one",
+            "mechanism": {
+                "space": "planar",
+                "links": {"a": {"type": "rigid", "nodes": {"hub": [0, 0], "end": [REACH, 0]}}},
+                "joints": {"hub": {"type": "revolute", "base": "ground", "follower": "a.hub"}},
+                "bodies": {"m": {"at": "a.end", "mass": 3.0}},
+            },
+            "coordinates": {
+                "q": {
+                    "joint": "hub",
+                    "drive": drive or {"stiffness": inertia * (2.0 * np.pi * HZ) ** 2},
+                }
+            },
+            "trajectory": {
+                "points": [[0.2], [0.2 + TURN]],
+                "duration": duration,
+                "samples": 21,
+                "timing": law,
+            },
+            "targets": [{"mode": 1, "at_least": 1.0}],
+        }
+    )
+
+
+def of_arm(case: ea.Case, zeta: float = 0.0) -> Move:
+    return move(case.model(), first(case), {"a.end": AXES}, Damping((zeta,)))
+
+
+def duhamel(law: str, T: float, zeta: float) -> float:
+    """The largest |x| REACH from the stop on, ẍ + 2ζω ẋ + ω²x = −q̈, x = Re Z exp(st) there.
+
+    ∫ p(t) exp(−st) dt = −exp(−st) Σ_k p⁽ᵏ⁾/s^(k+1) over each piece, and blows by q̇.
+    """
+    w = 2.0 * np.pi * HZ
+    s = w * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+    curve, total = timing_law(law), 0.0j
+    for k, (a, b) in enumerate(pairwise(curve.knots * T)):
+        place = Polynomial(curve.coefficients[:, k, 0] * TURN)(Polynomial([-a / T, 1.0 / T]))
+        push = place.deriv(2)
+        for t, sign in ((a, 1.0), (b, -1.0)):
+            each = sum(push.deriv(j)(t) / s ** (j + 1) for j in range(push.degree() + 1))
+            blow = place.deriv()(t) if law == "linear" else 0.0
+            total -= sign * np.exp(s * (T - t)) * (each + blow)
+    Z = total / (1j * s.imag)
+    # where ẋ = Re(s Z exp(st)) = 0, and at the stop itself
+    t = (np.pi / 2 - np.angle(s * Z)) % np.pi / s.imag
+    return float(max(abs((Z * np.exp(s * each)).real) for each in (0.0, t))) * REACH
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.05])
+@pytest.mark.parametrize("law", ["quintic", "cubic", "trapezoidal", "linear"])
+def test_one_mode_is_duhamels_integral(law: str, zeta: float) -> None:
+    durations = np.linspace(0.1, 0.9, 23)
+    found = of_arm(arm(law), zeta).at([]).residuals(durations)[:, 0]
+    exact = np.array([duhamel(law, T, zeta) for T in durations])
+    # 1e-9 before and behind a break is 1e-7 of what jumps there
+    np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-6 * exact.max())
+
+
+@pytest.mark.parametrize(
+    ("law", "periods"), [("trapezoidal", (1.5, 3.0)), ("cubic", (1.4302967,)), ("quintic", (1.834566,))]
+)
+def test_no_vibration_is_left_between_the_lobes(law: str, periods: tuple[float, ...]) -> None:
+    """x = ωT/2: sin(x/3) sin(2x/3) = 0 of two pulses; tan x = x; tan x = 3x/(3 − x²)."""
+    found = of_arm(arm(law)).at([]).residuals(np.array(periods) / HZ)
+    assert found.max() < 1e-6 * duhamel(law, 1.0 / HZ, 0.0)
+
+
+def test_a_command_in_two_halves_half_a_period_apart_leaves_nothing() -> None:
+    """A motion that is known at times only, with its jumps of q̈ twice; whole it leaves 9 mm."""
+    case, delay = arm("trapezoidal", 0.3), 0.5 / HZ
+    own = first(case)
+    tau = np.array([0.0, 0.1, 0.2, 0.3])
+    time_s = np.repeat(np.union1d(tau, tau + delay), 2)
+    beside = time_s + np.tile([-1e-12, 1e-12], len(time_s) // 2)
+    halves = []
+    for start in (0.0, delay):
+        t = np.clip(beside - start, 0.0, 0.3)
+        moving = own.motion.moving(t)
+        rests = (t == 0.0) | (t == 0.3)
+        still = [np.where(rests[:, None], 0.0, each) for each in moving[1:]]
+        halves.append([moving.q, *still])
+    whole = Moving(*(0.5 * (a + b) for a, b in zip(*halves, strict=True)))
+    ends = slice(1, -1)
+    shaped = known_motion(time_s[ends], Moving(*(each[ends] for each in whole)))
+    ran = replace(own, time_s=np.unique(time_s), q=shaped.poses(np.unique(time_s)), known=shaped)
+    left = move(case.model(), ran, {"a.end": AXES}).at([]).residuals(0.3 + delay)[0, 0]
+    assert left < 1e-5 * of_arm(case).at([]).residuals(0.3)[0, 0]
+
+
+def test_a_free_coordinate_is_refused() -> None:
+    with pytest.raises(MechanismError, match="is free"):
+        of_arm(arm(drive="free"))
+
+
+def test_the_error_of_the_tip_runs_on_into_what_is_left() -> None:
+    """And what counts in the last fifth of the move is the largest of it there or after."""
+    reduced = of_arm(arm(), 0.02).at([])
+    ran, free = reduced.error(0.3), reduced.free(np.array([0.3]))
+    np.testing.assert_allclose(ran.error[-1], free.at(np.zeros(1))[0, :, 0], atol=1e-12)
+    during = np.linalg.norm(ran.error[ran.time_s >= 0.8 * 0.3], axis=1).max()
+    both = reduced.residuals(0.3, last=0.2)[0, 0]
+    assert both == pytest.approx(max(during, reduced.residuals(0.3)[0, 0]), rel=1e-9)
+
+
+# --- forces of inertia, by differences of where matter is
+
+
+class Matter:
+    """Points with masses along beams and of bodies, of a design y; angles turn bodies in a plane."""
+
+    def __init__(
+        self, case: ea.Case, y: Floats, per_length: dict[str, float], driven: Floats | float = 0.0
+    ) -> None:
+        self.model, self.y, self.per_length, self.driven = case.model(), y, per_length, driven
+        self.bodies = list(case.file.mechanism.bodies.values())
+        self.planar = case.file.mechanism.space == "planar"
+        self.moving, self.T = first(case).motion.moving, float(first(case).time_s[-1])
+
+    def seen(self, q: Floats, phi: Floats) -> tuple[list[Floats], list[Floats], list[float]]:
+        """Of all masses places (d,) and motions (count, d), and how much they are."""
+        found = shapes(self.model.poses, self.model.x(q, self.y), phi[None])[0]
+        places, motions, masses = [], [], []
+        for strand in found.strands:
+            at = np.linalg.norm(strand.places - strand.places[0], axis=1)
+            masses += list(simpson(np.eye(len(at)), x=at) * self.per_length.get(strand.link, 0.0))
+            places += list(strand.places)
+            motions += list(strand.motions.swapaxes(0, 1))
+        for body in self.bodies:
+            link, node = body.at.split(".")
+            own, d = found.nodes[link, node], 2 if self.planar else 3
+            masses.append(body.mass)
+            places.append(own.place[:d])
+            motions.append(own.motion[:, :d])
+            if self.planar:  # its turning is one more place
+                line = next(strand.places for strand in found.strands if strand.link == link)
+                masses.append(body.inertia or 0.0)
+                places.append(np.array([np.arctan2(*(line[-1] - line[0])[::-1]), 0.0]))
+                motions.append(np.stack([own.motion[:, 5], 0.0 * own.motion[:, 5]], axis=1))
+        return places, motions, masses
+
+    def force(self, tau: float) -> Floats:
+        """Σ motionᵀ m place¨, by differences over 1e-3 T: 1e-5 of what goes like sin(3 t/T)."""
+        h, n = 1e-3 * self.T, self.model.n_dof
+        q = self.moving(tau * self.T + h * np.array([-1.0, 0.0, 1.0]), self.y).q
+        before, here, after = (self.seen(each, np.eye(n)) for each in q)
+        f = np.zeros(n)
+        for a, b, c, motion, mass in zip(before[0], here[0], after[0], *here[1:], strict=True):
+            f += mass * (motion @ (a - 2.0 * b + c)) / h**2
+        f[self.model.pencil.n_u :] += self.driven * (q[0] - 2.0 * q[1] + q[2]) / h**2
+        return f
+
+    def off(self, tau: float) -> float:
+        """How far f is from that, by the energy of what it bends, relative to the largest."""
+        own = inertia_forces(self.model.poses.case, self.model.poses.parameters, self.model.motion)
+        q, rate, push = self.moving(np.array([tau * self.T]), self.y)
+        difference = own.at(q, self.y, rate, push)[0] - (f := self.force(tau))
+        K = self.model.matrices(q, self.y)[1]
+        size = [each @ np.linalg.solve(K, each) for each in (difference, f)]
+        return float(np.sqrt(size[0] / size[1]))
+
+
+def beams(space: str, links: dict[str, Any], joints: dict[str, Any], **more: Any) -> ea.Case:
+    """Steel tubes of 60 and 56 mm, 2.84 kg/m, point to point in 0.4 s, all drives held."""
+    names = [name for name, joint in joints.items() if joint.pop("driven", True)]
+    section = {"shape": "tube", "outer_diameter": 0.06, "thickness": 0.002}
+    tubes = {"material": "steel", "section": "tube", "elements": 6}
+    steel = {"youngs_modulus": 2.1e11, "density": 7800.0, "shear_modulus": 8e10}
+    points = {"points": more.pop("points"), "duration": 0.4, "samples": 21}
+    return ea.load_case(
+        {
+            "title": space,
+            "mechanism": {
+                "space": space,
+                "materials": {"steel": steel},
+                "sections": {"tube": section},
+                "links": {name: {**tubes, **own} for name, own in links.items()},
+                "joints": joints,
+                **more,
+            },
+            "coordinates": {n: {"joint": n, "drive": {"stiffness": 8e4}} for n in names},
+            "trajectory": points,
+            "targets": [{"mode": 1, "at_least": 1.0}],
+        }
+    )
+
+
+TUBE = 7800.0 * np.pi / 4.0 * (0.06**2 - 0.056**2)
+
+
+def spatial_arm() -> ea.Case:
+    joints = {
+        "yaw": {"type": "revolute", "axis": [0, 0, 1], "base": "ground", "follower": "post.start"},
+        "lift": {"type": "revolute", "axis": [0, 1, 0], "base": "post.end", "follower": "a.start"},
+        "roll": {"type": "revolute", "axis": [0, 0, 1], "base": "a.end", "follower": "b.start"},
+    }
+    links = {"post": {"length": 0.5}, "a": {"length": 0.7}, "b": {"length": 0.5}}
+    bodies = {"load": {"at": "b.end", "mass": 4.0}, "motor": {"at": "a.end", "mass": 2.0}}
+    points = [[0.0, 0.3, 0.2], [1.4, -0.6, 1.5]]
+    return beams("spatial", links, joints, bodies=bodies, points=points)
+
+
+def four_bar() -> ea.Case:
+    joints = {
+        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+        "B": {"type": "revolute", "base": "crank.end", "follower": "rod.start", "driven": False},
+        "D": {
+            "type": "revolute",
+            "base": "ground",
+            "follower": "lever.start",
+            "position": [0.5, 0],
+            "driven": False,
+        },
+        "C": {"type": "revolute", "base": "rod.end", "follower": "lever.end", "driven": False},
+    }
+    links = {"crank": {"length": 0.12}, "rod": {"length": 0.45}, "lever": {"length": 0.4}}
+    bodies = {"load": {"at": "rod.end", "mass": 2.0, "inertia": 0.01}}
+    guess = {"A": 0.5, "B": 0.3, "D": 1.8, "C": 1.0}
+    assembly = {"at": {"A": 0.5}, "guess": {k: guess[k] for k in "BDC"}}
+    return beams(
+        "planar", links, joints, bodies=bodies, points=[[1.2], [2.8]], assembly=assembly
+    )
+
+
+@pytest.mark.parametrize("case", [spatial_arm, four_bar])
+def test_forces_of_inertia_are_what_matter_in_motion_needs(case: Callable[[], ea.Case]) -> None:
+    """In space six elements of a beam err by 1/36 of a share of what they carry: 1.4e-4."""
+    own = case()
+    matter = Matter(own, np.zeros(0), dict.fromkeys(own.file.mechanism.links, TUBE))
+    assert max(matter.off(tau) for tau in (0.2, 0.5, 0.7)) < 3e-4
+
+
+# --- the whole mechanism, integrated
+
+DURATIONS = np.array([0.15, 0.165, 0.18, 0.195, 0.21, 0.225, 0.24])
+ZETA, STEPS = 0.01, 2400  # (ωh)²/12 · ωT = 7e-4 of a turn by the trapezoidal rule
+REFLECTED = np.array([4e-5 * 80**2, 2e-5 * 50**2])
+
+
+def scara() -> ea.Case:
+    return ea.load_case(Path(__file__).with_name("scara.yaml"))
+
+
+def box(width: float, height: float, t: float) -> float:
+    return 2700.0 * (width * height - (width - 2.0 * t) * (height - 2.0 * t))
+
+
+def integrated(y: Floats, durations: Floats) -> Floats:
+    """The largest way of the tip after the stop: M ẍ + Cẋ + Kx = −f by Newmark, all dofs."""
+    lines = {"upper_arm": box(0.08, y[2], 0.004), "forearm": box(0.06, 0.045, 0.003)}
+    matter = Matter(scara(), y, lines, REFLECTED)
+    model, tau, few = matter.model, np.linspace(0.0, 1.0, STEPS + 1), np.linspace(0.002, 0.998, 61)
+    # beyond 0.002 the quintic runs out as it began: 2e-4 of f
+    f = CubicSpline(few, [matter.force(each) * matter.T**2 for each in few])(tau)
+    T, n = durations[:, None], model.n_dof
+    h = T / STEPS
+    x, v = np.zeros((2, len(T), n))
+    a = -np.linalg.solve(model.matrices(matter.moving(np.zeros(1)).q, y)[0], f[0]) / T**2
+    for k, q in enumerate(matter.moving(tau * matter.T).q[1:], 1):
+        M, K = model.matrices(q, y)
+        lam, phi = eigh(K, M)
+        C = (M @ phi) * (2.0 * ZETA * np.sqrt(lam)) @ (M @ phi).T
+        x, v = x + h * v + 0.25 * h**2 * a, v + 0.5 * h * a
+        A = M + 0.5 * h[..., None] * C + 0.25 * h[..., None] ** 2 * K
+        a = np.linalg.solve(A, (-f[k] / T**2 - v @ C - x @ K)[..., None])[..., 0]
+        x, v = x + 0.25 * h**2 * a, v + 0.5 * h * a
+    omega = np.sqrt(lam)
+    s = omega * (-ZETA + 1j * np.sqrt(1.0 - ZETA**2))
+    eta, rate = x @ M @ phi, v @ M @ phi
+    Z = eta - 1j * (rate + ZETA * omega * eta) / s.imag
+    tip = shapes(model.poses, model.x(q, y), phi[None])[0].nodes["forearm", "end"].motion[:, :2]
+    waves = np.exp(s[:, None] * np.linspace(0.0, 0.3, 6001))
+    ways = (np.einsum("ti,id->tdi", Z, tip) @ waves).real
+    return np.asarray(np.linalg.norm(ways, axis=1).max(axis=1))
+
+
+def agrees(k1: float, k2: float, durations: Floats) -> None:
+    y = np.array([k1, k2, 0.06])
+    case = scara()
+    own = move(case.model(), first(case), {"forearm.end": AXES}, Damping((ZETA,)))
+    found, exact = own.at(y).residuals(durations)[:, 0], integrated(y, durations)
+    apart = np.abs(found - exact)
+    assert (apart <= np.maximum(0.01 * exact, 0.003 * exact.max())).all(), apart / exact
+    accuracy = own.accuracy(y, durations)
+    assert max(accuracy) < 1e-3
+
+
+@pytest.mark.parametrize("k1", [25e3, 45e3])
+def test_a_scara_vibrates_as_the_whole_of_it_integrated(k1: float) -> None:
+    agrees(k1, 12e3, DURATIONS[:3])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("k1", [25e3, 35e3, 45e3])
+@pytest.mark.parametrize("k2", [12e3, 24e3])
+def test_every_scara_vibrates_as_the_whole_of_it_integrated(k1: float, k2: float) -> None:
+    agrees(k1, k2, DURATIONS)
