@@ -20,8 +20,8 @@ follow at rest, as far as they are fast. Over a step of τ the pose rests, as it
 the modes z = Φ η part, and each of them is solved exactly. The next step takes over
 η ← Φ₊ᵀ M₊ Φ η and η̇ likewise: of R = exp(hA), this matrix for all modes, exp(hA_pp). That slow
 modes must follow their shapes as these turn, softens them, ω²T² − B, B = A_fpᵀ A_fp of the fast
-ones f. (Were these followed in steps, which are long beside their periods, each step would ring
-them anew.) All that errs by the square of the step.
+ones f: followed in steps that are long beside their periods, these would be rung by each step. All
+that errs by the square of the step.
 
 After the stop the pose rests, so that each mode vibrates freely, for good, with Z_i from η and η̇:
 
@@ -41,7 +41,6 @@ from scipy.interpolate import CubicSpline
 
 from eigassign.mechanism.assembly.dynamics.inertia_forces import InertiaForces, inertia_forces
 from eigassign.mechanism.forces import Forces
-from eigassign.mechanism.trajectory.motion import Motion, TipMotion
 from eigassign.mechanism.trajectory.trajectory import Trajectory
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.model import Model
@@ -57,10 +56,8 @@ BESIDE = 1e-9  # of the duration: a break is looked at this much before and behi
 SAME = 1e-9  # of the largest: what a vector of the basis has that no other has, squared
 LEAST_STEPS = 4  # between breaks, of a spline
 JUMP = 1e-6  # of the largest q̇: less is no blow
-PERIODS, PER_PERIOD = (
-    20,
-    40,
-)  # of the lowest mode that are looked at; instants in one of the highest
+PERIODS = 20  # of the lowest mode that are looked at
+PER_PERIOD = 40  # instants in one of the highest
 FINER = 20  # instants between two of these, beside the largest
 UNSEEN = 5e-4  # of all that vibrates: modes that are left out of the search, from the highest on
 NUMBERS = 2_000_000  # looked at together: 16 MB
@@ -95,8 +92,7 @@ class Move:
     """A motion of a mechanism, with nodes that are watched; built once, solved for designs."""
 
     model: Model
-    motion: Motion | TipMotion
-    span: tuple[float, float]  # s, from rest to rest
+    trajectory: Trajectory  # from rest to rest
     inertia: InertiaForces
     tips: Forces
     groups: tuple[slice, ...]  # of the forces, of each node
@@ -120,9 +116,9 @@ class Move:
         p = min(sizes.modes, V.shape[1])
         turn, pull = _followed(inverse[1:] @ phi[:-1], np.diff(middle), p)
         omega, phi, inverse = 1.0 / np.sqrt(mu[:, :p]), phi[..., :p], inverse[:, :p]
+        push = -self._blows(own, edges[blown]) @ V
         blows = np.zeros((n, V.shape[1]))
-        push = (self._blows(own, edges[blown]) @ V)[..., None]
-        blows[blown] = -np.linalg.solve(M[n:][blown], push)[..., 0]
+        blows[blown] = np.linalg.solve(M[n:][blown], push[..., None])[..., 0]
         still, steps = self._at_rest(own, edges, blown, V, K[n:])
         return ReducedMove(
             groups=self.groups,
@@ -147,10 +143,8 @@ class Move:
         w, ẇ, ẅ where a step begins and ẅ where it ends, (n, 4, r), and by how much w and ẇ jump
         where one begins, and at the stop, (n + 1, 2, r).
         """
-        still, steps = (
-            np.zeros((len(edges) - 1, 4, len(K[0]))),
-            np.zeros((len(edges), 2, len(K[0]))),
-        )
+        n, r = K.shape[:2]
+        still, steps = np.zeros((n - 1, 4, r)), np.zeros((n, 2, r))
         for first, last in pairwise(breaks.tolist()):
             tau = edges[first : last + 1]
             f = self._forces(y, np.clip(tau, tau[0] + BESIDE, tau[-1] - BESIDE)) @ V
@@ -164,21 +158,23 @@ class Move:
 
     def _edges(self, steps: int) -> tuple[Floats, Ints]:
         """τ of the ends of all steps (n,), and which of them are breaks or ends of the motion."""
-        first, last = self.span
-        tau = (np.asarray(self.motion.breaks_s) - first) / (last - first)
+        first, T = self._span
+        tau = (np.asarray(self.trajectory.motion.breaks_s) - first) / T
         ends = np.concatenate([[0.0], tau[(tau > BESIDE) & (tau < 1.0 - BESIDE)], [1.0]])
         counts = np.maximum(np.ceil(np.diff(ends) * steps - 1e-6).astype(int), LEAST_STEPS)
-        pieces = [
-            np.linspace(a, b, n, endpoint=False)
-            for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)
-        ]
-        return np.append(np.concatenate(pieces), 1.0), np.cumsum([0, *counts])
+        breaks = np.cumsum([0, *counts])
+        return np.interp(np.arange(breaks[-1] + 1), breaks, ends), breaks
 
     def _moving(self, y: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
         """q and its derivatives in τ, (n, n_q) each."""
-        T = self.span[1] - self.span[0]
-        q, rate, push = self.motion.moving(self.span[0] + T * tau, y)
+        first, T = self._span
+        q, rate, push = self.trajectory.motion.moving(first + T * tau, y)
         return q, T * rate, T * T * push
+
+    @property
+    def _span(self) -> tuple[float, float]:
+        """When it starts, and its duration, s."""
+        return float(self.trajectory.time_s[0]), float(np.ptp(self.trajectory.time_s))
 
     def _x(self, y: Floats, tau: Floats) -> Floats:
         return self.model.x(self._moving(y, tau)[0], y)
@@ -217,11 +213,8 @@ class Move:
 
     def _projected(self, V: Floats, x: Floats) -> tuple[Floats, Floats]:
         """K_r and M_r (n, r, r) at x (n, n_x)."""
-        theta, r = self.model.pencil.theta(x).T, V.shape[1]
-        K, M = (
-            (theta @ terms.reshape(len(terms), -1)).reshape(-1, r, r)
-            for terms in project(self.model.pencil, V)
-        )
+        theta = self.model.pencil.theta(x).T
+        K, M = (np.tensordot(theta, terms, 1) for terms in project(self.model.pencil, V))
         return K, M
 
     def _ratios(self, x: Floats, V: Floats, phi: Floats, omega: Floats) -> Floats:
@@ -230,9 +223,7 @@ class Move:
         if loss is None:
             return np.tile(self.damping.zeta(r), (len(x), 1))
         lost = np.tensordot(loss.theta(x).T, project(loss, V)[0], 1)
-        return np.asarray(
-            0.5 / omega**2 * np.einsum("nir,nij,njr->nr", phi, lost, phi, optimize=True)
-        )
+        return np.asarray(0.5 * (phi * (lost @ phi)).sum(axis=1) / omega**2)
 
     def _tips(self, x: Floats) -> Floats:
         """b (n, m, n_dof) of every node and direction."""
@@ -244,11 +235,9 @@ class Move:
 
     def accuracy(self, y: ArrayLike, durations: ArrayLike, sizes: Sizes = SIZES) -> Accuracy:
         """What other sizes would change of the residuals of a design."""
-        others = (
-            sizes._replace(steps=sizes.steps // 2),
-            sizes._replace(modes=sizes.modes + 2),
-            sizes._replace(poses=2 * sizes.poses, loads=2 * sizes.loads),
-        )
+        modes, poses, loads, steps = sizes
+        half, more = Sizes(modes, poses, loads, steps // 2), Sizes(modes + 2, poses, loads, steps)
+        others = half, more, Sizes(modes, 2 * poses, 2 * loads, steps)
         found = self.at(y, sizes).residuals(durations)
         largest = np.maximum(found.max(axis=0), np.finfo(float).tiny)
         changes = (self.at(y, one).residuals(durations) - found for one in others)
@@ -258,7 +247,7 @@ class Move:
 def _followed(turn: Floats, apart: Floats, p: int) -> tuple[Floats, Floats]:
     """What p slow modes take over (n, p, p), and B (n, p) of each step, from whole Φ⁻¹₊Φ.
 
-    From exp(hA): exp(hA_pp) to second order, and the mean of A_phᵀA_ph at both ends of a step.
+    From exp(hA): exp(hA_pp) to second order, and the mean of A_fpᵀA_fp at both ends of a step.
     """
     lost, back = turn[:, p:, :p], turn[:, :p, p:]
     pull = (lost**2).sum(axis=1) / apart[:, None] ** 2
@@ -282,8 +271,7 @@ def move(
     ends = np.cumsum([0, *map(len, nodes.values())]).tolist()
     groups = tuple(slice(a, b) for a, b in pairwise(ends))
     own = inertia_forces(model.poses.case, model.poses.parameters, model.motion)
-    span = float(trajectory.time_s[0]), float(trajectory.time_s[-1])
-    return Move(model, trajectory.motion, span, own, tips, groups, damping)
+    return Move(model, trajectory, own, tips, groups, damping)
 
 
 # --- of one design, in its modes
@@ -331,13 +319,6 @@ class Free(NamedTuple):
         return np.asarray(np.sqrt(b + more))
 
 
-class Error(NamedTuple):
-    """The error of the tips while they move, (n_t, m) in m along each direction, at times in s."""
-
-    time_s: Floats  # from the start
-    error: Floats
-
-
 @dataclass(frozen=True, eq=False)
 class ReducedMove:
     """The move of one design over n steps, in p modes of each; last those of the end pose.
@@ -358,45 +339,43 @@ class ReducedMove:
     blows: Floats  # (n + 1, p): by how much η̇ jumps with q̇
     tip: Floats  # (n + 1, m, r): Vᵀb where a step begins
 
-    def residuals(self, durations: ArrayLike, last: float = 0.0) -> Floats:
+    def residuals(self, durations: ArrayLike, last: ArrayLike = 0.0) -> Floats:
         """The largest way (n_T, n_nodes) in m of each node from the stop on, for durations in s.
 
-        With ``last`` also during that share of the move, its end.
+        With ``last`` (n_T,) also in that share of the move before the stop.
         """
         T = np.atleast_1d(np.asarray(durations, dtype=np.float64))
-        free = self.free(T)
+        free, near = self.free(T), np.asarray(last, dtype=np.float64)
         found = [free._replace(tip=free.tip[own]).largest() for own in self.groups]
-        after = np.stack(found, axis=1)
-        if last <= 0.0:
-            return after
-        during = []
-        for each in T:
-            error = self.error(each, last).error
-            ways = [np.linalg.norm(error[:, own], axis=1) for own in self.groups]
-            during.append(np.max(ways, axis=1))
-        return np.maximum(after, np.array(during))
+        if near.any():
+            tau, error = self.errors(T)
+            ways = [np.linalg.norm(error[..., own], axis=2) for own in self.groups]
+            there = tau >= 1.0 - np.broadcast_to(near, T.shape)[:, None]
+            found = [
+                np.maximum(a, (b * there).max(axis=1)) for a, b in zip(found, ways, strict=True)
+            ]
+        return np.stack(found, axis=1)
 
-    def error(self, duration: float, last: float = 1.0) -> Error:
-        """The error of the tips in the last share of a move of some duration, s."""
-        T, h = np.array([duration]), np.diff(self.edges)
+    def errors(self, durations: ArrayLike) -> tuple[Floats, Floats]:
+        """τ (n_t,), and the error of the tips while they move, (n_T, n_t, m) in m by directions."""
+        T, h = np.atleast_1d(np.asarray(durations, dtype=np.float64)), np.diff(self.edges)[:, None]
         free, states = self.free(T), self._states(T)
         highest = np.abs(free.s[free.seen()]).max(initial=0.0)
-        parts = int(np.ceil(PER_PERIOD * h.max() * duration * highest / (2.0 * np.pi))) + 1
-        tau, error = [self.edges[-1:]], [self.tip[-1] @ self.phi[-1] @ states[-1, 0, 0]]
-        for share in np.arange(parts) / parts:
-            sigma = h[:, None] * share
+        parts = 1 + int(PER_PERIOD * h.max() * T.max() * highest / (2.0 * np.pi))
+        shares, found = np.arange(parts) / parts, []
+        w, rate, push, end = np.moveaxis(self.still, 1, 0)
+        for share in shares:
+            sigma = h * share
             P, offset = self._stepped(T, sigma)
-            eta = (P[:, 0, 0] * states[:-1, 0]).sum(axis=1) + offset[:, 0, 0]
-            w, rate, push, end = np.moveaxis(self.still, 1, 0)
-            w = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
-            x = (self.phi[:-1] @ eta[..., None])[..., 0] - w / duration**2
+            eta = (P[:, :, 0] * states[:-1]).sum(axis=2) + offset[:, :, 0]
+            still = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
+            x = eta @ np.swapaxes(self.phi[:-1], 1, 2) - still[:, None] / T[:, None] ** 2
             tip = self.tip[:-1] + share * np.diff(self.tip, axis=0)
-            tau.append(self.edges[:-1] + sigma[:, 0])
-            error.append((tip @ x[..., None])[..., 0])
-        at, ways = np.concatenate(tau), np.vstack(error)
-        order = np.argsort(at)
-        order = order[at[order] >= 1.0 - last]
-        return Error(duration * at[order], ways[order])
+            found.append(x @ np.swapaxes(tip, 1, 2))  # (n, n_T, m)
+        tau = np.append((self.edges[:-1, None] + h * shares).ravel(), 1.0)
+        error = np.stack(found, axis=1).reshape(len(tau) - 1, len(T), -1)
+        stopped = free.at(np.zeros(1))[..., 0]
+        return tau, np.concatenate([error, stopped[None]]).swapaxes(0, 1)
 
     def free(self, T: Floats) -> Free:
         """The vibration from the stop on, after durations T (n_T,)."""
@@ -431,9 +410,8 @@ class ReducedMove:
         t, root = sigma[..., None], v * np.sqrt(1.0 - zeta**2)
         fall = np.exp(-zeta * v * t)
         C, S = fall * np.cos(root * t), fall * np.sin(root * t) / root
-        P = np.moveaxis(
-            np.array([[C + zeta * v * S, S], [-(v**2) * S, C - zeta * v * S]]), (0, 1), (2, 3)
-        )
+        P = np.array([[C + zeta * v * S, S], [-(v**2) * S, C - zeta * v * S]])
+        P = np.moveaxis(P, (0, 1), (2, 3))
         start = np.stack(np.broadcast_arrays(a, b), axis=2)
         end = np.stack([a + (b + c * t) * t, b + 2.0 * c * t], axis=2)
         return P, end - (P * start[:, :, None]).sum(axis=3)
