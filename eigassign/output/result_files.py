@@ -36,6 +36,17 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
     }
     files["frequencies.csv"] = csv_text(frequency_columns(results))
     files |= _response_files(results)
+    if results.moves:
+        every = [
+            (name, a, t)
+            for row in results.moves
+            for name, *own in row.impulses
+            for a, t in zip(*own, strict=True)
+        ]
+        headings = "shaper", "amplitude", "time [s]"
+        columns = zip(*every, strict=True) if every else ((), (), ())
+        files["shapers.csv"] = csv_text([*zip(headings, columns, strict=True)])
+        files["shapers.txt"] = "\n".join(row.lines for row in results.moves).encode()
     for name, rows in {"drives.csv": results.drives, "statics.csv": results.statics}.items():
         if rows:
             files[name] = csv_text([*_samples(results), *_both(rows)])

@@ -361,6 +361,17 @@ def _responses(results: RunResults) -> Iterator[Table]:
     yield facts_table("Free speeds of the spindle", free, "of lowest highest", caption)
 
 
+def _moves(results: RunResults) -> Iterator[Table]:
+    """What moves leave, and what input shapers would."""
+    caption = "The largest way after the stop; more finely: twice the basis and half the steps."
+    names = "name handy duration residual before confirmed"
+    yield facts_table("Residual vibration", results.moves, names, caption)
+    for row in results.moves:
+        caption = f"{row.name}: {row.advice}."
+        names = "name hz zeta delay residual"
+        yield facts_table("Input shapers", row.shapers, names, caption)
+
+
 def _motion(results: RunResults) -> Iterator[Table]:
     """What every drive exerts: its peak, where that is, and rms, before and after."""
     rows = results.drives
@@ -403,6 +414,7 @@ SECTIONS = {  # of a page, with their headings; what is in none is in the append
     "depends": "What it hangs on",
     "robustness": "Robustness",
     "responses": "Responses",
+    "moves": "Residual vibration",
     "motion": "Motion",
 }
 _KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
@@ -411,6 +423,7 @@ _KINDS: dict[str, Callable[[RunResults], Iterator[Table]]] = {
     "depends": _depends,
     "robustness": _robustness,
     "responses": _responses,
+    "moves": _moves,
     "motion": _motion,
     "appendix": _appendix,
 }

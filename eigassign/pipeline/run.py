@@ -40,6 +40,7 @@ from eigassign.study.design.conclusions import proof
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, judged_modes, study_targets
 from eigassign.study.meaning import Studies, study_meaning
+from eigassign.study.moves import study_moves
 from eigassign.study.pictures import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.response import study_responses
@@ -166,9 +167,12 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
             if answer.found is not None and asked is not Studies.NONE:
                 bound = proof(scene, answer.found, thorough=asked is Studies.ALL)
         drawn = _responses(scene, answer.y, stages)
+        with stages("moves", "what the move leaves, and input shapers"):
+            moves = tuple(study_moves(scene, answer.y))
     found = VerifiedAssignment(answer, targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
     results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s, drawn)
+    results = replace(results, moves=moves)
     if options.figures or options.report != "none":
         between = between_samples(scene, answer.y, len(results.spectrum))
         results = replace(results, between=between)

@@ -58,6 +58,7 @@ MET = 1e-8  # a violation below it is round-off
 THIN = 1e-3
 WEIGHED = "weight and motion"  # what loads of drives are of, where gravity is known
 InPower = Annotated[float, Fact(unit="m/N", digits=partial(handy, unit="m/N"), says_unit=True)]
+KEPT = 1e-6  # of a limit: what is beyond it by less keeps it
 Metres = Annotated[float, Fact(unit="m", digits=partial(handy, unit="m"), says_unit=True)]
 
 
@@ -328,6 +329,52 @@ class ResponseRow(InOneUnit, Brief):
     def least_real(self) -> Floats:
         """Re H (k,) in m/N, the least of all samples."""
         return np.asarray(self.response.real.min(axis=(0, 1)))
+
+
+@dataclass(frozen=True)
+class ShaperRow:
+    """An input shaper for the modes of a move, and what it leaves of the node's vibration."""
+
+    name: Annotated[str, Fact("as controllers call it; with * one for each mode", "shaper")]
+    hz: Annotated[str, Fact("what it is designed for", "for", "Hz")]
+    zeta: Annotated[float, Fact("damping ratio that it is designed for", "ζ", digits=".3g")]
+    delay: Annotated[Seconds, Fact("by which the command is longer", digits=".3g")]
+    residual: Annotated[Metres, Fact("largest way after the stop", "leaves")]
+
+
+@dataclass(frozen=True)
+class MoveRow(InOneUnit):
+    """What a move leaves at a node; of ranges of damping the worst choice of ends."""
+
+    name: Annotated[Key, Fact(heading="what")]
+    unit: str
+    duration: Annotated[Seconds, Fact("of the motion", "motion time")]
+    residual: Annotated[InUnit, Fact("the largest way after the stop", "leaves")]
+    before: Annotated[InUnit, Fact("of the initial design and its motion time", "initially")]
+    limit: InUnit
+    confirmed: Annotated[InUnit, Fact("with twice the basis and half the steps", "more finely")]
+    shapers: tuple[ShaperRow, ...]
+    time_s: Unwritten[Floats]  # (n,)
+    error: Unwritten[Floats]  # (n,) m
+    times: Unwritten[Floats]  # (k,) s
+    lobes: Unwritten[Floats]  # (k,) m
+    lobes_before: Unwritten[Floats]
+    lines: Unwritten[str]  # for controllers
+    impulses: Unwritten[tuple[tuple[str, Floats, Floats], ...]]
+
+    @property
+    def advice(self) -> Annotated[str, Fact("which shaper to take, in words")]:
+        """The shaper of the least delay that keeps the limit, or the one that leaves least."""
+        said = f"{handy(self.residual, self.unit, 3)} without a shaper"
+        if not self.shapers:
+            return f"{said}; no mode is excited"
+        kept = [row for row in self.shapers if row.residual <= self.limit]
+        best = min(kept or self.shapers, key=lambda row: row.delay if kept else row.residual)
+        leaves = f"leaves {handy(best.residual, self.unit, 3)} after {1e3 * best.delay:.3g} ms more"
+        if self.residual <= (1.0 + KEPT) * self.limit:
+            return f"{said}, so that none is needed; {best.name} for {best.hz} Hz {leaves}"
+        rest = "" if kept else ", the least of all, above the limit"
+        return f"{said}; take {best.name} for {best.hz} Hz: it {leaves}{rest}"
 
 
 @dataclass(frozen=True)
@@ -1074,6 +1121,7 @@ class RunResults(Origin):
         tuple[StaticRow, ...], Fact("of static targets, by what they ask", by="name")
     ] = ()
     responses: Annotated[tuple[ResponseRow, ...], Fact("drawn ones", by="name")] = ()
+    moves: Annotated[tuple[MoveRow, ...], Fact("with residual vibration", by="name")] = ()
     targets: Annotated[tuple[TargetStudy, ...], Fact("in the order of the case")] = ()
     assignment: Annotated[
         AssignmentRow | None, Fact("the verdict, and how the answer was found")

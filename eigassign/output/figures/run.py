@@ -10,6 +10,7 @@ from eigassign.facts import capital, percent
 from eigassign.output.figures import curves, graph, mechanism
 from eigassign.output.figures.curves import OPTIMAL, TARGET, suffix
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Shade
+from eigassign.output.figures.moves import move_figures
 from eigassign.output.figures.responses import response_figures
 from eigassign.study.results import (
     WEIGHED,
@@ -106,6 +107,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     asked = any(d.of == WEIGHED or d.limit is not None for d in results.drives)
     yield from (curves.exerted(one, "statics") for one in each if one.statics)
     yield from response_figures(results)
+    yield from move_figures(results)
     yield from reach_figures(results)
     yield from (curves.exerted(one, "drives") for one in each if asked)
     yield from (curves.coordinates(one) for one in each if one.q.size)

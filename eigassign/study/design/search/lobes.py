@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.case.schema.trajectory import DURATION_PATH
 from eigassign.errors import EigassignError
@@ -59,7 +60,7 @@ def fastest(
     near: list[Floats] = [basin.y for basin in _best(basins)]
     found = find_optimum(scene, starts, progress, near, deadline=deadline)
     for _ in range(AGAIN):
-        y, kept = found.best.y, found.best.seen.violation <= 0.0
+        y, kept = found.best.y, found.best.seen.violation <= ON
         faster = [b for b in _basins(scene, y, column, times[times < y[column] * (1.0 - FASTER)])
                   if b.missed <= 1.0 or not kept]  # fmt: skip
         if not faster:
