@@ -55,7 +55,7 @@ LEAST_STEPS = 4  # between breaks, of a spline
 JUMP = 1e-6  # of the largest q̇: less is no blow
 PERIODS = 20  # of the lowest mode that are looked at
 PER_PERIOD = 40  # instants in one of the highest
-FINER = 20  # instants between two of these, beside the largest
+BETWEEN = 20  # instants between two of these, beside the largest
 UNSEEN = 5e-4  # of all that vibrates: modes that are left out of the search, from the highest on
 NUMBERS = 2_000_000  # looked at together: 16 MB
 
@@ -75,6 +75,7 @@ class Sizes(NamedTuple):
 
 
 SIZES = Sizes()
+FINER = Sizes(poses=5, loads=17, steps=256)  # that answers are looked at with
 
 
 class Accuracy(NamedTuple):
@@ -293,11 +294,11 @@ class Free(NamedTuple):
     def _largest(self, t: Floats, step: float) -> Floats:
         """By squares at times t, at finer ones beside the largest, and a parabola through three."""
         first = t[(self.at(t) ** 2).sum(axis=1).argmax(axis=1)]
-        near = np.maximum(first[:, None] + np.linspace(-step, step, 2 * FINER + 1), 0.0)
+        near = np.maximum(first[:, None] + np.linspace(-step, step, 2 * BETWEEN + 1), 0.0)
         waves = np.exp(self.s[:, None] * near[:, None])  # (n_T, p, n)
         squares = (((self.Z[:, None] * self.tip) @ waves).real ** 2).sum(axis=1)
         rows, k = np.arange(len(squares)), squares.argmax(axis=1)
-        a, b, c = (squares[rows, np.clip(k + i, 0, 2 * FINER)] for i in (-1, 0, 1))
+        a, b, c = (squares[rows, np.clip(k + i, 0, 2 * BETWEEN)] for i in (-1, 0, 1))
         inner = (a < b) & (c < b)
         more = np.divide((a - c) ** 2, 8.0 * (2.0 * b - a - c), out=np.zeros_like(b), where=inner)
         return np.asarray(np.sqrt(b + more))

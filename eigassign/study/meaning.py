@@ -275,6 +275,8 @@ def error_kind(problem: DesignProblem, asked: Requirements) -> str:
     if asked.aims and problem.cost is None:
         return "room" if asked.aims[0].kind != "highest" else "frequency"
     if problem.cost is not None and not asked.goals and not asked.aims:
+        if problem.cost.is_time:
+            return "motion time"
         return "price" if problem.cost.free or not problem.cost.of_mass else "mass"
     if not asked.goals or problem.cost is not None:
         return "objective"

@@ -19,7 +19,7 @@ from eigassign.assignment.requirements.residual import Residual
 from eigassign.errors import UsageError
 from eigassign.mechanism.trajectory.motion import Motion, Moving, known_motion, sampled_motion
 from eigassign.mechanism.trajectory.trajectory import Trajectory
-from eigassign.modal.residual_vibration import SIZES, Move, ReducedMove
+from eigassign.modal.residual_vibration import FINER, Move, ReducedMove
 from eigassign.modal.shapers import (
     SHAPERS,
     ModeOnPath,
@@ -62,9 +62,6 @@ def _row(scene: Scene, limit: LimitedQuantity, y: Floats) -> MoveRow:
     times, at = np.linspace(low, high, TIMES), np.array([T])
     k = int(np.argmax([one.residuals(at)[0, 0] for one in own.solved(y)]))  # the worst damping
     move, solved = own.moves[k], own.solved(y)[k]
-    sizes = SIZES._replace(
-        poses=2 * SIZES.poses - 1, loads=2 * SIZES.loads - 1, steps=2 * SIZES.steps
-    )
     time_s, error = _trace(solved, T)
     modes = _modes(solved, T)
     made = [*_made(modes)]
@@ -78,7 +75,7 @@ def _row(scene: Scene, limit: LimitedQuantity, y: Floats) -> MoveRow:
         residual=float(own.along(y, at)[0]),
         before=float(own.along(scene.initial, np.array([before]))[0]),
         limit=limit.allowed[1],
-        confirmed=float(own.along(y, at, sizes)[0]),
+        confirmed=float(own.along(y, at, FINER)[0]),
         shapers=tuple(rows),
         time_s=time_s,
         error=error,
@@ -94,7 +91,7 @@ def _trace(solved: ReducedMove, T: float) -> tuple[Floats, Floats]:
     """Times (n,) and how far the node is from where it should be, during the move and after it."""
     at = np.array([T])
     (tau, during), free = solved.errors(at), solved.free(at)
-    slowest = np.abs(free.s[free.seen()]).min(initial=2.0 * np.pi / T)
+    slowest = min(np.abs(free.s[free.seen()]), default=2.0 * np.pi / T)
     after = np.linspace(0.0, AFTER * 2.0 * np.pi / slowest, FINE)
     ways = np.vstack([during[0], free.at(after)[0].T])
     time_s = np.concatenate([T * tau, T + after])

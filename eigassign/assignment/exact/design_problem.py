@@ -51,6 +51,7 @@ class Cost(NamedTuple):
     free: float = 0.0  # m_ref
     is_affine: bool = True  # but for the choices
     listed: Callable[[Floats], Floats | float] = lambda _y: 0.0  # (n,) of designs (n, n_y) too
+    is_time: bool = False  # c is the motion time, s
 
     def __call__(self, y: Floats) -> tuple[float, Floats]:
         """The cost of a design y (n_y,), and its slopes (n_y,)."""

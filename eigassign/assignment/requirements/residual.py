@@ -8,7 +8,7 @@ instant changes, and lobes over the motion time, which a scan of that has to fin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -24,6 +24,7 @@ from eigassign.modal.residual_vibration import SIZES, Move, ReducedMove, Sizes, 
 from eigassign.modal.response import dampings
 
 STEP = 1e-5  # of the range of a parameter: differences err by 1e-5 of the residual or so
+MARGIN = 1e-3  # of a limit, by which it is kept where steps and basis are those of a search
 KEPT = 64  # designs whose moves are remembered
 
 
@@ -98,7 +99,7 @@ def residual_limits(file: CaseFile, model: Model, path: Trajectories) -> Iterato
             moves = (move(model, part.trajectory, {place.at: along}, d) for d in dampings(model))
             where = f" along {part.name!r}" if path.several else ""
             noun, unit = f"residual vibration of {place.name}{where}", SI("m", target.at_most)
-            yield limit_between(
+            limit = limit_between(
                 *(None, target.at_most, Residual(target, part, tuple(moves), STEP * sizes)),
                 f"{noun} at most {handy(target.at_most, unit, 4)}",
                 f"targets[{k}]",
@@ -110,3 +111,4 @@ def residual_limits(file: CaseFile, model: Model, path: Trajectories) -> Iterato
                 is_residual=True,
                 trajectory=target.trajectory,
             )
+            yield replace(limit, upper=(1.0 - MARGIN) * limit.upper)

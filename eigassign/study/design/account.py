@@ -15,8 +15,10 @@ from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Solved
 from eigassign.brief import counted
+from eigassign.case.units import handy
 from eigassign.errors import LostModeError
 from eigassign.facts import capital, priced
+from eigassign.modal.residual_vibration import FINER
 from eigassign.study.checks import (
     Accuracy,
     MotionStudy,
@@ -211,6 +213,12 @@ def _unproved(scene: Scene, own: VerifiedAssignment, largest: float) -> Iterator
     answer, found = own.answer, own.answer.found
     designs = [answer.y] if found is None else found.task.designs(answer.y)
     yield from _missed_between(scene, designs, own.targets, largest)
+    for one in scene.limits:
+        for y in designs if one.is_residual else ():
+            at = np.array([one.quantity.duration(y)])
+            way = float(one.quantity.along(y, at, FINER)[0])
+            if way > one.allowed[1] and one.violation(one.amount(y), 0.0) <= ON:
+                yield f"{one.label}: {handy(way, one.unit, 4)} with twice the steps and basis"
     for y in designs:
         yield from (f"{each}: {finer(scene.model)}" for each in _too_stiff(scene, y))
     if found is not None and (bands := "; ".join(_why_unproved(scene, found))):

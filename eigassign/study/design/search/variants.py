@@ -222,7 +222,7 @@ def cost_of(scene: Scene, unit: float) -> Cost | None:
     design, mass, n = scene.file.design, scene.model.total_mass, len(scene.initial)
     if scene.file.assignment.objective == "fastest":
         of_time = [c.parameter == DURATION_PATH for c in design.parameters.values()]
-        return Cost(np.array(of_time, dtype=np.float64), np.zeros(n))
+        return Cost(np.array(of_time, dtype=np.float64), np.zeros(n), is_time=True)
     if scene.file.assignment.objective == "lightest":
         return Cost(np.zeros(n), scene.initial, 1.0, mass, is_affine=mass.is_affine)
     prices = np.array([column.price or 0.0 for column in design.parameters.values()])
