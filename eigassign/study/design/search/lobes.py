@@ -9,6 +9,7 @@ faster one keeps the limits too, it goes on from there.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ TIMES = 241  # over the bounds of the motion time
 DESIGNS = 12  # for each other parameter, beside corners
 NEAR = 4.0  # times its limit: a basin that is worse is passed over
 SAME = 0.02  # of the times of basins: nearer ones are one, of which the best is looked at
+STEPS = 30  # from each basin: what takes more is none that can keep the limits
 AGAIN = 3  # times that a search goes on from a faster motion
 FASTER = 1e-3  # relative
 
@@ -58,6 +60,9 @@ def fastest(
     progress(f"fastest: {len(designs)} designs at {TIMES} motion times")
     basins = [basin for y in designs for basin in _basins(scene, y, column, times)]
     near: list[Floats] = [basin.y for basin in _best(basins)]
+    keys = scene.file.assignment
+    short = keys.model_copy(update={"steps": min(keys.steps, STEPS)})
+    scene = replace(scene, file=replace(scene.file, assignment=short))
     found = find_optimum(scene, starts, progress, near, deadline=deadline)
     for _ in range(AGAIN):
         y, kept = found.best.y, found.best.seen.violation <= ON

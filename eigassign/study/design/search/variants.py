@@ -256,7 +256,7 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
 
 
 STARTS = 100  # with `starts: auto`, at most
-LOBES = 12  # of residuals, over the motion time, that the fastest motion is sought in
+LOBES = 8  # of residuals, over the motion time, that the fastest motion is sought in
 # Of each of several choices: those that cannot meet the limits have many optima. Of 150 random
 # problems with lists beside continuous parameters none was worse than with ten each.
 OF_SEVERAL = 20
