@@ -162,8 +162,8 @@ LOW = np.array([9.8, 23.0])
 
 def test_a_range_asks_for_the_design_that_the_same_tolerance_asks_for() -> None:
     wrist = "  wrist: {parameter: bodies.wrist.mass, "
-    _, row, y = solved(*LOWER, (KNOWN, f"uncertain:\n{wrist}min: 1.78, max: 1.98}}\n"))
-    fixed = f"{wrist}min: 1.88, max: 1.8800001, tolerance: 100 g}}\n  mass: {{price"
+    _, row, y = solved(*LOWER, (KNOWN, f"uncertain:\n{wrist}min: 1.84, max: 1.98}}\n"))
+    fixed = f"{wrist}min: 1.91, max: 1.9100001, tolerance: 70 g}}\n  mass: {{price"
     _, same, both = solved(*LOWER, (KNOWN, ""), ("  mass: {price", fixed))
     assert row.verdict == same.verdict == "reached"
     np.testing.assert_allclose(y, both[:2], rtol=1e-6)

@@ -83,14 +83,15 @@ def ranges_are_those_of_a_grid(name: str, seed: int, n: int) -> None:
     inner = np.array([[row.low, row.high] for row in rows]).T
     outer = np.array([[row.outer_low, row.outer_high] for row in rows]).T
     slack = 1e-6 * (high - low)  # the exact solves of the two are rounded otherwise
-    assert (outer[0] <= inner[0] + slack).all()
-    assert (inner[1] <= outer[1] + slack).all()
-    if explains.any():
-        least, most = grid[explains].min(axis=0), grid[explains].max(axis=0)
-        assert (outer[0] <= least + slack).all()
-        assert (most <= outer[1] + slack).all()
-        assert (inner[0] <= least + step).all()
-        assert (inner[1] >= most - step).all()
+    beyond = np.array([inner[0] - outer[0], outer[1] - inner[1]])
+    assert (beyond >= -slack).all()
+    assert (beyond <= 0.011 * np.ptp(inner, axis=0) + slack).all()  # boxes end at 1 %
+    assert explains.any()
+    least, most = grid[explains].min(axis=0), grid[explains].max(axis=0)
+    assert (outer[0] - slack <= least).all()
+    assert (most <= outer[1] + slack).all()
+    assert (inner[0] <= least + step).all()
+    assert (inner[1] >= most - step).all()
 
 
 @pytest.mark.parametrize(("name", "seed"), [("two_link", 7), ("two_link", 14)])
