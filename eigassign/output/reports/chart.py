@@ -149,8 +149,6 @@ def _facts(section: str, rows: Sequence[Any], names: str, caption: str = "") -> 
 def _tables(chart: Chart) -> Iterator[Table]:
     yield _facts("fails", chart.findings, "kind where modes gap methods why instead")
     yield _facts("write", chart.advice, "question words")
-    table = _facts("write", chart.orders, "order moved one_shot")
-    yield table._replace(title="What optimize makes of each order")
     limited = [row for row in chart.reach if row.half_width < 1.0]
     wanted, clock = percent(chart.asked.accuracy), f"{chart.asked.clock_s:.0e} s"
     caption = f"To {wanted}; methods that are not here hold all of the ranges."
@@ -160,8 +158,7 @@ def _tables(chart: Chart) -> Iterator[Table]:
     caption = f"Least processor time of repeats in turns; the clock resolves {clock}. By shape: "
     caption += "against the mode that has the shape, where modes meet and numbers change places."
     yield facts_table("All methods", points, f"{names} failed use", caption)
-    names = "method varied half_width worst_relative claimed"
-    yield facts_table("All boxes", chart.boxes, names)
+    yield facts_table("All boxes", chart.boxes, "method varied half_width worst_relative")
     fronts = tuple((f"{f.evaluations:,}", "; ".join(f.methods)) for f in chart.fronts)
     yield Table("Fronts", ("trajectories", "no other is quicker and more accurate"), fronts)
     yield Table("Left out", ("method", "why"), chart.skipped)
