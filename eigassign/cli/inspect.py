@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.arguments import Reporter, print_json, reporting, show
+from eigassign.cli.arguments import print_json, reporting, show
 from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
@@ -54,7 +54,7 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
             try:
                 with Stages(reporter.stage)("check", f"checking {case}"):
                     answer = queries.check(case, how["allow_outside"])
-                    notes = (*answer.notes, *_sweep(case, how["allow_outside"], reporter))
+                    notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
@@ -75,10 +75,10 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     return max(codes)
 
 
-def _sweep(case: Path, allow_outside: bool, reporter: Reporter) -> list[str]:
+def _sweep(case: Path, allow_outside: bool) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
     from eigassign.batch.plan import plan_of, variant_problem
-    from eigassign.batch.work import CaseOptions, check_cases, idle_keys
+    from eigassign.batch.work import CaseOptions, check_cases
 
     plan = plan_of([case])
     if not plan.is_swept:
@@ -88,7 +88,6 @@ def _sweep(case: Path, allow_outside: bool, reporter: Reporter) -> list[str]:
     if wrong := check_cases(first, CaseOptions("", allow_outside=allow_outside)):
         found = [(index, problem) for index, problems in wrong for problem in problems]
         raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
-    reporter.warn(idle_keys(plan, CaseOptions("", allow_outside=allow_outside)))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
     return [f"sweep: {len(plan)} variants, {seen}: eigassign batch {quoted(case)} --dry-run"]
 

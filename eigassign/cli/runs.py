@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -253,21 +253,14 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any)
 @click.command(
     epilog=arguments.examples(
         "eigassign validate cases/two_link.yaml",
-        "eigassign validate cases --junit validation.xml",
         "eigassign validate cases --json",
     )
 )
 @click.argument("cases", nargs=-1, type=arguments.PATH)
-@click.option(
-    "--junit",
-    type=arguments.PATH,
-    metavar="FILE",
-    help="Also write the results in JUnit format, for CI servers (default: no file).",
-)
 @arguments.caching
 @arguments.json
 @arguments.common
-def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: Any) -> int:
+def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     """Compare the expansion with exact frequencies.
 
     Compares the full expansion, and the one that is linear in the design, along the trajectory,
@@ -275,13 +268,10 @@ def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: 
     the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case.
     """
     from eigassign.batch.plan import cases_in
-    from eigassign.output.batch.summary import junit_xml
-    from eigassign.output.store.atomic import replace_synced
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
     failures: list[dict[str, object]] = []
-    tests: list[tuple[str, str, float, str, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
         for case in cases_in(cases):
@@ -290,15 +280,10 @@ def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: 
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
-                text = process.failure_of(error).text
-                tests.append((case.stem, str(case), 0.0, "error", text, ""))
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
             codes.append(0 if answer.passed else 1)
-            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows), ""))
-        if junit:
-            replace_synced(junit, junit_xml(tests))
     if as_json:
         print_json([*rows, *failures])
     else:
@@ -309,19 +294,6 @@ def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: 
         brief = table if how["verbose"] else table.without("points").without("order")
         print_tables([brief] if rows else ())
     return max(codes)
-
-
-def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
-    """The status of a validated case, and why it is not ok."""
-    from eigassign.facts import percent
-
-    reasons = [
-        f"mode {row.mode}, {row.where}: {percent(row.worst_taylor)} from exact, with the design "
-        f"linearised {percent(row.worst_linearised)}; accepted are {percent(row.limit)}"
-        for row in rows
-        if not row.passed
-    ]
-    return "tolerance" if reasons else "ok", "\n".join(reasons)
 
 
 @click.command(
