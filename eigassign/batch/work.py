@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from eigassign.batch.plan import STUDY, Variant, content_of, key_of
+from eigassign.batch.plan import (
+    STUDY,
+    BatchPlan,
+    Variant,
+    content_of,
+    key_of,
+    variant_problem,
+)
 from eigassign.case.case_file import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
 from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
@@ -46,24 +53,21 @@ class CaseOptions:
 # --- Reading and checking
 
 
-def check_cases(
-    variants: Sequence[Variant], options: CaseOptions
-) -> list[tuple[int, tuple[Problem, ...]]]:
-    """The index of every variant that is no valid case, and what is wrong with it.
+def faults_of(plan: BatchPlan, index: int, options: CaseOptions) -> tuple[Problem, ...]:
+    """What is wrong with a variant that is no valid case, where that was given; else nothing.
 
-    Raises StorageError where a file of one cannot be read.
+    Raises StorageError where a file of it cannot be read.
     """
-    found = []
-    for variant in variants:
-        try:
-            load(variant, options)
-        except CaseError as error:
-            found.append((variant.index, error.problems))
-        except StorageError:
-            raise
-        except EigassignError as error:
-            found.append((variant.index, (Problem(variant.path, 0, 0, "", str(error)),)))
-    return found
+    variant = plan[index]
+    try:
+        load(variant, options)
+    except StorageError:
+        raise
+    except CaseError as error:
+        return tuple(variant_problem(plan, index, each) for each in error.problems)
+    except EigassignError as error:
+        return (variant_problem(plan, index, Problem(variant.path, 0, 0, "", str(error))),)
+    return ()
 
 
 def load(variant: Variant, options: CaseOptions) -> BuiltCase:

@@ -78,7 +78,7 @@ def batch(
         workers = this_machine(jobs)
         if dry_run:
             there = runner.done(asked)
-            todo = runner.require_valid(asked, there, workers, reporter.stage)
+            todo = runner.require_valid(asked, there, reporter.stage)
             show(f"{counted(len(todo), 'case')} would run, {len(there)} are done and still current")
             return 0
 

@@ -77,17 +77,16 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
 
 def _sweep(case: Path, allow_outside: bool) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
-    from eigassign.batch.plan import plan_of, variant_problem
-    from eigassign.batch.work import CaseOptions, check_cases
+    from eigassign.batch.plan import plan_of
+    from eigassign.batch.work import CaseOptions, faults_of
 
     plan = plan_of([case])
     if not plan.is_swept:
         return []
     count = min(len(plan), 100)  # half a second
-    first = [plan[k] for k in range(count)]
-    if wrong := check_cases(first, CaseOptions("", allow_outside=allow_outside)):
-        found = [(index, problem) for index, problems in wrong for problem in problems]
-        raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
+    options = CaseOptions("", allow_outside=allow_outside)
+    if wrong := [each for k in range(count) for each in faults_of(plan, k, options)]:
+        raise CaseError(tuple(wrong[:10]))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
     return [f"sweep: {len(plan)} variants, {seen}: eigassign batch {quoted(case)} --dry-run"]
 
