@@ -1,14 +1,13 @@
 """What a chart leaves: errors against time and against the size of the box; tables; files.
 
 A colour is a kind of method, its orders or sizes stand at its points. What the front passes by is
-pale, not absent. Of several cases there is one picture of scenes × methods.
+pale, not absent. Of several cases there are tables of scenes × methods.
 """
 
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -30,15 +29,15 @@ COLOURS: dict[str, str] = dict(zip(Kind, (
 ), strict=True))  # fmt: skip
 Floats = NDArray[np.float64]
 WANTED = Look(graph.BLACK, 1.0, "fine")
-SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
-COSTS = {0.01: "≤ 1/100", 0.1: "≤ 1/10", 1.0: "≤ 1", np.inf: "over 1"}
 SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
-            "reach": "How far each method goes"}  # fmt: skip
+            "reach": "How far each method goes", "scenes": "Scenes × methods"}  # fmt: skip
 
 
-def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """Error against time; where something varies, against the size of the box."""
-    return (_plane(chart), *((_boxes(chart),) if chart.boxes else ()))
+def chart_figures(made: Chart | Matrix) -> tuple[FigurePlan, ...]:
+    """Error against time; where something varies, against the size of the box; none of several."""
+    if isinstance(made, Matrix):
+        return ()
+    return (_plane(made), *((_boxes(made),) if made.boxes else ()))
 
 
 def _figure(
@@ -174,60 +173,21 @@ def write_chart(
 
     Numbers are chart.json, or matrix.json and matrix.csv.
     """
-    if isinstance(made, Chart):
-        name, plans = "chart", chart_figures(made)
-    else:
-        name, plans = "matrix", matrix_figures(made)
+    name = "chart" if isinstance(made, Chart) else "matrix"
+    if isinstance(made, Matrix):
         names = [each.name for each in fields(Cell)]
         text = csv_text([(each, [getattr(cell, each) for cell in made.cells]) for each in names])
         (folder / "matrix.csv").write_bytes(text)
     data = f"{dumps(results_document(made, may_lack=True))}\n".encode()
     tone = "fair" if made.findings else "good"
+    numbers, plans = (f"{name}.json", data), chart_figures(made)
     report.write_page(
-        made, chart_tables(made), plans, folder, formats, kind, (f"{name}.json", data),
+        made, chart_tables(made), plans, folder, formats, kind, numbers,
         line=made.headline, tone=tone, headings=SECTIONS,
     )  # fmt: skip
 
 
 # --- Several cases
-
-
-def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
-    """Two heat maps: errors at equal cost, costs at equal accuracy."""
-    wanted, steps = percent(matrix.accuracy), [1e-4 * matrix.accuracy, 1e-2 * matrix.accuracy]
-    errors = {e: f"≤ {percent(e)}" for e in (*steps, matrix.accuracy)} | {np.inf: f"over {wanted}"}
-    exact, time = "Worst error for the time of exact solves", f"Time for {wanted}, of that of exact"
-    return (
-        _heat(matrix, "errors", exact, errors, "error_at_equal_cost"),
-        _heat(matrix, "costs", f"{time} solves", COSTS, "cost_at_equal_accuracy"),
-    )
-
-
-def _heat(
-    matrix: Matrix, name: str, heading: str, levels: Mapping[float, str], fact: str
-) -> FigurePlan:
-    marks, limits, kinds = list[Mark](), list(levels), tuple(Kind)
-    shades: list[list[Cell]] = [[] for _ in (*levels, None)]
-    for cell in matrix.cells:
-        value = getattr(cell, fact)
-        shades[len(levels) if value is None else bisect_left(limits, value)].append(cell)
-    for own, label, shade in zip(shades, (*levels.values(), "none"), SHADES, strict=True):
-        at = np.array([kinds.index(cell.curve) + 1.0 for cell in own])
-        below = np.array([-float(matrix.cases.index(cell.case)) for cell in own])
-        names = tuple(f"{c.case}: {c.curve}, {getattr(c, fact)}" for c in own)
-        marks.append(Curve(below, Look(shade, 0.0, "solid", "s", 15.0), label, at, names=names))
-    failing = {c: ", ".join(f.kind for f in matrix.findings[c]) for c in matrix.cases}
-    rows = np.array([-float(k) for k, c in enumerate(matrix.cases) if failing[c]])
-    look, names = Look(graph.VERMILLION, 0.0, marker="o"), tuple(filter(None, failing.values()))
-    marks.append(Curve(rows, look, "something fails by name", 0.0 * rows, names=names))
-    caption = f"Preparations are spread over {matrix.evaluations} trajectories."
-    room = np.array([0.6, 0.4 - len(matrix.cases)])
-    panel = Panel(
-        "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
-    )
-    ends = (-0.6, len(kinds) + 0.6)
-    shows = Graph(heading, "", np.zeros(0), (panel,), ends, x_names=kinds)
-    return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
 
 
 def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
@@ -236,6 +196,11 @@ def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
     failing = [(c, f) for c in matrix.cases for f in matrix.findings[c]]
     rows = tuple((c, f.kind, f.where, f.methods, f.instead) for c, f in failing)
     yield Table(SECTIONS["fails"], columns, rows, section="fails")
+    spread = f"Preparations are spread over {matrix.evaluations} trajectories."
+    caption = {
+        "error_at_equal_cost": f"The worst error for the time of exact solves. {spread}",
+        "cost_at_equal_accuracy": f"Time for {percent(matrix.accuracy)}, of that of exact solves.",
+    }
     for title, name in (
         ("Errors at equal cost", "error_at_equal_cost"),
         ("Costs at equal accuracy", "cost_at_equal_accuracy"),
@@ -243,5 +208,5 @@ def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
         text = fact(Cell, name).text
         found = {(c.case, c.curve): text(getattr(c, name)) for c in matrix.cells}
         body = tuple((c, *(found[c, curve] for curve in Kind)) for c in matrix.cases)
-        yield Table(title, ("case", *Kind), body)
+        yield Table(title, ("case", *Kind), body, caption[name], "scenes")
     yield Table("Refused", ("case", "why"), matrix.refused, section="fails")
