@@ -37,7 +37,6 @@ def off(error: float) -> str:
 RelativeError = Annotated[
     Share, Fact(may_lack=True, digits=lambda e: percent(e) if np.isfinite(e) else "no number")
 ]
-ErrorIfAny = Annotated[RelativeError | None, Fact(absent="")]
 TinyIfAny = Annotated[float | None, Fact(digits=lambda v: f"{v:.1e}" if v else "0", absent="")]
 
 
@@ -80,7 +79,6 @@ class ChartPoint:
     spread_s: Annotated[Seconds, Fact("median of the repeats above their least", "spread")]
     worst_relative: Annotated[RelativeError, Fact("at the test points", "worst error")]
     rms_relative: Annotated[RelativeError, Fact(heading="rms error")]
-    worst_by_shape: Annotated[ErrorIfAny, Fact("against the mode of its shape", "worst by shape")]
     failed: Annotated[int, Fact("test points without a number", digits=lambda n: str(n or ""))]
     use: Annotated[str, Fact("the call or key that asks for it", "how")] = ""
 

@@ -59,7 +59,6 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 )
 @arguments.case
 @click.option("--order", type=click.IntRange(1, 20), help="Order (default: that of the case).")
-@click.option("--linear", is_flag=True, help="Only terms that are linear in the design.")
 @click.option(
     "--mode",
     "modes",
@@ -71,9 +70,7 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 @arguments.caching
 @arguments.json
 @arguments.common
-def expand(
-    case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
-) -> int:
+def expand(case: Path, order: int | None, modes: tuple[int, ...], as_json: bool, **how: Any) -> int:
     """Write the Taylor expansion of eigenvalues, and its accuracy.
 
     The expansion is in the coordinates q and the design y. Its coefficients are in
@@ -82,7 +79,7 @@ def expand(
     from eigassign.pipeline import run
 
     def expanded(path: Path, options: Options) -> Outcome:
-        return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
+        return run.expand_case(path, options, order=order, modes=modes or None)
 
     return _finished(expanded, case, as_json, how)
 

@@ -144,7 +144,7 @@ def draw_modes(
     with new_run_folder(case.file, out, force, "_modes") as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
-        report.write_modes(pictures, folder.hidden, formats)
+        report.write_figures(mechanism.mode_figures(pictures), folder.hidden, formats)
     return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), folder.path
 
 

@@ -338,12 +338,11 @@ def expand_case(
     options: Options = DEFAULT,
     order: int | None = None,
     modes: Sequence[int] | None = None,
-    linear: bool = False,
 ) -> Outcome:
     """Expansion coefficients of a case and how good they are, in a run folder.
 
-    ``order`` and ``modes`` override the case's; ``linear`` keeps the full set's coefficients out
-    of the files. The case needs neither design nor targets, and no trajectory if it gives q.
+    ``order`` and ``modes`` override the case's. The case needs neither design nor targets, and no
+    trajectory if it gives q.
     """
     stages = Stages(options.progress)
     case = load_case(path, options.allow_outside)
@@ -355,8 +354,7 @@ def expand_case(
         moving = _moving(scene, scene.initial, (), options)
         results = collect_results(scene, studies, accuracy, None, moving, stages.timing_s)
         with stages("report", "writing the report"):
-            extra = coefficient_files(scene, linear)
-            folder.write(results, options.figures, options.report, extra)
+            folder.write(results, options.figures, options.report, coefficient_files(scene))
     return Outcome(folder.path, results, stages.total_s)
 
 

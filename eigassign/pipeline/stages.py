@@ -260,11 +260,11 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
 
 
-def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
+def coefficient_files(scene: Scene) -> dict[str, bytes]:
     """coefficients.json and coefficients.h5 of a scene's expansions.
 
-    Names are those of the Python face. For ``linearised`` and, unless ``linear_only``, ``full``:
-    ``indices`` (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
+    Names are those of the Python face. For ``linearised`` and ``full``: ``indices``
+    (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
     λ = Σ_γ λ_γ (x − x0)^γ in rad²/s², x = (q, y) in SI units; of modes that are expanded together
     ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
     """
@@ -274,8 +274,7 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     for k, (linear, full) in enumerate(each, 1):
         where = f"_at_point_{k}" if k > 1 else ""
         tables[f"linearised{where}"] = _table(linear)
-        if not linear_only:
-            tables[f"full{where}"] = _table(full)
+        tables[f"full{where}"] = _table(full)
     names = [*scene.model.q_names, *scene.model.y_names]
     point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
     document = {

@@ -153,10 +153,9 @@ def _tables(chart: Chart) -> Iterator[Table]:
     caption = f"To {wanted}; methods that are not here hold all of the ranges."
     yield _facts("reach", limited, "method varied half_width error_at_all", caption)
     points = sorted(chart.points, key=lambda p: p.worst_relative)
-    names = "method preparation_s trajectory_s spread_s worst_relative rms_relative worst_by_shape"
-    caption = f"Least processor time of repeats in turns; the clock resolves {clock}. By shape: "
-    caption += "against the mode that has the shape, where modes meet and numbers change places."
-    yield facts_table("All methods", points, f"{names} failed use", caption)
+    names = "method preparation_s trajectory_s spread_s worst_relative rms_relative failed use"
+    caption = f"Least processor time of repeats in turns; the clock resolves {clock}."
+    yield facts_table("All methods", points, names, caption)
     yield facts_table("All boxes", chart.boxes, "method varied half_width worst_relative")
     fronts = tuple((f"{f.evaluations:,}", "; ".join(f.methods)) for f in chart.fronts)
     yield Table("Fronts", ("trajectories", "no other is quicker and more accurate"), fronts)
