@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from scipy.optimize import minimize_scalar
 
 from eigassign._version import __version__
 from eigassign.case.units import shown_point
-from eigassign.chart.methods import NO_KRIGING, Built, Method, list_meshes, list_methods
+from eigassign.chart.methods import NO_KRIGING, Built, list_meshes, list_methods
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
     ACCURACY,
@@ -63,7 +63,8 @@ def compare_methods(
     tests, along = subject.tested(effort), subject.along(subject.initial)
     exact, near = subject.exact(tests.x), _near_modes(subject, tests)
     made = dict[str, tuple[ChartPoint, Built, Callable[[], object]]]()
-    tasks = _tasks(subject, effort, tests, exact)
+    judged = ((method, tests, exact) for method in list_methods(subject, effort))
+    tasks = chain(judged, list_meshes(subject, effort, tests))
     for k, (method, where, truth) in enumerate(tasks, 1):
         progress(f"{k}: {method.curve}, {method.size}")
         try:
@@ -117,18 +118,6 @@ def _notes(subject: Subject) -> Iterator[str]:
         yield NO_KRIGING
     if subject.model.n_dof > SOUGHT_DOF:
         yield f"modes that meet are not sought with over {SOUGHT_DOF} degrees of freedom"
-
-
-def _tasks(
-    subject: Subject, effort: Effort, tests: Points, exact: Floats
-) -> Iterator[tuple[Method, Points, Floats]]:
-    """Each method with its test points and what is exact there."""
-    for method in list_methods(subject, effort):
-        yield method, tests, exact
-    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
-    meshes, limit = list_meshes(subject, effort, few)
-    for method in meshes:
-        yield method, few, limit
 
 
 # --- Error against the size of the box: points drawn towards x0, x0 + h (x − x0)

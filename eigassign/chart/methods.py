@@ -221,11 +221,15 @@ def _kriged(u: Floats, hz: Floats) -> Callable[[Floats], Floats]:
 # --- The mesh itself
 
 
-def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Method], Floats]:
+def list_meshes(
+    subject: Subject, effort: Effort, tests: Points
+) -> Iterator[tuple[Method, Points, Floats]]:
     """The case with 1, 2, 4, … elements in every beam, as large as is solved, and as it is.
 
-    And their limit f + (f − f_coarser)/15 at ``few`` points, for errors fall like h⁴ when halved.
+    Each with a few of the test points, and Hz (n, n_modes) of the limit of all there:
+    f + (f − f_coarser)/15, for errors fall like h⁴ when halved.
     """
+    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
     coarsest, hz = refined(subject.file, 1e-9)[0], list[Floats]()  # a beam keeps one
     meshes = list[Method]()
     for count in effort.elements:
@@ -237,7 +241,6 @@ def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Met
         hz.append(finer.exact(few.x))
         size, use = f"{count} element{'s' * (count > 1)} a link", f"elements: {count}"
         meshes.append(Method(Kind.MESH, size, partial(_solved, finer), use=use))
-    if len(hz) < 2:
-        return [], np.empty(0)
-    meshes.append(Method(Kind.MESH, "as in the case", partial(_solved, subject)))
-    return meshes, hz[-1] + (hz[-1] - hz[-2]) / 15.0
+    if len(hz) > 1:
+        meshes.append(Method(Kind.MESH, "as in the case", partial(_solved, subject)))
+        yield from ((mesh, few, hz[-1] + (hz[-1] - hz[-2]) / 15.0) for mesh in meshes)

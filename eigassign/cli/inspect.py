@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.arguments import print_json, reporting, show
+from eigassign.cli.arguments import print_json, reporting, run_options, show
 from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
@@ -21,7 +21,6 @@ import re
 
 from eigassign.errors import StorageError, UsageError
 
-_DRAWING = ("out", "force", "figures", "allow_outside")
 LEFT_BY = ("run", "update", "batch", "chart", "charts")
 
 
@@ -58,7 +57,7 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
-                    folder = queries.draw(case, None, *(how[key] for key in _DRAWING[1:]))
+                    folder = queries.draw(case, run_options(how, reporter))
                     reporter.note(f"{folder}/figures written")
             except EigassignError as error:
                 codes.append(process.report(error))
@@ -151,7 +150,7 @@ def modes(
     draw = draw or how["out"] is not None or given is ParameterSource.COMMANDLINE
     with reporting(how) as reporter:
         if draw:
-            answer, folder = queries.draw_modes(case, q, y, count, *(how[key] for key in _DRAWING))
+            answer, folder = queries.draw_modes(case, run_options(how, reporter), q, y, count)
         else:
             answer = queries.modes(case, q, y, count, how["allow_outside"])
         reporter.warn(answer.warnings)

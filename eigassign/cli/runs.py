@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.arguments import Reporter, print_json, reporting, show
+from eigassign.cli.arguments import print_json, reporting, run_options, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
@@ -136,7 +135,7 @@ def _finished(
     from eigassign.output.console import print_assignment
 
     with reporting(how) as reporter:
-        outcome = work(case, _options(how, reporter))
+        outcome = work(case, run_options(how, reporter))
         results = outcome.results
         reporter.warn(results.warnings)
     told = partial(print_assignment, results, verbose=how["verbose"] > 0)
@@ -148,18 +147,6 @@ def _finished(
         reporter.error(f"interrupted: the best design so far is in {outcome.folder}; {kept}")
         return process.INTERRUPTED
     return 0 if results.shortcoming is None else 1
-
-
-_UNASKED = {"use_cache": False, "figures": (), "report": "none", "study": "none"}
-
-
-def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
-    """The options of the command line that are those of a run; what a command lacks it is not."""
-    from eigassign.pipeline.run import Options
-
-    own = {field.name for field in fields(Options)}
-    given = {name: value for name, value in {**_UNASKED, **how}.items() if name in own}
-    return Options(**given, progress=reporter.stage)
 
 
 def _show(
@@ -199,7 +186,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     from eigassign.pipeline import studies as updating
 
     with reporting(how) as reporter:
-        done = updating.update(case, _options(how, reporter))
+        done = updating.update(case, run_options(how, reporter))
         results = done.results
         reporter.warn(results.warnings)
 
@@ -273,7 +260,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     with reporting(how) as reporter:
         for case in cases_in(cases):
             try:
-                answer = run.validate(case, _options(how, reporter))
+                answer = run.validate(case, run_options(how, reporter))
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
@@ -330,7 +317,7 @@ def chart(
     several = len(cases) > 1 or cases[0].is_dir()
     paths = cases_in(cases) if several else cases
     with reporting(how) as reporter:
-        options = _options(how, reporter)
+        options = run_options(how, reporter)
         made: Chart | Matrix
         if several:
             folder, made = charting.chart_cases(paths, options, effort, accuracy)

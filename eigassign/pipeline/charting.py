@@ -49,7 +49,7 @@ def chart_case(
 def chart_cases(
     paths: Sequence[Path], options: Options, effort: Effort, accuracy: float | None = None
 ) -> tuple[Path, Matrix]:
-    """Scenes × methods in one folder: matrix.json, matrix.csv, report.html.
+    """Scenes × methods in one folder: matrix.json, report.html.
 
     A case that cannot be charted is told with the reason, and does not stop the others.
     """

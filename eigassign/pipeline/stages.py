@@ -50,6 +50,24 @@ def silent(_line: str) -> None:
     """No progress is shown."""
 
 
+@dataclass(frozen=True)
+class Options:
+    """Options of a run, none of which changes a number."""
+
+    out: Path | None = None  # the run folder; below results, by the case file, if None
+    cache_dir: Path | None = None  # the user's cache folder if None
+    use_cache: bool = True
+    force: bool = False  # a folder that another case wrote is moved aside
+    figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
+    report: str = "full"  # full, light or none
+    study: str = "cheap"  # of what the answer means: none, cheap or all
+    allow_outside: bool = False  # the case may name files outside its own folder
+    progress: Callable[[str], None] = silent  # called with a line as each stage begins
+
+
+DEFAULT = Options()
+
+
 class Stages:
     """A stopwatch with a lap for each stage; ``timing_s`` holds them in the order they ran.
 

@@ -29,7 +29,7 @@ def test_a_run_leaves_results_report_figures_resolved_case_and_log(outcome: Outc
     folder = outcome.folder
     names = {path.name for path in folder.iterdir()}
     assert names >= {"results.json", "report.html", "figures", "case.yaml", "log.txt"}
-    assert len(list((folder / "figures").glob("*.png"))) >= 5
+    assert len(list((folder / "figures").glob("*.png"))) >= 4
     assert outcome.results.shortcoming is None
     assert outcome.results.warnings == ()
     assert outcome.seconds > 0.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,6 @@ from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import csv_text
 from eigassign.output.tables import Table, facts_table
 
 COLOURS: dict[str, str] = dict(zip(Kind, (
@@ -170,15 +169,10 @@ def write_chart(
 ) -> None:
     """Into ``folder``, which must exist: the numbers, a report of this kind, the figures.
 
-    Numbers are chart.json, or matrix.json and matrix.csv.
+    Numbers are chart.json, or matrix.json.
     """
-    name = "chart" if isinstance(made, Chart) else "matrix"
-    if isinstance(made, Matrix):
-        names = [each.name for each in fields(Cell)]
-        text = csv_text([(each, [getattr(cell, each) for cell in made.cells]) for each in names])
-        (folder / "matrix.csv").write_bytes(text)
+    name, tone = type(made).__name__.lower(), "fair" if made.findings else "good"
     data = f"{dumps(results_document(made, may_lack=True))}\n".encode()
-    tone = "fair" if made.findings else "good"
     numbers, plans = (f"{name}.json", data), chart_figures(made)
     report.write_page(
         made, chart_tables(made), plans, folder, formats, kind, numbers,
@@ -196,16 +190,14 @@ def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
     rows = tuple((c, f.kind, f.where, f.methods, f.instead) for c, f in failing)
     yield Table(SECTIONS["fails"], columns, rows, section="fails")
     spread = f"Preparations are spread over {matrix.evaluations} trajectories."
-    caption = {
-        "error_at_equal_cost": f"The worst error for the time of exact solves. {spread}",
-        "cost_at_equal_accuracy": f"Time for {percent(matrix.accuracy)}, of that of exact solves.",
-    }
-    for title, name in (
-        ("Errors at equal cost", "error_at_equal_cost"),
-        ("Costs at equal accuracy", "cost_at_equal_accuracy"),
+    error = f"The worst error for the time of exact solves. {spread}"
+    time = f"Time for {percent(matrix.accuracy)}, of that of exact solves."
+    for title, name, caption in (
+        ("Errors at equal cost", "error_at_equal_cost", error),
+        ("Costs at equal accuracy", "cost_at_equal_accuracy", time),
     ):
         text = fact(Cell, name).text
         found = {(c.case, c.curve): text(getattr(c, name)) for c in matrix.cells}
         body = tuple((c, *(found[c, curve] for curve in Kind)) for c in matrix.cases)
-        yield Table(title, ("case", *Kind), body, caption[name], "scenes")
+        yield Table(title, ("case", *Kind), body, caption, "scenes")
     yield Table("Refused", ("case", "why"), matrix.refused, section="fails")
