@@ -93,11 +93,9 @@ class Result(Pictured):
         return f"<Result: {design}. {tables.headline(self.results)}>"
 
     def _repr_html_(self) -> str:
-        lines, made = [tables.headline(self.results) or ""], tables.run_tables(self.results)
-        shown = [table for table in made if table.section == "requirements"]
-        return html(
-            lines, [table for table in made if table.title == "Design"] + shown, self.plan()
-        )
+        made = tables.run_tables(self.results)
+        shown = [one for one in made if one.title == "Design" or one.section == "requirements"]
+        return html([tables.headline(self.results) or ""], shown, self.plan())
 
     def plans(self) -> dict[str, FigurePlan]:
         """The figures of the report."""
