@@ -123,8 +123,6 @@ class Failing(Instant):
         self.error, self.broken = error, False
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        if fn.func.__name__ == "check_cases":
-            return super().submit(fn, *args, **kwargs)
         variant, future = args[0], Future[object]()
         hit = variant.values[MASS] == 0.5
         if hit and not isinstance(self.error, Exception):
@@ -155,43 +153,6 @@ def test_of_what_breaks_the_culprit_is_told_and_nobody_else_loses(
     assert [*summary(batch).values()] == ["ok", "error", "ok", "ok"]
     found = (batch.folder / "summary.csv").read_text()
     assert "the process that ran it was killed" in found
-
-
-class Dying(Instant):
-    """A pool that dies as a variant of ``mass`` is checked, the first ``times``."""
-
-    def __init__(self, out: Path, mass: float, times: int) -> None:
-        super().__init__(out, lambda _name: None)
-        self.mass, self.left, self.broken = mass, times, False
-
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        checks = fn.func.__name__ == "check_cases"
-        hit = checks and self.left and any(v.values[MASS] == self.mass for v in args[0])
-        self.left -= bool(hit)
-        self.broken |= bool(hit)
-        if not self.broken:
-            return super().submit(fn, *args, **kwargs)
-        future = Future[object]()
-        future.set_exception(BrokenProcessPool())
-        return future
-
-
-@pytest.mark.parametrize("times", [1, 100])
-def test_what_dies_while_it_checks_variants_is_tried_again(times: int, tmp_path: Path) -> None:
-    case(tmp_path)
-    batch = batch_of(tmp_path, "1..2:301")
-    pool = Dying(batch.folder, 1.5, times)
-
-    @contextmanager
-    def opened(_slots: int) -> Iterator[Executor]:
-        pool.broken = False
-        yield pool
-
-    if times == 1:
-        assert len(ran(batch, Workers(3, opened))) == 301
-        return
-    with pytest.raises(StorageError, match=r"mass=1\.33333.* to mass=1\.66.*was killed"):
-        ran(batch, Workers(3, opened))
 
 
 def test_an_interrupt_leaves_a_summary_of_what_was_finished(tmp_path: Path) -> None:

@@ -138,20 +138,6 @@ def test_modes_that_meet_are_told_with_place_and_gap() -> None:
     assert near.modes == found(charted("stress/repeated_modes"), "repeated modes").modes == (1, 2)
 
 
-def test_a_series_goes_on_along_its_own_mode_where_another_takes_its_number(
-    tmp_path: Path,
-) -> None:
-    motion = "trajectory: {duration: 1 s, q: [[135 deg], [150 deg], [165 deg]]}\n"
-    text = (CASES / "stress/mode_swaps.yaml").read_text().partition("trajectory:")[0] + motion
-    (tmp_path / "case.yaml").write_text(f"{text}expansion: {{q: [145 deg]}}\n")
-    chart = charted(tmp_path / "case.yaml")
-    (best, exact) = (rows_of(chart, "Taylor")["8"], chart.points[0])
-    assert best.worst_relative > 0.05
-    assert best.worst_by_shape < 1e-4
-    assert exact.worst_relative < 1e-9
-    assert exact.worst_by_shape > 0.05  # number and shape part where modes cross
-
-
 THREE = """title: Three cantilevers
 mechanism:
   space: planar

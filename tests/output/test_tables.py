@@ -2,6 +2,7 @@
 
 import io
 import math
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 import numpy as np
@@ -74,8 +75,8 @@ def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met
         limit.error, initial=ErrorRow(0.681, 0.5), exact=ErrorRow(6e-11, 1e-11), one_shot=None
     )
     both = replace(results, targets=(target, replace(limit, error=error)))
-    said = io.StringIO()
-    print_assignment(both, stream=said)
+    with redirect_stdout(io.StringIO()) as said:
+        print_assignment(both)
     assert (
         "Worst violation of a limit: 68.1 % before (mode 1 at_least), 0 % after.\n"
         in said.getvalue()
