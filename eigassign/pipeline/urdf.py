@@ -114,7 +114,9 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
     for joint, coordinate in zip(moving.values(), content["coordinates"].values(), strict=True):
         steps[joint.name] = np.zeros(2)
         if joint.mimic is not None:
-            asked.append(f"poses of {joint.name}, which mimics {joint.mimic}: locked there")
+            one, k, more = joint.mimic
+            tied = f"{k:g} × {one}" + (f" {'+' if more > 0 else '−'} {abs(more):g}" if more else "")
+            asked.append(f"drive of {joint.name}, which follows as {tied}: locked there")
         elif joint.child not in heavy:
             coordinate["drive"] = "locked"
             asked.append(f"drive of {joint.name}: nothing beyond it has mass in the URDF; locked")
@@ -126,6 +128,11 @@ def urdf_case(path: Path) -> tuple[str, list[str]]:
             step = 0.1 if joint.type == "prismatic" else 0.5
             room = max(upper - start, lower - start, key=abs)
             steps[joint.name] = start + np.array([0.0, np.clip(0.25 * room, -step, step)])
+    following = [joint for joint in moving.values() if joint.mimic is not None]
+    for _ in following:  # each of a chain of them is right one turn after the one before it
+        for joint in following:
+            one, k, more = joint.mimic or ("", 0.0, 0.0)
+            steps[joint.name] = k * steps.get(one, np.zeros(2)) + more
     if not heavy.intersection(joint.child for joint in moving.values()):
         without = listed(name for name, inertial in links.items() if inertial is None)
         raise UsageError(f"{path}: no joint moves a mass: give links <inertial>, as {without}")
@@ -174,7 +181,7 @@ class _Joint(NamedTuple):
     turn: Floats  # (3,): roll, pitch and yaw
     axis: Floats  # (3,)
     limits: Floats  # lower and upper, infinite where there is none
-    mimic: str | None  # the joint that it follows
+    mimic: tuple[str, float, float] | None  # k × that joint + so much more
 
 
 class _Tree(ElementTree.TreeBuilder):
@@ -298,8 +305,10 @@ def _read_joint(element: ElementTree.Element) -> _Joint:
             f'joint {name}: type {kind} is not supported; type="fixed" if it does not move, else '
             "a chain of revolute and prismatic joints"
         )
-    follows = element.find("mimic") is not None and kind != "fixed"
-    tied = _text(element, "mimic", "joint") if follows else None
+    mimic, tied = element.find("mimic"), None
+    if mimic is not None and kind != "fixed":
+        k, more = (_numbers(mimic, w, [d])[0] for w, d in (("multiplier", 1.0), ("offset", 0.0)))
+        tied = (_text(element, "mimic", "joint"), float(k), float(more))
     axis = _numbers(element.find("axis"), "xyz", [1.0, 0.0, 0.0])
     if kind != "fixed" and not axis.any():
         raise ValueError(f"joint {name}: its axis has no direction")
@@ -321,11 +330,26 @@ def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) 
         raise ValueError("two links or two joints have one name")
     children = [joint.child for joint in joints]
     missing = {n for j in joints for n in (j.parent, j.child)} - set(links)
+    _require_masters(joints)
     once = len(set(children)) == len(children) == len(links) - 1
     if missing or not once or len(_beyond(*set(links) - set(children), joints=joints)) != count:
         loose = [n for n in links if n not in children][1:] or sorted(missing)
         which = f": see {', '.join(loose)}" if loose else ""
         raise ValueError(f"the joints do not connect all links to one tree{which}")
+
+
+def _require_masters(joints: Sequence[_Joint]) -> None:
+    """Raises ValueError for joints that mimic none, or each other."""
+    over, names = {j.name: j.mimic[0] for j in joints if j.mimic}, {j.name for j in joints}
+    wrong = [
+        f"{name} mimics {at}, which is no joint" for name, at in over.items() if at not in names
+    ]
+    for name, at in over.items():
+        for _ in over:
+            at = over.get(at, "")
+        wrong += [f"{name} mimics itself, by {over[name]}"] if at in over else []
+    if wrong:
+        raise ValueError("; ".join(f"joint {each}" for each in wrong))
 
 
 def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:

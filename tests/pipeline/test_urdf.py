@@ -120,6 +120,8 @@ def test_a_stiffness_is_a_parameter_and_the_case_can_be_kept(crane: Path, tmp_pa
         ('<parent link="slide"/>', "", "not a URDF file"),
         ("</robot>", "", "not a URDF file"),
         ("<robot", "<!DOCTYPE x [<!ENTITY a 'b'>]><robot", "no document type and no entities"),
+        ('<axis xyz="0 0 1"/>', '<mimic joint="jaw"/>', "joint yaw mimics jaw, which is no joint"),
+        ('<axis xyz="0 0 1"/>', '<mimic joint="yaw"/>', "joint yaw mimics itself, by yaw"),
         ('<mass value="5"/>', '<mass value="inf"/>', "expected a number"),
         ('name="slide"', 'name="sledge"', "do not connect all links to one tree"),
         ('"slide"', '"upper_arm"', "two names of links or joints are alike"),
@@ -254,18 +256,22 @@ BODY = """<inertial><origin xyz="0 0 0.1"/><mass value="0.5"/>
 SOUND, FAULTY = BODY.format("0.0012"), BODY.format("-0.0012")
 
 
-def test_joints_that_mimic_are_locked_and_it_is_said(
+def test_joints_that_mimic_follow_on_locked_drives_and_it_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """One mimics a joint that mimics, and stands before blanks and an infinite limit."""
     ties = {"k": '<mimic joint="j" multiplier="-2" offset="0.1"/>', "l": '<mimic joint="k"/>'}
     (tmp_path / "hand.urdf").write_text(ARM.format(a=SOUND, b=SOUND, **ties))
     assert main(["init", "--urdf", str(tmp_path / "hand.urdf"), "--out", str(tmp_path)]) == 0
     asked, case = capsys.readouterr().out, yaml.safe_load((tmp_path / "hand.yaml").read_text())
     first, last = np.array(case["trajectory"]["points"])
+    for pose in (first, last):
+        assert pose[1:] == pytest.approx([0.1 - 2.0 * pose[0]] * 2)
     assert first[0] != last[0]
     assert [each["drive"] for each in case["coordinates"].values()][1:] == ["locked", "locked"]
-    assert "poses of k, which mimics j: locked there" in asked
-    assert "poses of l, which mimics k: locked there" in asked
+    said = "drive of k, which follows as -2 × j + 0.1: locked there"
+    assert said in asked
+    assert "drive of l, which follows as 1 × k: locked there" in asked
     model = ea.load_case(ea.urdf_mapping(tmp_path / "hand.urdf", 2e3)).model()
     assert model.frequencies(first, [], 1)[0, 0] > 1.0
 
