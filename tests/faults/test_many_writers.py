@@ -56,7 +56,6 @@ def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
 
     assert not any(side_by_side(store))
     found = Cache(root / "cache").load(KEY)
-    assert found is not None
     assert (found["a"] == found["a"][0]).all()
     assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.h5"]
 

@@ -67,7 +67,6 @@ def automatic(tmp_path: Path, elements: int = 24, **more: Any) -> Case:
 def test_auto_is_within_its_share_of_the_accuracy_and_no_finer_than_that(tmp_path: Path) -> None:
     case = automatic(tmp_path)
     model, choice = case.model(), case.settled.reduction
-    assert choice is not None
     assert choice.error <= 0.25e-4
     full = Case(with_reduction(case.file, {"one": None, "two": None})).model()
     assert not full.is_reduced
@@ -86,7 +85,6 @@ def test_auto_leaves_small_links_whole_and_says_so(tmp_path: Path) -> None:
     few = with_elements(case.file, {"one": 2, "two": 2})
     small = Case(few)
     assert not small.model().is_reduced
-    assert small.settled.reduction is not None
     assert (
         small.settled.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
     )
@@ -99,7 +97,6 @@ def test_a_run_states_what_its_reduced_links_leave_out(tmp_path: Path) -> None:
         said = [n for n in notes if "reduced links raise its frequency by" in n]
         assert [n[:7] for n in said] == ["mode 1:", "mode 2:"]
     found = modes(case.file.path, [0.1, 1.0], [0.2], 2)
-    assert found.truncation_error is not None
     assert 0.0 < max(found.truncation_error) < 1e-3
 
 

@@ -110,8 +110,6 @@ def test_a_common_factor_of_all_weights_changes_nothing(pair: Result, tmp_path: 
     scaled = solved(tmp_path, text)
     np.testing.assert_allclose(list(scaled.design.values()), list(pair.design.values()), rtol=1e-10)
     one, two = (r.results.error for r in (pair, scaled))
-    assert one is not None
-    assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-9)
 
 
@@ -129,8 +127,6 @@ def test_a_trajectory_cut_in_two_is_still_the_same_problem(
         list(halves.design.values()), list(whole.design.values()), rtol=rtol, atol=1e-12
     )
     one, two = (r.results.error for r in (whole, halves))
-    assert one is not None
-    assert two is not None
     for kind in ("initial", "predicted", "exact"):
         a, b = getattr(one, kind), getattr(two, kind)
         assert b.rms_relative == pytest.approx(a.rms_relative, rel=rtol)
@@ -161,8 +157,6 @@ def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
     split = solved(tmp_path, text)
     np.testing.assert_allclose(list(split.design.values()), list(pair.design.values()), rtol=1e-10)
     one, two = pair.results.error, split.results.error
-    assert one is not None
-    assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
     assert [t.asked.trajectory for t in split.results.targets] == ["pick", "return"]
     np.testing.assert_array_equal(
@@ -285,7 +279,6 @@ def test_automatic_orders_look_at_every_trajectory(tmp_path: Path) -> None:
     lines = [note for note in result.results.notes if note.startswith("order ")]
     assert [line.partition(":")[0] for line in lines[:2]] == ["order 2", "order 4"]
     (study,) = result.results.studies
-    assert study.over_time is not None
     assert study.over_time.worst["taylor"] < 0.005
 
 
@@ -350,7 +343,6 @@ def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> 
 
 def test_the_drawn_tip_path_stops_where_a_trajectory_does(pair: Result) -> None:
     poses = pair.results.poses
-    assert poses.tip_path is not None
     gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
     assert gaps.tolist() == [21]
     assert len(poses.tip_path) == 43

@@ -127,7 +127,6 @@ def test_a_veering_is_said_by_mode_and_sample_and_the_verdict_follows(
     path = tmp_path / "veering.yaml"
     path.write_text(yaml.safe_dump(veering(duration)), encoding="utf-8")
     results = solve_case(load_case(path)).results
-    assert results.assignment is not None
     assert results.assignment.verdict == verdict
     said = [line for line in (*results.warnings, *results.notes) if "velocity terms" in line]
     (change,) = re.findall(
