@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from chains import model_of
 from reduced_links import random_arm, random_x, reduced_tree
-from spatial_cases import built
+from spatial_cases import built, linkage
 
 from eigassign import Case, load_case
 from eigassign.mechanism import with_elements, with_reduction
@@ -42,20 +42,17 @@ def automatic(tmp_path: Path, elements: int = 24, **more: Any) -> Case:
     """Two slender links of many elements, their masses design, reduced as needed."""
     link = {"length": 0.6, "material": "m", "section": "s", "reduce_to": "auto"}
     link["elements"] = elements
-    tree = {
-        "title": "auto",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": 70e9, "density": 2700}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {"one": dict(link), "two": dict(link)},
-            "joints": {
-                "a": {"type": "revolute", "base": "ground", "follower": "one.start"},
-                "b": {"type": "revolute", "base": "one.end", "follower": "two.start"},
-            },
-            "bodies": {"load": {"at": "two.end", "mass": 0.2}},
+    tree = linkage(
+        {"one": dict(link), "two": dict(link)},
+        {
+            "a": {"type": "revolute", "base": "ground", "follower": "one.start"},
+            "b": {"type": "revolute", "base": "one.end", "follower": "two.start"},
         },
-        "coordinates": {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
+        {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
+        material={"youngs_modulus": 70e9, "density": 2700},
+        bodies={"load": {"at": "two.end", "mass": 0.2}},
+    ) | {
+        "title": "auto",
         "trajectory": {"q": [[0.0, 0.4], [0.2, 1.6]], "duration": 2.0},
         "design": {"load": {"parameter": "bodies.load.mass", "min": 0.0, "max": 0.5}},
         "expansion": {"accuracy": 1e-4, "modes": [1, 2], **more},

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from chains import bar, model_of, two_link
+from spatial_cases import linkage
 from stress import case, judged, stated
 
 from eigassign import load_case
@@ -198,21 +199,13 @@ def comb() -> Model:
     """Cantilevers of 0.25 m / 1.06^k on the ground that know nothing of each other; y at a tip."""
     names = [f"t{k}" for k in range(TINES)]
     bar = {"material": "al", "section": "flat", "elements": 3}
-    tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"al": {"youngs_modulus": 70e9, "density": 2700.0}},
-            "sections": {"flat": {"shape": "rectangle", "width": 0.02, "height": 0.004}},
-            "links": {name: {**bar, "length": 0.25 / 1.06**k} for k, name in enumerate(names)},
-            "joints": {
-                name: {"type": "fixed", "base": "ground", "follower": f"{name}.start"}
-                for name in names
-            },
-            "bodies": {"tip": {"at": f"{names[-1]}.end", "mass": 0.0}},
-        },
-        "coordinates": {},
-        "design": {"y": {"parameter": "bodies.tip.mass", "min": 0.0, "max": 1.0}},
-    }
+    tree = linkage(
+        {name: {**bar, "length": 0.25 / 1.06**k} for k, name in enumerate(names)},
+        {name: {"type": "fixed", "base": "ground", "follower": f"{name}.start"} for name in names},
+        sections={"flat": {"shape": "rectangle", "width": 0.02, "height": 0.004}},
+        materials={"al": {"youngs_modulus": 70e9, "density": 2700.0}},
+        bodies={"tip": {"at": f"{names[-1]}.end", "mass": 0.0}},
+    ) | {"design": {"y": {"parameter": "bodies.tip.mass", "min": 0.0, "max": 1.0}}}
     return model_of(tree)
 
 

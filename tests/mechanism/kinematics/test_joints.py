@@ -19,9 +19,6 @@ from eigassign.mechanism import JointEdge, Placement, all_moving, joint_motion, 
 from eigassign.modal import eigenvalues
 from eigassign.series import Samples, compile_table
 
-# --- Joints by differences: freedoms from their own motion, twists from world frames
-
-
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
 JOINTS = [
     Given(type="fixed"),
