@@ -1,31 +1,23 @@
 """The paper's arm with a limited mass, with catalogues, and with limits that contradict."""
 
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest
+from run_cases import DESIGN, TAIL, answered, changed
 
 from eigassign.case import parse
 from eigassign.pipeline import Result, solve_case
 from eigassign.study import AssignmentRow, BuiltCase
 
-TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
-HEAD, REST = TEXT.replace("samples: 152", "samples: 11").split("design: #")
-DESIGN = """\
-design:
-  m1: {parameter: bodies.elbow_mass.mass, min: 0, max: 250 g}
-  m2: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}
-"""
-TAIL = "\nexpansion: {order: 2, q: [1.817, 5.312], y: auto, modes: [1]}\ntargets:\n"
+HEAD = changed(("samples: 152", "samples: 11")).split("design: #")[0]
 HELD = HEAD.replace("{joint: shoulder}", "{joint: shoulder, drive: {stiffness: 2e4}}").replace(
     "{joint: elbow, angle: absolute}", "{joint: elbow, angle: absolute, drive: {stiffness: 2e4}}"
 )
 
 
 def solved(design: str, targets: str, head: str = HEAD) -> tuple[Result, AssignmentRow]:
-    result = solve_case(BuiltCase(parse((head + design + TAIL + targets).encode(), "case.yaml")))
-    return result, result.results.assignment
+    return answered(head + design + TAIL + targets)
 
 
 def test_a_limit_of_the_mass_holds_and_is_named_where_it_binds() -> None:

@@ -180,18 +180,13 @@ MISLEADING = automatic(
 )
 
 
-def test_a_one_shot_that_is_worse_than_the_initial_design_is_not_passed_off_as_an_optimum(
+def test_a_one_shot_that_misleads_is_no_optimum_and_the_sequential_answer_is_better(
     tmp_path: Path,
 ) -> None:
     results = solved(tmp_path, MISLEADING + ONE_SHOT).results
     assert results.error.exact.rms_relative > results.error.initial.rms_relative
     assert results.assignment.verdict == "do_not_use"
     assert results.shortcoming is not None
-
-
-def test_where_the_one_shot_misleads_the_sequential_answer_is_better_than_the_start(
-    tmp_path: Path,
-) -> None:
     results = solved(tmp_path, MISLEADING).results
     error = results.error
     assert error.exact.rms_relative < error.initial.rms_relative < error.one_shot.rms_relative

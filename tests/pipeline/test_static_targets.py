@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from run_cases import answered
 
 from eigassign import load_case
 from eigassign.assignment import design_limits
@@ -37,9 +38,7 @@ AT = "at: forearm.end, direction: [0, 1]"
 
 
 def solved(targets: str, design: str = GEARS, head: str = LEVEL) -> tuple[Result, AssignmentRow]:
-    text = f"{head}{design}targets:\n{targets}"
-    result = solve_case(BuiltCase(parse(text.encode(), "case.yaml")))
-    return result, result.results.assignment
+    return answered(f"{head}{design}targets:\n{targets}")
 
 
 @cache

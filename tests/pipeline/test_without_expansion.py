@@ -89,10 +89,10 @@ def test_an_expansion_point_that_cannot_follow_the_path_ends_nothing(tmp_path: P
     """The middle of the bounds is too long an arm and too short a one to reach the path."""
     text = between((CASES / "arm_lengths.yaml").read_text(), "expansion:", "targets:", ONCE)
     text = changed(
-        text,
         ("samples: 101", "samples: 11"),
         ("min: 580 mm, max: 610 mm", "min: 580 mm, max: 1000 mm"),
         ("min: 440 mm, max: 480 mm", "min: 100 mm, max: 480 mm"),
+        text=text,
     )
     result = solved(tmp_path, text)
     assert result.assignment is None
