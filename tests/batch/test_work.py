@@ -10,14 +10,7 @@ from pathlib import Path
 import pytest
 import scipy.sparse.linalg
 
-from eigassign.batch import (
-    Batch,
-    CaseOptions,
-    plan_of,
-    run,
-    run_case,
-    this_machine,
-)
+from eigassign.batch import Batch, CaseOptions, plan_of, run, run_case, this_machine
 from eigassign.errors import StorageError
 from eigassign.output import CaseOutcome
 

@@ -9,14 +9,7 @@ from charts import CASES, SMALL, charted, found, rows_of
 from scipy.interpolate import RBFInterpolator
 
 from eigassign import load_case
-from eigassign.chart import (
-    EVALUATIONS,
-    ChartPoint,
-    build_subject,
-    compare_methods,
-    errors,
-    front,
-)
+from eigassign.chart import EVALUATIONS, ChartPoint, build_subject, compare_methods, errors, front
 
 
 def row(name: str, preparation: float, each: float, worst: float, curve: str = "") -> ChartPoint:

@@ -11,13 +11,7 @@ import numpy as np
 
 from eigassign import Case
 from eigassign.case import CaseFile, parse
-from eigassign.mechanism import (
-    Pencil,
-    build_link_frames,
-    build_pencil,
-    erls_motion,
-    parameters,
-)
+from eigassign.mechanism import Pencil, build_link_frames, build_pencil, erls_motion, parameters
 from eigassign.modal import eigenvalues
 
 Tree = dict[str, Any]

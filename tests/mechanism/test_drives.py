@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 from chains import bar
 from drive_oracle import exerted
-from redesigned_arms import (
-    extrapolated,
-    five_bar,
-    five_bar_in_joints,
-    six_joints,
-    two_link_lengths,
-)
+from redesigned_arms import extrapolated, five_bar, five_bar_in_joints, six_joints, two_link_lengths
 from spatial_cases import CASES, Built, built, linkage, shipped
 from spatial_oracle import Tree
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
@@ -21,12 +15,7 @@ from weight_comparison import pulled
 
 import eigassign as ea
 from eigassign.case import PointTrajectory
-from eigassign.mechanism import (
-    NamedTrajectory,
-    Trajectories,
-    build_trajectory,
-    drive_forces,
-)
+from eigassign.mechanism import NamedTrajectory, Trajectories, build_trajectory, drive_forces
 
 G = 9.81
 PULL = {"planar": "[3.0, -9.0]", "spatial": "[3.0, -2.0, -9.0]"}

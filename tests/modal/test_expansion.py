@@ -10,11 +10,7 @@ from rungs import richardson
 
 from eigassign import expand, load_case
 from eigassign.errors import UsageError
-from eigassign.modal import (
-    Expansion,
-    Model,
-    eigenvalues,
-)
+from eigassign.modal import Expansion, Model, eigenvalues
 from eigassign.modal import expand as expand_pencil
 from eigassign.series import lower_set, total_degree
 

@@ -9,13 +9,7 @@ import pytest
 from synthetic_results import as_limit, make_results
 
 from eigassign.output import CaseOutcome, Table, batch_table, print_assignment, run_tables
-from eigassign.study import (
-    CatalogueRow,
-    ClearanceRow,
-    CombinationRow,
-    ErrorRow,
-    RunResults,
-)
+from eigassign.study import CatalogueRow, ClearanceRow, CombinationRow, ErrorRow, RunResults
 
 
 def table(results: RunResults, title: str) -> Table | None:

@@ -10,12 +10,7 @@ from spatial_cases import built, linkage
 from tip_paths import chain_of, course
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism import (
-    Course,
-    TipChain,
-    follow,
-    tip_path,
-)
+from eigassign.mechanism import Course, TipChain, follow, tip_path
 
 straight, spline = (partial(tip_path, kind=kind) for kind in ("straight", "spline"))
 TAU = 2.0 * np.pi

@@ -12,11 +12,7 @@ from spatial_cases import linkage
 
 from eigassign.errors import MissingMassError
 from eigassign.mechanism import Pencil
-from eigassign.modal import (
-    modes,
-    rounding_error,
-    solve_large,
-)
+from eigassign.modal import modes, rounding_error, solve_large
 
 CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
 SAMPLES = 8

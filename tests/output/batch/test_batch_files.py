@@ -8,13 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eigassign.output import (
-    CaseOutcome,
-    from_plain,
-    index_page,
-    to_plain,
-    write_files,
-)
+from eigassign.output import CaseOutcome, from_plain, index_page, to_plain, write_files
 
 KEYS = ("body.mass", "kind")
 NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html")

@@ -15,13 +15,7 @@ from eigassign.assignment import Solved
 from eigassign.case import parse
 from eigassign.errors import LostModeError
 from eigassign.pipeline import Stages, prepare
-from eigassign.study import (
-    Scene,
-    find_answer,
-    followers,
-    response_of,
-    solve_design,
-)
+from eigassign.study import Scene, find_answer, followers, response_of, solve_design
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}

@@ -9,12 +9,7 @@ from scenes import changed, scene_of
 
 from eigassign import load_case
 from eigassign.pipeline import Options, solve_case
-from eigassign.study import (
-    Scene,
-    proved_ranges,
-    solve_design,
-    unreachable,
-)
+from eigassign.study import Scene, proved_ranges, solve_design, unreachable
 
 SHORT = ("samples: 152", "samples: 8")
 
