@@ -13,18 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from instant import MASS, Instant, batch_of, case, instant, names
+from instant import MASS, Instant, batch_of, case, instant, names, ran
+from stopping import forked
 
-from eigassign.batch import Batch, Workers, run
+from eigassign.batch import Batch, Workers
 from eigassign.errors import CaseError, StorageError
-
-
-def ran(batch: Batch, place: Workers | None = None) -> list[str]:
-    """Run it; the names of the cases that were not done before."""
-    heard: list[str] = []
-    place = place or instant(batch.folder, lambda _name: None)
-    run(batch, place, lambda _total, _done: None, lambda found: heard.append(found.name))
-    return heard
 
 
 def summary(batch: Batch) -> dict[str, str]:
@@ -176,7 +169,7 @@ def test_a_second_batch_is_refused_until_the_first_has_ended(tmp_path: Path) -> 
         with open(log, "a") as file:
             file.write(f"{name}\n")
 
-    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    other = forked(lambda: len(ran(batch, instant(batch.folder, heard, 1))) * 0)
     while not log.exists():
         time.sleep(0.01)
     with pytest.raises(StorageError, match=r"another batch is running in .*: wait for it"):
@@ -198,18 +191,7 @@ def test_a_batch_that_was_killed_is_gone_on_with(tmp_path: Path) -> None:
         if name == "mass=1.5":
             os.kill(os.getpid(), signal.SIGKILL)
 
-    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    other = forked(lambda: len(ran(batch, instant(batch.folder, heard, 1))) * 0)
     assert os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]) == -signal.SIGKILL
     done = log.read_text().split()
     assert ran(batch) == names(batch, range(21))[len(done) - 1 :]
-
-
-def _forked(job) -> int:  # type: ignore[no-untyped-def]
-    if pid := os.fork():
-        return pid
-    code = 1
-    try:
-        job()
-        code = 0
-    finally:
-        os._exit(code)

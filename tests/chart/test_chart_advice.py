@@ -10,12 +10,7 @@ import pytest
 from charts import CASES, SMALL, charted, rows_of
 
 import eigassign as ea
-from eigassign.chart import (
-    Chart,
-    advised,
-    build_subject,
-    errors,
-)
+from eigassign.chart import Chart, advised, build_subject, errors
 from eigassign.output import chart_tables, write_chart
 from eigassign.pipeline import Stages, prepare
 

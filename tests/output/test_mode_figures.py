@@ -9,12 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import eigassign as ea
-from eigassign.output import (
-    draw,
-    mode_figures,
-    render,
-    write_figures,
-)
+from eigassign.output import draw, mode_figures, render, write_figures
 from eigassign.study import ModePictures, draw_modes, with_middle_loads
 
 CASES = Path(__file__).parents[2] / "cases"

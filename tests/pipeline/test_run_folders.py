@@ -51,16 +51,6 @@ def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
         assert line in log
 
 
-def test_the_default_folder_is_named_after_the_case_below_the_current_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    little = Options(use_cache=False, figures=(), report="none")
-    outcome = optimize(written(tmp_path, chain(2), "arm.yaml"), little)
-    assert outcome.folder == Path("results/arm")
-    assert (tmp_path / "results" / "arm" / "results.json").is_file()
-
-
 def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path) -> None:
     outcome = expand_case(SHIPPED, in_folder(tmp_path / "out"))
     document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
