@@ -141,6 +141,14 @@ def number(value: float) -> str:
     return f"{float(f'{value:.4g}') + 0.0:.7g}"
 
 
+def priced(price: float, whole: bool = False) -> str:
+    """A price in words: ``12.4`` of a ``whole`` design, ``6.9 below the initial design``."""
+    size = number(abs(price))
+    if whole or size == "0":
+        return number(price) if whole else "that of the initial design"
+    return f"{size} {'below' if price < 0.0 else 'above'} the initial design"
+
+
 def percent(fraction: float) -> str:
     """Three significant digits: ``1.55 %`` for 0.0155; ``n/a`` where there is no number."""
     if not math.isfinite(fraction):

@@ -21,6 +21,7 @@ from eigassign.facts import (
     number,
     percent,
     positive_percent,
+    priced,
     verdict_word,
 )
 from eigassign.study.results import (
@@ -188,12 +189,11 @@ def _design(results: RunResults) -> Iterator[Table]:
     if constraints:
         caption = f"The constraint {', '.join(constraints)} is active."
     if price is not None:
-        what = "It" if listed else "The change"
-        caption = f"{what} costs {number(price)} in all. {caption}".strip()
+        caption = f"Price: {priced(price, listed)}. {caption}".strip()
     names = "name handy initial optimal lower upper lies_on chosen"
-    priced = " cost" * (price is not None)
+    costs = " cost" * (price is not None)
     rows = (*results.design, *filter(None, [results.mass])) if results.design else ()
-    yield facts_table("Design", rows, f"{names}{priced} parameter", caption, cost=cost)
+    yield facts_table("Design", rows, f"{names}{costs} parameter", caption, cost=cost)
     yield _combinations(results)
 
 

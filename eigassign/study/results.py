@@ -42,6 +42,7 @@ from eigassign.facts import (
     number,
     percent,
     positive_percent,
+    priced,
     told,
 )
 from eigassign.modal.adaptive_order import MARGIN
@@ -731,7 +732,7 @@ class RobustRow(Brief):
             pairs = [(f"rms error {percent(both[0] ** 0.5)}", percent(both[1] ** 0.5))]
         pairs += [(f"mass {number(self.mass_nominal)}", f"{number(self.mass)} kg")]
         if self.price is not None and self.price_nominal is not None:
-            pairs += [(f"price {number(self.price_nominal)}", number(self.price))]
+            pairs += [(f"price {number(self.price_nominal)}", priced(self.price))]
         return ", ".join(" → ".join(pair) for pair in pairs).replace("-", "−")
 
 

@@ -16,7 +16,7 @@ from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Solved
 from eigassign.brief import counted
 from eigassign.errors import LostModeError
-from eigassign.facts import capital
+from eigassign.facts import capital, priced
 from eigassign.study.checks import (
     Accuracy,
     MotionStudy,
@@ -81,6 +81,8 @@ def assignment_row(
     deviated = tuple(_deviated(answer.robust, targets, limits, largest))
     met = all(one.satisfied for one in targets) and all(row.satisfied for row in limits)
     conflict = None if met and not deviated else _decided(scene, answer)
+    costs, whole = cost(scene, answer.y), any(own.prices for own in scene.file.design.catalogues)
+    paid = None if costs is None else priced(costs, whole)
     conflicting = () if conflict is None else conflict.names
     optimality = _optimality(answer, conflict, own.bound)
     coarse, undecided = _of_mesh(scene, own, of_model, largest)
@@ -106,6 +108,7 @@ def assignment_row(
             unfinished=found.best.end.value if found is not None and found.best.end in CUT else "",
             max_error=keys.max_error,
             aim="" if aim is None else aim.words,
+            met="every target is met" if paid is None else f"every target is met, price {paid}",
             is_optimal=aim is None or first_order,
         )
     )

@@ -31,6 +31,7 @@ from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.case.units import handy
 from eigassign.errors import EigassignError
+from eigassign.facts import priced
 from eigassign.study.checks import raised_by
 from eigassign.study.design.clearance import WITHIN, check_band, lowest_room
 from eigassign.study.design.lists import cost
@@ -167,7 +168,7 @@ def aim_row(
         return _in_words(row, f"lightest design found: {row.after}", kept)
     if (paid := cost(scene, found.best.y)) is not None:
         one = "1 Hz" if aim == "highest" else "1 % of room"
-        kept += f"; its price, {paid:.4g}, counts against it, 1 as {one}"
+        kept += f"; its price, {priced(paid)}, counts against it, 1 as {one}"
     if aim == "highest":
         (asked,) = (one for one in wanted if one.is_aim)
         before, after = (_least(found, asked, y) for y in designs)

@@ -177,7 +177,7 @@ class Facts(NamedTuple):
     bounds the answer lies on;
     ``unfinished`` how a search was ended before it was done. ``max_error`` is the largest error
     accepted where the case says it. ``aim`` says what an objective that is no error has come to,
-    and ``is_optimal`` whether that is first-order optimal.
+    and ``is_optimal`` whether that is first-order optimal; ``met`` what is said without one.
     """
 
     targets: Sequence[TargetStudy]
@@ -194,6 +194,7 @@ class Facts(NamedTuple):
     unfinished: str = ""
     max_error: float | None = None
     aim: str = ""
+    met: str = "every target is met"
     is_optimal: bool = True
 
 
@@ -233,7 +234,7 @@ def _word(facts: Facts) -> tuple[str, str]:
             return "do_not_use", "; ".join(facts.unproved)
         if facts.is_optimal:
             checked = f", also for all deviations within {facts.robust}"
-            return "reached", (facts.aim or "every target is met") + checked * bool(facts.robust)
+            return "reached", (facts.aim or facts.met) + checked * bool(facts.robust)
         far = [f"{facts.aim}; a better design may be near (not first-order optimal)"]
     (before_violation, before), (violation, after) = facts.merits
     gain = IMPROVED * before
