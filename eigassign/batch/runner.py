@@ -16,16 +16,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from operator import itemgetter
 from pathlib import Path
-from typing import NoReturn
 
-from eigassign.batch.plan import BatchPlan, Variant, variant_problem
-from eigassign.batch.work import CaseOptions, check_cases, outcome_of, run_case
-from eigassign.batch.workers import Workers, run_all, this_machine
+from eigassign.batch.plan import BatchPlan, Variant
+from eigassign.batch.work import CaseOptions, faults_of, outcome_of, run_case
+from eigassign.batch.workers import Workers, run_all
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.index import write_files
 from eigassign.output.batch.summary import CaseOutcome, from_plain
@@ -33,7 +31,6 @@ from eigassign.output.store.atomic import lock
 from eigassign.output.store.run_folder import MARKER, is_whole, read_record, settle_killed
 from eigassign.pipeline.stages import Stages, silent
 
-_CHECKED = 100  # variants in a task that checks them: half a second
 _SHOWN = 10  # problems of variants
 Rows = dict[int, CaseOutcome]  # by index of the case
 
@@ -130,7 +127,7 @@ def run(
             held.enter_context(alone_in(folder))
             settle_killed(folder)
         rows = done(batch)
-        todo = require_valid(batch, rows, workers, say)
+        todo = require_valid(batch, rows, say)
         if not is_there:
             folder.mkdir(parents=True, exist_ok=True)
             held.enter_context(alone_in(folder))
@@ -156,37 +153,23 @@ def run(
     return told
 
 
-def require_valid(
-    batch: Batch, rows: Rows, workers: Workers, say: Callable[[str], None] = silent
-) -> list[int]:
-    """The cases that are not in ``rows``; raises CaseError where a variant is no valid case."""
+def require_valid(batch: Batch, rows: Rows, say: Callable[[str], None] = silent) -> list[int]:
+    """The cases that are not in ``rows``; raises CaseError where a variant is no valid case.
+
+    A check takes 1 to 3 ms, a hundredth of a run at most: no processes are made for it.
+    """
     plan, stages = batch.plan, Stages(say)
     todo = [index for index in range(len(plan)) if index not in rows]
     variants = [index for index in todo if plan.whose(index)[0].variants.keys]
-    total, checked, wrong, first = len(variants), 0, 0, list[tuple[int, Problem]]()
-    if not total:
+    if not (total := len(variants)):
         return todo
-
-    def keep(task: Sequence[Variant], found: Sequence[tuple[int, tuple[Problem, ...]]]) -> None:
-        nonlocal checked, wrong
-        checked, wrong = checked + len(task), wrong + len(found)
-        stages.advance(checked, total)
-        first.extend((index, problem) for index, problems in found for problem in problems)
-        first[:] = sorted(first, key=itemgetter(0))[:_SHOWN]
-
-    check, where = partial(check_cases, options=batch.options), this_machine(1)
+    wrong, first = 0, list[Problem]()
     with stages("check", f"checking {total} variant{'s' if total > 1 else ''}"):
-        parts = (variants[k : k + _CHECKED] for k in range(0, total, _CHECKED))
-        tasks = ([plan[index] for index in part] for part in parts)
-        run_all(workers if total > _CHECKED else where, tasks, check, keep, _lost_in_check)
+        for checked, index in enumerate(variants, 1):
+            faults = faults_of(plan, index, batch.options)
+            wrong, first = wrong + bool(faults), [*first, *faults][:_SHOWN]
+            stages.advance(checked, total)
     if wrong:
-        problems = [variant_problem(plan, *each) for each in first]
         many = f"{wrong} of {total} variants are not valid: nothing was run"
-        raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
+        raise CaseError((*first, Problem(plan.files[0].path, 0, 0, "", many)))
     return todo
-
-
-def _lost_in_check(task: Sequence[Variant]) -> NoReturn:
-    which = task[0].name if len(task) == 1 else f"{task[0].name} to {task[-1].name}"
-    what = "the process that checked it was killed, perhaps because memory ran out"
-    raise StorageError(f"{task[0].path}: {which}: {what}")

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from eigassign.batch.plan import STUDY, BatchPlan, Variant, content_of, key_of
-from eigassign.batch.variants import OPTION
+from eigassign.batch.plan import (
+    STUDY,
+    BatchPlan,
+    Variant,
+    content_of,
+    key_of,
+    variant_problem,
+)
 from eigassign.case.case_file import Unchecked, checked, read
-from eigassign.case.reader import dotted, key_path
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
 from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_folder import MARKER, read_record
@@ -48,44 +53,21 @@ class CaseOptions:
 # --- Reading and checking
 
 
-def check_cases(
-    variants: Sequence[Variant], options: CaseOptions
-) -> list[tuple[int, tuple[Problem, ...]]]:
-    """The index of every variant that is no valid case, and what is wrong with it.
+def faults_of(plan: BatchPlan, index: int, options: CaseOptions) -> tuple[Problem, ...]:
+    """What is wrong with a variant that is no valid case, where that was given; else nothing.
 
-    Raises StorageError where a file of one cannot be read.
+    Raises StorageError where a file of it cannot be read.
     """
-    found = []
-    for variant in variants:
-        try:
-            load(variant, options)
-        except CaseError as error:
-            found.append((variant.index, error.problems))
-        except StorageError:
-            raise
-        except EigassignError as error:
-            found.append((variant.index, (Problem(variant.path, 0, 0, "", str(error)),)))
-    return found
-
-
-def idle_keys(plan: BatchPlan, options: CaseOptions) -> Iterator[Problem]:
-    """Warn of swept initial values of design parameters, on which an optimum does not depend."""
-    for planned in plan.files:
-        try:
-            file, source = load(planned.variant(0, 0), options).file, _written(planned.path).source
-        except EigassignError:  # it is told of where variants are checked
-            continue
-        parameters, one_shot = file.design.parameters, file.assignment.method == "one_shot"
-        if one_shot or any(column.price for column in parameters.values()):
-            continue  # its answer depends on where it begins
-        owners = {path: k for k, column in parameters.items() for path in column.factors}
-        for key in planned.variants.keys:
-            path = dotted(key_path(source.tree, key)).removeprefix("mechanism.")
-            if name := owners.get(path):
-                why = f"this is where the design parameter {name} begins: every variant may find "
-                why += f"the same optimum; sweep design.{name}.max, or take {name} out of design"
-                where = source.problem(("sweep", "parameters", key), why)
-                yield Problem(OPTION, 0, 0, key, why) if planned.is_set else where
+    variant = plan[index]
+    try:
+        load(variant, options)
+    except StorageError:
+        raise
+    except CaseError as error:
+        return tuple(variant_problem(plan, index, each) for each in error.problems)
+    except EigassignError as error:
+        return (variant_problem(plan, index, Problem(variant.path, 0, 0, "", str(error))),)
+    return ()
 
 
 def load(variant: Variant, options: CaseOptions) -> BuiltCase:

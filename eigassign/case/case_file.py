@@ -529,7 +529,8 @@ def _with_updates(tree: Tree, named: Sequence[NamedFile]) -> Tree:
         if each.path == ("uncertain", "file"):
             body = {**entries(tree, "uncertain")}
             told = entries(read_yaml(read_bytes(each.file, CASE), each.file).tree, "uncertain")
-            tree = {**tree, "uncertain": {**told, **{k: v for k, v in body.items() if k != "file"}}}
+            own = {key: value for key, value in body.items() if key != "file" or not told}
+            tree = {**tree, "uncertain": {**told, **own}}
     return tree
 
 

@@ -44,13 +44,15 @@ class CsvColumn(NamedTuple):
     """A column to be read: numbers of one of these dimensions, or words where it has none.
 
     The first dimension is meant where the header gives no unit. ``written`` is what the header
-    calls it, `name` or `name [unit]`, where that is something else.
+    calls it, `name` or `name [unit]`, where that is something else. Where the table has the column
+    ``instead``, this one may be missing.
     """
 
     name: str
     dimensions: tuple[Dimension, ...] = ()
     optional: bool = False
     written: str = ""
+    instead: str = ""
 
 
 class CsvTable(NamedTuple):
@@ -230,20 +232,24 @@ def _headings(
             raise ValueError(f"column {shown(cell)} must read `name` or `name [unit]`")
         names.append(match.group(1))
         units.append(match.group(2) or "")
-    found = []
+    found, lacking = [], list[CsvColumn]()
     for column in columns:
         if (match := _HEADER_CELL.fullmatch(column.written or column.name)) is None:
             raise ValueError(f"column {shown(column.written)} must read `name` or `name [unit]`")
         name, unit_written = match.groups()
         if not unit_written and (column.written or name not in names):
             name, unit_written = _behind(name, names, column) or (name, unit_written)
-        if name not in names and column.optional and not column.written:
+        if name not in names and (column.optional or column.instead) and not column.written:
+            lacking += [column] * (not column.optional)
             continue
         if names.count(name) != 1:
             raise ValueError(_miscounted(column._replace(name=name), names))
         index = names.index(name)
         unit = _unit(column, unit_written or units[index]) if column.dimensions else ()
         found.append(_Heading(column.name, index, *unit))
+    for column in lacking:
+        if all(one.name != column.instead for one in found):
+            raise ValueError(_miscounted(column, names))
     return names, found
 
 

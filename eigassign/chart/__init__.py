@@ -18,7 +18,7 @@ __all__, __getattr__, __dir__ = face(
         "question": "QUICK Effort Points Subject build_subject errors",
         "results": (
             "ACCURACY EVALUATIONS Advice BoxRow Cell Chart ChartPoint Finding Front Kind Matrix "
-            "OrderRow Reach advised build_matrix machine"
+            "Reach advised build_matrix machine"
         ),
     },
 )

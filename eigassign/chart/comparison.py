@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from scipy.optimize import minimize_scalar
 
 from eigassign._version import __version__
 from eigassign.case.units import shown_point
-from eigassign.chart.methods import NO_KRIGING, Built, Method, list_meshes, list_methods
+from eigassign.chart.methods import NO_KRIGING, Built, list_meshes, list_methods
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
 from eigassign.chart.results import (
     ACCURACY,
@@ -41,20 +41,12 @@ from eigassign.chart.results import (
 from eigassign.errors import EigassignError
 from eigassign.facts import percent
 from eigassign.modal.exact.solver import rounding_error
-from eigassign.modal.exact.tracking import (
-    EXTRA,
-    FollowedShape,
-    MoreModesError,
-    follow,
-    links,
-    places,
-)
+from eigassign.modal.exact.tracking import links
 from eigassign.study.built_case import BuiltCase
 
 Floats = NDArray[np.float64]
 LEAST_S = 1e-3  # a timed run takes at least so long: a thousand times what the clock resolves
 ONCE_S, OFTEN_S = 1.0, 0.1  # a run that takes over so long is not repeated, or three times only
-SHAPED = 48  # test points at which errors by shape are taken
 
 
 def compare_methods(
@@ -70,10 +62,10 @@ def compare_methods(
     progress("solving the test points exactly")
     tests, along = subject.tested(effort), subject.along(subject.initial)
     exact, near = subject.exact(tests.x), _near_modes(subject, tests)
-    shapes = _by_shape(subject, tests) if near else np.full_like(exact, np.nan)
     made = dict[str, tuple[ChartPoint, Built, Callable[[], object]]]()
-    tasks = _tasks(subject, effort, tests, exact, shapes)
-    for k, (method, where, truth, by_shape) in enumerate(tasks, 1):
+    judged = ((method, tests, exact) for method in list_methods(subject, effort))
+    tasks = chain(judged, list_meshes(subject, effort, tests))
+    for k, (method, where, truth) in enumerate(tasks, 1):
         progress(f"{k}: {method.curve}, {method.size}")
         try:
             learnt = subject.learnt(method.learns)
@@ -87,12 +79,9 @@ def compare_methods(
         counts = f"{method.learns} points", f"{len(learnt)} points"  # few samples are no more
         size = built.size or method.size.replace(*counts)
         worst, rms, failed = errors(hz, truth)
-        shaped = None
-        if np.isfinite(by_shape).all(axis=1).any():
-            shaped = max(errors(hz, by_shape)[0], floor)
         row = ChartPoint(
             f"{method.curve}, {size}", method.curve, size, 0.0, 0.0, 0.0, max(worst, floor), rms,
-            shaped, failed, method.use,
+            failed, method.use,
         )  # fmt: skip
         made.setdefault(row.method, (row, built, partial(method.build, learnt)))
     progress("timing all in turns")
@@ -131,37 +120,6 @@ def _notes(subject: Subject) -> Iterator[str]:
         yield f"modes that meet are not sought with over {SOUGHT_DOF} degrees of freedom"
 
 
-def _tasks(
-    subject: Subject, effort: Effort, tests: Points, exact: Floats, shapes: Floats
-) -> Iterator[tuple[Method, Points, Floats, Floats]]:
-    """Each method with its test points, what is exact there, and that of modes of one shape."""
-    for method in list_methods(subject, effort):
-        yield method, tests, exact, shapes
-    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
-    meshes, limit = list_meshes(subject, effort, few)
-    for method in meshes:
-        yield method, few, limit, np.full_like(limit, np.nan)
-
-
-def _by_shape(subject: Subject, tests: Points) -> Floats:
-    """Frequencies (n, n_modes) of one shape, that where neighbours are farthest; NaN where lost."""
-    pencil, highest = subject.model.pencil, max(subject.modes)
-    hz = np.full((len(tests), len(subject.modes)), np.nan)
-    if pencil.n_dof > SOUGHT_DOF:
-        return hz
-    lowest = subject.exact(tests.x, min(highest + 1, len(pencil.elastic)))
-    apart = np.nan_to_num(np.min(np.diff(lowest, axis=1) / lowest[:, :-1], axis=1), nan=-1.0)
-    (start,) = places(pencil, tests.x[[int(apart.argmax())]], highest, EXTRA)
-    for k in np.unique(np.linspace(0, len(tests) - 1, SHAPED).astype(int)):
-        with suppress(EigassignError, MoreModesError):
-            there = places(pencil, tests.x[k : k + 1], highest, EXTRA)
-            for column, mode in enumerate(subject.modes):
-                one = FollowedShape(start, 1.0 * (np.arange(1, len(start.lam) + 1) == mode))
-                found = follow(pencil, one, there)[0]
-                hz[k, column] = np.nan if found.is_shared else np.sqrt(found.lam) / (2.0 * np.pi)
-    return hz
-
-
 # --- Error against the size of the box: points drawn towards x0, x0 + h (x − x0)
 
 HALF_WIDTHS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -189,10 +147,8 @@ def study_boxes(
                 made[f"{fit.curve}, {fit.size}"] = fit.build(learnt)
         exact = subject.exact(points.x)
         for method, one in made.items():
-            error, claimed = errors(asked(one.answer, points, exact), exact)[0], None
-            if one.claimed is not None:
-                claimed = errors(1.0 + asked(one.claimed, points, exact), exact * 0.0 + 1.0)[0]
-            yield BoxRow(method, name, h, max(error, floor), claimed)
+            error = errors(asked(one.answer, points, exact), exact)[0]
+            yield BoxRow(method, name, h, max(error, floor))
 
 
 def _drawn(subject: Subject, points: Points, widths: Floats) -> Points:

@@ -34,8 +34,7 @@ from eigassign.study.pictures import spread_samples
 
 Floats = NDArray[np.float64]
 Answer = Callable[[Points], Floats]  # Hz (n, n_modes)
-Fits = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats] | None]  # as `Built` has both
-Fit = Callable[[Floats, Floats], Fits]  # of inputs (n, n_u) and Hz (n, n_modes)
+Fit = Callable[[Floats, Floats], Callable[[Floats], Floats]]  # of inputs (n, n_u), Hz (n, n_modes)
 NO_KRIGING = "Kriging needs scikit-learn: pip install 'eigassign[chart]'"
 FEW = 3  # points of series about several
 SCIPY_DOF = 1500  # beyond which its dense solver is not tried
@@ -43,10 +42,9 @@ SCIPY_DOF = 1500  # beyond which its dense solver is not tried
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A method that is ready: its answers, and what it says of their relative error, if so."""
+    """A method that is ready: its answers."""
 
     answer: Answer
-    claimed: Answer | None = None
     size: str = ""  # where that is known only now
 
 
@@ -98,7 +96,7 @@ def list_methods(subject: Subject, effort: Effort) -> Iterator[Method]:
             yield Method(Kind.SURFACE, f"degree {degree}", build, max(2 * terms, 12))
     for curve, fit, counts in (
         # RBFInterpolator as it is: thin plate splines
-        (Kind.RADIAL, lambda u, hz: (RBFInterpolator(u, hz), None), effort.learnt),
+        (Kind.RADIAL, RBFInterpolator, effort.learnt),
         (Kind.KRIGING, _kriged, effort.kriged if find_spec("sklearn") else ()),
     ):
         for count in counts:
@@ -148,10 +146,7 @@ def _expanded(subject: Subject, order: int, linear: bool, count: int, _: Points)
     pencil, modes = subject.model.pencil, subject.modes
     parts = tuple(expand(pencil, *at, modes, order, linear) for at in about)
     made = NearestExpansion(parts) if count > 1 else parts[0]
-    return Built(
-        lambda points: made.frequencies(*subject.split(points.x)),
-        lambda points: parts[0].last_degree_share(*subject.split(points.x)),
-    )
+    return Built(lambda points: made.frequencies(*subject.split(points.x)))
 
 
 def _reduced(subject: Subject, count: int, half: int, _: Points) -> Built:
@@ -193,18 +188,11 @@ def _fitted(subject: Subject, fit: Fit, learnt: Points) -> Built:
     _, s, Vt = np.linalg.svd((x - middle) / width, full_matrices=False)
     kept = s > 1e-6 * s[0]
     turned = Vt[kept].T / s[kept] * np.sqrt(len(x))
-    answer, claimed = fit((x - middle) / width @ turned, hz[known])
-
-    def inputs(points: Points) -> Floats:
-        return np.asarray((points.x - middle) / width @ turned)
-
-    return Built(
-        lambda points: answer(inputs(points)),
-        claimed and (lambda points: claimed(inputs(points))),
-    )
+    answer = fit((x - middle) / width @ turned, hz[known])
+    return Built(lambda points: answer((points.x - middle) / width @ turned))
 
 
-def _polynomials(degree: int, u: Floats, hz: Floats) -> Fits:
+def _polynomials(degree: int, u: Floats, hz: Floats) -> Callable[[Floats], Floats]:
     """Polynomials of all terms up to a degree, by least squares."""
     powers = total_degree(u.shape[1], degree).indices
 
@@ -213,10 +201,10 @@ def _polynomials(degree: int, u: Floats, hz: Floats) -> Fits:
 
     mean = hz.mean(axis=0)  # which too few points would not give
     coefficients = lstsq(terms(u), hz - mean)[0]
-    return lambda at: np.asarray(mean + terms(at) @ coefficients), None
+    return lambda at: np.asarray(mean + terms(at) @ coefficients)
 
 
-def _kriged(u: Floats, hz: Floats) -> Fits:
+def _kriged(u: Floats, hz: Floats) -> Callable[[Floats], Floats]:
     """scikit-learn's Gaussian process with a length for each input, found by likelihood."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
@@ -227,24 +215,21 @@ def _kriged(u: Floats, hz: Floats) -> Fits:
     )
     with warnings.catch_warnings(action="ignore"):  # of lengths at the ends of their range
         process.fit(u, hz)
-
-    def answer(claimed: bool, at: Floats) -> Floats:
-        with warnings.catch_warnings(action="ignore"):  # of variances below 0
-            both = process.predict(at, return_std=True)
-        found, off = (np.reshape(each, (len(at), -1)) for each in both)
-        return np.asarray(off / found if claimed else found)
-
-    return partial(answer, False), partial(answer, True)
+    return lambda at: np.reshape(process.predict(at), (len(at), -1))
 
 
 # --- The mesh itself
 
 
-def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Method], Floats]:
+def list_meshes(
+    subject: Subject, effort: Effort, tests: Points
+) -> Iterator[tuple[Method, Points, Floats]]:
     """The case with 1, 2, 4, … elements in every beam, as large as is solved, and as it is.
 
-    And their limit f + (f − f_coarser)/15 at ``few`` points, for errors fall like h⁴ when halved.
+    Each with a few of the test points, and Hz (n, n_modes) of the limit of all there:
+    f + (f − f_coarser)/15, for errors fall like h⁴ when halved.
     """
+    few = tests[np.unique(np.linspace(0, len(tests) - 1, 16).astype(int))]
     coarsest, hz = refined(subject.file, 1e-9)[0], list[Floats]()  # a beam keeps one
     meshes = list[Method]()
     for count in effort.elements:
@@ -256,7 +241,6 @@ def list_meshes(subject: Subject, effort: Effort, few: Points) -> tuple[list[Met
         hz.append(finer.exact(few.x))
         size, use = f"{count} element{'s' * (count > 1)} a link", f"elements: {count}"
         meshes.append(Method(Kind.MESH, size, partial(_solved, finer), use=use))
-    if len(hz) < 2:
-        return [], np.empty(0)
-    meshes.append(Method(Kind.MESH, "as in the case", partial(_solved, subject)))
-    return meshes, hz[-1] + (hz[-1] - hz[-2]) / 15.0
+    if len(hz) > 1:
+        meshes.append(Method(Kind.MESH, "as in the case", partial(_solved, subject)))
+        yield from ((mesh, few, hz[-1] + (hz[-1] - hz[-2]) / 15.0) for mesh in meshes)

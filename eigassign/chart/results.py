@@ -20,12 +20,11 @@ from eigassign._version import __version__
 from eigassign.facts import Fact, Seconds, Share, percent, time_in_words
 from eigassign.study.results import CaseRow
 
-SCHEMA = 8  # of chart.json
+SCHEMA = 9  # of chart.json
 EVALUATIONS = (1, 100, 10_000)  # trajectories over which a preparation is spread
 ACCURACY = 1e-2  # wanted of a frequency, where nothing is said
 UNFOLLOWED = ("straight or folded arm", "path not followed")  # findings, and charts at rest
 ALIKE = 1.25  # times that differ by less are alike: a busy machine's spread
-ALIKE_DESIGNS = 1e-4  # of the bounds: the search ends within 1e-6
 EQUAL = 100  # trajectories over which preparations are spread where cases are compared
 Time = Annotated[Seconds, Fact(digits=time_in_words, says_unit=True)]
 
@@ -38,7 +37,6 @@ def off(error: float) -> str:
 RelativeError = Annotated[
     Share, Fact(may_lack=True, digits=lambda e: percent(e) if np.isfinite(e) else "no number")
 ]
-ErrorIfAny = Annotated[RelativeError | None, Fact(absent="")]
 TinyIfAny = Annotated[float | None, Fact(digits=lambda v: f"{v:.1e}" if v else "0", absent="")]
 
 
@@ -81,7 +79,6 @@ class ChartPoint:
     spread_s: Annotated[Seconds, Fact("median of the repeats above their least", "spread")]
     worst_relative: Annotated[RelativeError, Fact("at the test points", "worst error")]
     rms_relative: Annotated[RelativeError, Fact(heading="rms error")]
-    worst_by_shape: Annotated[ErrorIfAny, Fact("against the mode of its shape", "worst by shape")]
     failed: Annotated[int, Fact("test points without a number", digits=lambda n: str(n or ""))]
     use: Annotated[str, Fact("the call or key that asks for it", "how")] = ""
 
@@ -106,7 +103,6 @@ class BoxRow:
     varied: Annotated[str, Fact("q, y, or q and y")]
     half_width: Annotated[float, Fact("of the case's own ranges; 1: all of them", digits="g")]
     worst_relative: Annotated[RelativeError, Fact(heading="worst error")]
-    claimed: Annotated[ErrorIfAny, Fact("what the method says of its own error, at worst")]
 
 
 @dataclass(frozen=True)
@@ -139,15 +135,6 @@ class Advice:
     question: str
     words: Annotated[str, Fact("what to write, and the consequence", "write")]
     key: Annotated[str | None, Fact("of the case file", absent="")] = None
-
-
-@dataclass(frozen=True)
-class OrderRow:
-    """`optimize` with an expansion of this order."""
-
-    order: int
-    moved: Annotated[TinyIfAny, Fact("the design, from the highest order's, of the bounds")]
-    one_shot: Annotated[ErrorIfAny, Fact("the one shot's worst error")]
 
 
 @dataclass(frozen=True)
@@ -185,7 +172,6 @@ class Chart:
     reach: tuple[Reach, ...]
     findings: tuple[Finding, ...]
     advice: tuple[Advice, ...] = ()
-    orders: tuple[OrderRow, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     seconds: Annotated[Seconds, Fact("that the chart took")] = 0.0
@@ -267,9 +253,9 @@ class Matrix:
 # --- What to write
 
 
-def advised(chart: Chart, orders: Sequence[OrderRow] = ()) -> Chart:
-    """The chart with what to write; ``orders`` is what `optimize` makes of each order."""
-    return replace(chart, orders=tuple(orders), advice=tuple(_advise(chart, orders)))
+def advised(chart: Chart) -> Chart:
+    """The chart with what to write."""
+    return replace(chart, advice=tuple(_advise(chart)))
 
 
 def _far(reach: Reach, names: Sequence[str]) -> str:
@@ -279,24 +265,8 @@ def _far(reach: Reach, names: Sequence[str]) -> str:
     return f"{reach.half_width:.2g} of {of[reach.varied]}"
 
 
-def _advise(chart: Chart, orders: Sequence[OrderRow]) -> Iterator[Advice]:
+def _advise(chart: Chart) -> Iterator[Advice]:
     accuracy, n = chart.asked.accuracy, EVALUATIONS[-1]
-    if orders:
-        moved = max((row.moved for row in orders if row.moved is not None), default=0.0)
-        shots = {str(o.order): percent(o.one_shot) for o in orders if o.one_shot is not None}
-        names = "orders " + ", ".join(str(row.order) for row in orders)
-        same = f"to {moved:.0e} of the bounds" if moved > 1e-12 else "to the last digit"
-        words = f"nothing: the design is the same {same} for {names}, since the search solves "
-        words += "exactly"
-        if moved > ALIKE_DESIGNS:
-            words = f"the order counts: the design differs by up to {moved:.1g} of the bounds "
-            words += f"among {names}"
-        if shots:
-            words += (
-                f"; the one shot misses its targets by {', '.join(shots.values())} with orders "
-            )
-            words += ", ".join(shots)
-        yield Advice("a design (`optimize`)", words)
     able = [p for p in chart.points if p.worst_relative <= accuracy]
     if any(p.curve == Kind.FULL for p in chart.points):
         key, none = None, "solve exactly: no series that was charted is within"

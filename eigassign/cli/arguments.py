@@ -8,15 +8,18 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from eigassign.errors import Problem
 from eigassign.files import plain, printable
 from eigassign.process import Progress, say
+
+if TYPE_CHECKING:
+    from eigassign.pipeline.stages import Options
 
 # --- Options and arguments
 
@@ -72,7 +75,6 @@ def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tu
 
 
 PATH = click.Path(path_type=Path)
-COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)
 design = click.option(
@@ -105,12 +107,6 @@ common = several(
         help="Let cases name files outside their own folder.",
     ),
 )
-cache_dir = click.option(
-    "--cache-dir",
-    type=PATH,
-    metavar="FOLDER",
-    help="Cache folder (default: $EIGASSIGN_CACHE_DIR, else the user's cache folder).",
-)
 caching = several(
     click.option(
         "--no-cache",
@@ -121,7 +117,12 @@ caching = several(
         help="Neither read nor write the cache. $EIGASSIGN_CACHE is auto (keep what took over "
         "0.1 s to compute; the default), always or never.",
     ),
-    cache_dir,
+    click.option(
+        "--cache-dir",
+        type=PATH,
+        metavar="FOLDER",
+        help="Cache folder (default: $EIGASSIGN_CACHE_DIR, else the user's cache folder).",
+    ),
 )
 force = click.option(
     "--force",
@@ -215,6 +216,18 @@ class _Handler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         say([f"{record.levelname.lower()}: {self.format(record)}"])
+
+
+_UNASKED = {"use_cache": False, "figures": (), "report": "none", "study": "none"}
+
+
+def run_options(how: Mapping[str, Any], reporter: Reporter) -> Options:
+    """The options of the command line that are those of a run; what a command lacks it is not."""
+    from eigassign.pipeline.stages import Options
+
+    own = {field.name for field in fields(Options)}
+    given = {name: value for name, value in {**_UNASKED, **how}.items() if name in own}
+    return Options(**given, progress=reporter.stage)
 
 
 # --- stdout

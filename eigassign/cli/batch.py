@@ -66,7 +66,6 @@ def batch(
     """
     from eigassign.batch import runner
     from eigassign.batch.plan import cases_in, plan_of
-    from eigassign.batch.work import idle_keys
     from eigassign.batch.workers import this_machine
     from eigassign.brief import counted
 
@@ -77,10 +76,9 @@ def batch(
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
         workers = this_machine(jobs)
-        reporter.warn(idle_keys(plan, asked.options))
         if dry_run:
             there = runner.done(asked)
-            todo = runner.require_valid(asked, there, workers, reporter.stage)
+            todo = runner.require_valid(asked, there, reporter.stage)
             show(f"{counted(len(todo), 'case')} would run, {len(there)} are done and still current")
             return 0
 

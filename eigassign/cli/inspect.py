@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.arguments import Reporter, print_json, reporting, show
+from eigassign.cli.arguments import print_json, reporting, run_options, show
 from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
@@ -21,7 +21,6 @@ import re
 
 from eigassign.errors import StorageError, UsageError
 
-_DRAWING = ("out", "force", "figures", "allow_outside")
 LEFT_BY = ("run", "update", "batch", "chart", "charts")
 
 
@@ -54,11 +53,11 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
             try:
                 with Stages(reporter.stage)("check", f"checking {case}"):
                     answer = queries.check(case, how["allow_outside"])
-                    notes = (*answer.notes, *_sweep(case, how["allow_outside"], reporter))
+                    notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
                 answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
-                    folder = queries.draw(case, None, *(how[key] for key in _DRAWING[1:]))
+                    folder = queries.draw(case, run_options(how, reporter))
                     reporter.note(f"{folder}/figures written")
             except EigassignError as error:
                 codes.append(process.report(error))
@@ -75,20 +74,18 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     return max(codes)
 
 
-def _sweep(case: Path, allow_outside: bool, reporter: Reporter) -> list[str]:
+def _sweep(case: Path, allow_outside: bool) -> list[str]:
     """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
-    from eigassign.batch.plan import plan_of, variant_problem
-    from eigassign.batch.work import CaseOptions, check_cases, idle_keys
+    from eigassign.batch.plan import plan_of
+    from eigassign.batch.work import CaseOptions, faults_of
 
     plan = plan_of([case])
     if not plan.is_swept:
         return []
     count = min(len(plan), 100)  # half a second
-    first = [plan[k] for k in range(count)]
-    if wrong := check_cases(first, CaseOptions("", allow_outside=allow_outside)):
-        found = [(index, problem) for index, problems in wrong for problem in problems]
-        raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
-    reporter.warn(idle_keys(plan, CaseOptions("", allow_outside=allow_outside)))
+    options = CaseOptions("", allow_outside=allow_outside)
+    if wrong := [each for k in range(count) for each in faults_of(plan, k, options)]:
+        raise CaseError(tuple(wrong[:10]))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
     return [f"sweep: {len(plan)} variants, {seen}: eigassign batch {quoted(case)} --dry-run"]
 
@@ -153,7 +150,7 @@ def modes(
     draw = draw or how["out"] is not None or given is ParameterSource.COMMANDLINE
     with reporting(how) as reporter:
         if draw:
-            answer, folder = queries.draw_modes(case, q, y, count, *(how[key] for key in _DRAWING))
+            answer, folder = queries.draw_modes(case, run_options(how, reporter), q, y, count)
         else:
             answer = queries.modes(case, q, y, count, how["allow_outside"])
         reporter.warn(answer.warnings)

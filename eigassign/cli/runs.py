@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.arguments import Reporter, print_json, reporting, show
+from eigassign.cli.arguments import print_json, reporting, run_options, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
@@ -59,7 +58,6 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 )
 @arguments.case
 @click.option("--order", type=click.IntRange(1, 20), help="Order (default: that of the case).")
-@click.option("--linear", is_flag=True, help="Only terms that are linear in the design.")
 @click.option(
     "--mode",
     "modes",
@@ -71,9 +69,7 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 @arguments.caching
 @arguments.json
 @arguments.common
-def expand(
-    case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
-) -> int:
+def expand(case: Path, order: int | None, modes: tuple[int, ...], as_json: bool, **how: Any) -> int:
     """Write the Taylor expansion of eigenvalues, and its accuracy.
 
     The expansion is in the coordinates q and the design y. Its coefficients are in
@@ -82,7 +78,7 @@ def expand(
     from eigassign.pipeline import run
 
     def expanded(path: Path, options: Options) -> Outcome:
-        return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
+        return run.expand_case(path, options, order=order, modes=modes or None)
 
     return _finished(expanded, case, as_json, how)
 
@@ -139,7 +135,7 @@ def _finished(
     from eigassign.output.console import print_assignment
 
     with reporting(how) as reporter:
-        outcome = work(case, _options(how, reporter))
+        outcome = work(case, run_options(how, reporter))
         results = outcome.results
         reporter.warn(results.warnings)
     told = partial(print_assignment, results, verbose=how["verbose"] > 0)
@@ -151,18 +147,6 @@ def _finished(
         reporter.error(f"interrupted: the best design so far is in {outcome.folder}; {kept}")
         return process.INTERRUPTED
     return 0 if results.shortcoming is None else 1
-
-
-_UNASKED = {"use_cache": False, "figures": (), "report": "none", "study": "none"}
-
-
-def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
-    """The options of the command line that are those of a run; what a command lacks it is not."""
-    from eigassign.pipeline.run import Options
-
-    own = {field.name for field in fields(Options)}
-    given = {name: value for name, value in {**_UNASKED, **how}.items() if name in own}
-    return Options(**given, progress=reporter.stage)
 
 
 def _show(
@@ -202,7 +186,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     from eigassign.pipeline import studies as updating
 
     with reporting(how) as reporter:
-        done = updating.update(case, _options(how, reporter))
+        done = updating.update(case, run_options(how, reporter))
         results = done.results
         reporter.warn(results.warnings)
 
@@ -253,21 +237,14 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **how: Any)
 @click.command(
     epilog=arguments.examples(
         "eigassign validate cases/two_link.yaml",
-        "eigassign validate cases --junit validation.xml",
         "eigassign validate cases --json",
     )
 )
 @click.argument("cases", nargs=-1, type=arguments.PATH)
-@click.option(
-    "--junit",
-    type=arguments.PATH,
-    metavar="FILE",
-    help="Also write the results in JUnit format, for CI servers (default: no file).",
-)
 @arguments.caching
 @arguments.json
 @arguments.common
-def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: Any) -> int:
+def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     """Compare the expansion with exact frequencies.
 
     Compares the full expansion, and the one that is linear in the design, along the trajectory,
@@ -275,30 +252,22 @@ def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: 
     the case files in ./cases. Exit code 1 if an error is above validation.max_error of the case.
     """
     from eigassign.batch.plan import cases_in
-    from eigassign.output.batch.summary import junit_xml
-    from eigassign.output.store.atomic import replace_synced
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
     failures: list[dict[str, object]] = []
-    tests: list[tuple[str, str, float, str, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
         for case in cases_in(cases):
             try:
-                answer = run.validate(case, _options(how, reporter))
+                answer = run.validate(case, run_options(how, reporter))
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
-                text = process.failure_of(error).text
-                tests.append((case.stem, str(case), 0.0, "error", text, ""))
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
             codes.append(0 if answer.passed else 1)
-            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows), ""))
-        if junit:
-            replace_synced(junit, junit_xml(tests))
     if as_json:
         print_json([*rows, *failures])
     else:
@@ -309,19 +278,6 @@ def validate(cases: tuple[Path, ...], junit: Path | None, as_json: bool, **how: 
         brief = table if how["verbose"] else table.without("points").without("order")
         print_tables([brief] if rows else ())
     return max(codes)
-
-
-def _judged(rows: Sequence[ValidationRow]) -> tuple[str, str]:
-    """The status of a validated case, and why it is not ok."""
-    from eigassign.facts import percent
-
-    reasons = [
-        f"mode {row.mode}, {row.where}: {percent(row.worst_taylor)} from exact, with the design "
-        f"linearised {percent(row.worst_linearised)}; accepted are {percent(row.limit)}"
-        for row in rows
-        if not row.passed
-    ]
-    return "tolerance" if reasons else "ok", "\n".join(reasons)
 
 
 @click.command(
@@ -361,7 +317,7 @@ def chart(
     several = len(cases) > 1 or cases[0].is_dir()
     paths = cases_in(cases) if several else cases
     with reporting(how) as reporter:
-        options = _options(how, reporter)
+        options = run_options(how, reporter)
         made: Chart | Matrix
         if several:
             folder, made = charting.chart_cases(paths, options, effort, accuracy)

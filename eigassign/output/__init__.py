@@ -28,7 +28,7 @@ __all__, __getattr__, __dir__ = face(
         "figures.run": "run_figures",
         "figures.screen": "screen_figure",
         "reports.chart": "chart_figures chart_tables write_chart",
-        "reports.page": "page verdict_of write_modes write_run",
+        "reports.page": "page verdict_of write_figures write_run",
         "documents": "NUMBERS results_document to_json",
         "result_files": "sample_files",
         "store.cache": "Cache content_key default_directory",

@@ -9,7 +9,6 @@ import textwrap
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
-from typing import TextIO
 
 from eigassign.files import printable
 from eigassign.output.tables import Table, headline, helps, run_tables, tone_of
@@ -47,54 +46,50 @@ def _words(line: str, room: int, indent: str = "", fold: bool = False) -> list[s
     )
 
 
-def print_assignment(
-    results: RunResults, *, verbose: bool = False, stream: TextIO | None = None
-) -> None:
+def print_assignment(results: RunResults, *, verbose: bool = False) -> None:
     """The verdict, the design, what was asked, what would help; ``verbose``: every table."""
     if (line := headline(results)) is not None:
-        print_verdict(line, tone_of(results), stream=stream)
+        print_verdict(line, tone_of(results))
     brief = not verbose and results.assignment is not None
-    print_tables(run_tables(results, brief), stream=stream)
+    print_tables(run_tables(results, brief))
     if lines := [*helps(results)]:
-        out = sys.stdout if stream is None else stream
-        _write(out, [_styled("What would help", "1", out), *wrapped(lines, width())])
+        _write([_styled("What would help", "1"), *wrapped(lines, width())])
 
 
-def print_verdict(line: str, verdict: str = "", *, stream: TextIO | None = None) -> None:
+def print_verdict(line: str, verdict: str = "") -> None:
     """The first sentence of a result, in the colour of its verdict, or of what it begins with."""
-    out = sys.stdout if stream is None else stream
     colour = _colour(verdict or line.partition(":")[0])
-    _write(out, [_styled(text, colour, out) for text in _words(printable(line), width())])
+    _write(_styled(text, colour) for text in _words(printable(line), width()))
 
 
-def print_tables(shown: Iterable[Table], *, stream: TextIO | None = None) -> None:
+def print_tables(shown: Iterable[Table]) -> None:
     """Tables of finished text, one below the other.
 
     Where a table is wider than the terminal, text goes on in the next line, and columns that still
     find no room follow in a table below, behind the first.
     """
-    out, room = sys.stdout if stream is None else stream, width()
+    room = width()
     for table in shown:
-        lines = [_styled(printable(table.title), "1", out)] if table.title else []
-        lines += _drawn(table, room, out)
-        _write(out, [*lines, *_words(printable(table.caption), room)])
+        lines = [_styled(printable(table.title), "1")] if table.title else []
+        lines += _drawn(table, room)
+        _write([*lines, *_words(printable(table.caption), room)])
 
 
-def _write(out: TextIO, lines: Iterable[str]) -> None:
-    """Lines and an empty one; what the character set of ``out`` lacks is ``?``, not an error."""
+def _write(lines: Iterable[str]) -> None:
+    """Lines and an empty one; what the character set of stdout lacks is ``?``, not an error."""
     text = "".join(f"{line.rstrip()}\n" for line in (*lines, ""))
-    encoding = out.encoding or "utf-8"
-    out.write(text.encode(encoding, "replace").decode(encoding))
+    encoding = sys.stdout.encoding or "utf-8"
+    sys.stdout.write(text.encode(encoding, "replace").decode(encoding))
 
 
-def _styled(text: str, style: str, out: TextIO) -> str:
+def _styled(text: str, style: str) -> str:
     """The text in a style of a terminal that shows colours; not where NO_COLOR is set."""
     dull = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    shows = out.isatty() and not dull
+    shows = sys.stdout.isatty() and not dull
     return f"\x1b[{style}m{text}\x1b[0m" if style and shows else text
 
 
-def _drawn(table: Table, room: int, out: TextIO) -> Iterator[str]:
+def _drawn(table: Table, room: int) -> Iterator[str]:
     """A table in lines: columns in groups that fit, each behind those that name rows."""
     rows = [[printable(cell) for cell in row] for row in table.rows]
     cells = [[row[k] for row in rows] for k in range(len(table.columns))]
@@ -122,15 +117,15 @@ def _drawn(table: Table, room: int, out: TextIO) -> Iterator[str]:
         for k in sorted(group, key=lambda k: table.numeric[k]):  # texts first
             more = min(left, full[k] - least[k])
             wide[k], left = wide[k] + more, left - more
-        yield from _row([table.columns[k] for k in group], group, wide, table.numeric, "1", out)
+        yield from _row([table.columns[k] for k in group], group, wide, table.numeric, "1")
         yield "─" * (sum(wide.values()) + _GAP * (len(wide) - 1))
         for row in rows:
-            yield from _row([row[k] for k in group], group, wide, table.numeric, "", out)
+            yield from _row([row[k] for k in group], group, wide, table.numeric, "")
 
 
 def _row(
     row: Sequence[str], group: Sequence[int], wide: dict[int, int], numeric: Sequence[bool],
-    style: str, out: TextIO,
+    style: str,
 ) -> Iterator[str]:  # fmt: skip
     """The lines of a row; numbers stand to the right of their column, but for the first one."""
     texts = [_words(cell, wide[k], fold=True) for cell, k in zip(row, group, strict=True)]
@@ -138,7 +133,7 @@ def _row(
         parts = []
         for cell, text, k in zip(row, line, group, strict=True):
             blanks = " " * (wide[k] - _size(text))
-            shown = _styled(text, style or _colour(cell), out) if text else ""
+            shown = _styled(text, style or _colour(cell)) if text else ""
             parts.append(f"{blanks}{shown}" if k and numeric[k] else f"{shown}{blanks}")
         yield (" " * _GAP).join(parts)
 

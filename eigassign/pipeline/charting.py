@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from eigassign.chart.comparison import compare_methods
 from eigassign.chart.question import Effort
-from eigassign.chart.results import ACCURACY, Chart, Matrix, OrderRow, advised, build_matrix
+from eigassign.chart.results import ACCURACY, Chart, Matrix, advised, build_matrix
 from eigassign.errors import EigassignError, UsageError
 from eigassign.output.reports.chart import write_chart
 from eigassign.output.store.run_folder import run_folder
-from eigassign.pipeline.run import DEFAULT, Options, solve_case
+from eigassign.pipeline.run import Options
 from eigassign.pipeline.stages import Stages, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
-
-TRIED = (1, 2, 4, 8)  # orders of which optimize is asked
-SOLVED_DOF = 400  # up to which it is
 
 
 def chart(
@@ -46,37 +43,13 @@ def chart_case(
         asked = case.file.expansion
         given = asked.accuracy if "accuracy" in asked.model_fields_set else ACCURACY
         made = compare_methods(case, effort, accuracy or given, stages.tell)
-        orders = list(_orders(case, made, stages))
-    return replace(advised(made, orders), seconds=stages.total_s)
-
-
-def _orders(case: BuiltCase, made: Chart, stages: Stages) -> Iterator[OrderRow]:
-    """What `optimize` makes of the orders, where something is asked of a model of modest size."""
-    file = case.file
-    if not (file.has_question and file.design.parameters and made.asked.n_dof <= SOLVED_DOF):
-        return
-    found = dict[int, tuple[dict[str, float], float | None]]()
-    for order in (p for p in TRIED if any(each.size == f"order {p}" for each in made.points)):
-        stages.tell(f"optimizing with order {order}")
-        expansion = file.expansion.model_copy(update={"order": order})
-        try:
-            quiet = replace(DEFAULT, use_cache=False, report="none", study="none")
-            result = solve_case(BuiltCase(replace(file, expansion=expansion)), quiet)
-        except EigassignError:
-            continue
-        shot = result.results.error.one_shot if result.results.error else None
-        found[order] = dict(result.design), shot.max_relative if shot else None
-    width = {k: (p.max - p.min) or 1.0 for k, p in file.design.parameters.items()}
-    last = next(reversed(found.values()), ({}, None))[0]
-    for order, (design, off) in found.items():
-        moved = max((abs(design[k] - last[k]) / width[k] for k in last), default=0.0)
-        yield OrderRow(order, moved, off)
+    return replace(advised(made), seconds=stages.total_s)
 
 
 def chart_cases(
     paths: Sequence[Path], options: Options, effort: Effort, accuracy: float | None = None
 ) -> tuple[Path, Matrix]:
-    """Scenes × methods in one folder: matrix.json, matrix.csv, report.html, heat maps.
+    """Scenes × methods in one folder: matrix.json, report.html.
 
     A case that cannot be charted is told with the reason, and does not stop the others.
     """

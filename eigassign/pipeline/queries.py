@@ -26,7 +26,7 @@ from eigassign.modal.exact.solver import rounding_error
 from eigassign.output.figures import mechanism
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.reports import page as report
-from eigassign.pipeline.stages import new_run_folder
+from eigassign.pipeline.stages import DEFAULT, Options, new_run_folder
 from eigassign.study import pictures as drawing
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import GIVEN, judged_mesh, mesh_lines, study_weight, truncation_lines
@@ -125,26 +125,19 @@ def _with_modes(case: BuiltCase, count: int | None) -> tuple[BuiltCase, int]:
 
 
 def draw_modes(
-    path: str | Path,
-    q: Sequence[float] | str | None = None,
-    y: Sequence[float] | str | None = None,
-    count: int | None = None,
-    out: Path | None = None,
-    force: bool = False,
-    formats: Sequence[str] = ("png",),
-    allow_outside: bool = False,
+    path: str | Path, options: Options, q: str | None, y: str | None, count: int | None
 ) -> tuple[ModesAnswer, Path]:
-    """`modes`, and a folder with a figure of each: ``out``, or results/<case>_modes.
+    """`modes`, and a folder with a figure of each, usually results/<case>_modes.
 
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
-    case = load_case(path, allow_outside)
+    case = load_case(path, options.allow_outside)
     at_q, at_y = pose_and_design(case, q, y)
     case, count = _with_modes(case, count)
-    with new_run_folder(case.file, out, force, "_modes") as folder:
+    with new_run_folder(case.file, options.out, options.force, "_modes") as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
-        report.write_modes(pictures, folder.hidden, formats)
+        report.write_figures(mechanism.mode_figures(pictures), folder.hidden, options.figures)
     return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), folder.path
 
 
@@ -304,20 +297,14 @@ def _doubts(case: BuiltCase, asked: Sequence[Requirement], q: Floats | None) -> 
 # --- The mechanism alone, in a picture
 
 
-def draw(
-    path: str | Path,
-    out: Path | None = None,
-    force: bool = False,
-    formats: Sequence[str] = ("png",),
-    allow_outside: bool = False,
-) -> Path:
-    """`picture` in a folder: ``out``, or results/<case>_check.
+def draw(path: str | Path, options: Options = DEFAULT) -> Path:
+    """`picture` in a folder, usually results/<case>_check.
 
     Raises StorageError where the folder may not be replaced.
     """
-    case = load_case(path, allow_outside)
-    with new_run_folder(case.file, out, force, "_check") as folder:
-        report.write_figures([picture(case)], folder.hidden, formats)
+    case = load_case(path, options.allow_outside)
+    with new_run_folder(case.file, options.out, options.force, "_check") as folder:
+        report.write_figures([picture(case)], folder.hidden, options.figures)
     return folder.path
 
 

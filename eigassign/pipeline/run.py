@@ -6,7 +6,7 @@ commands ``optimize``, ``expand`` and ``validate`` do.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +30,9 @@ from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.output.store.run_folder import UNFINISHED, unfinished_beside
 from eigassign.pipeline.queries import pose_and_design
-from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder, silent
+from eigassign.pipeline.stages import DEFAULT as DEFAULT
+from eigassign.pipeline.stages import Options as Options
+from eigassign.pipeline.stages import Stages, coefficient_files, expand_plan, new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.checks import study_accuracy, truncation_lines, weight_at
 from eigassign.study.collect import between_samples, collect_results
@@ -63,21 +65,6 @@ Floats = NDArray[np.float64]
 SHOWN = 6  # modes of which a page shows the shapes
 
 
-@dataclass(frozen=True)
-class Options:
-    """Options of a run, none of which changes a number."""
-
-    out: Path | None = None  # the run folder; below results, by the case file, if None
-    cache_dir: Path | None = None  # the user's cache folder if None
-    use_cache: bool = True
-    force: bool = False  # a folder that another case wrote is moved aside
-    figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
-    report: str = "full"  # full, light or none
-    study: str = "cheap"  # of what the answer means: none, cheap or all
-    allow_outside: bool = False  # the case may name files outside its own folder
-    progress: Callable[[str], None] = silent  # called with a line as each stage begins
-
-
 @dataclass(frozen=True, repr=False)
 class Result(Pictured):
     """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target on modes, if any.
@@ -107,19 +94,15 @@ class Result(Pictured):
         return f"<Result: {design}. {tables.headline(self.results)}>"
 
     def _repr_html_(self) -> str:
-        lines, made = [tables.headline(self.results) or ""], tables.run_tables(self.results)
-        shown = [table for table in made if table.section == "requirements"]
-        return html(
-            lines, [table for table in made if table.title == "Design"] + shown, self.plan()
-        )
+        made = tables.run_tables(self.results)
+        shown = [one for one in made if one.title == "Design" or one.section == "requirements"]
+        return html([tables.headline(self.results) or ""], shown, self.plan())
 
     def plans(self) -> dict[str, FigurePlan]:
-        """The figures of the report; that of the first target along the trajectory is the first."""
+        """The figures of the report."""
         from eigassign.output.figures.run import run_figures
 
-        plans = {plan.name: plan for plan in run_figures(self.results)}
-        first = next((name for name in plans if name.startswith("assignment")), None)
-        return plans if first is None else {first: plans[first], **plans}
+        return {plan.name: plan for plan in run_figures(self.results)}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """The columns of frequencies.csv as arrays (n_t,): ``pandas.DataFrame(result.to_dict())``.
@@ -137,9 +120,6 @@ class Outcome:
     folder: Path
     results: RunResults
     seconds: float
-
-
-DEFAULT = Options()
 
 
 def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
@@ -342,12 +322,11 @@ def expand_case(
     options: Options = DEFAULT,
     order: int | None = None,
     modes: Sequence[int] | None = None,
-    linear: bool = False,
 ) -> Outcome:
     """Expansion coefficients of a case and how good they are, in a run folder.
 
-    ``order`` and ``modes`` override the case's; ``linear`` keeps the full set's coefficients out
-    of the files. The case needs neither design nor targets, and no trajectory if it gives q.
+    ``order`` and ``modes`` override the case's. The case needs neither design nor targets, and no
+    trajectory if it gives q.
     """
     stages = Stages(options.progress)
     case = load_case(path, options.allow_outside)
@@ -359,8 +338,7 @@ def expand_case(
         moving = _moving(scene, scene.initial, (), options)
         results = collect_results(scene, studies, accuracy, None, moving, stages.timing_s)
         with stages("report", "writing the report"):
-            extra = coefficient_files(scene, linear)
-            folder.write(results, options.figures, options.report, extra)
+            folder.write(results, options.figures, options.report, coefficient_files(scene))
     return Outcome(folder.path, results, stages.total_s)
 
 

@@ -50,6 +50,24 @@ def silent(_line: str) -> None:
     """No progress is shown."""
 
 
+@dataclass(frozen=True)
+class Options:
+    """Options of a run, none of which changes a number."""
+
+    out: Path | None = None  # the run folder; below results, by the case file, if None
+    cache_dir: Path | None = None  # the user's cache folder if None
+    use_cache: bool = True
+    force: bool = False  # a folder that another case wrote is moved aside
+    figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
+    report: str = "full"  # full, light or none
+    study: str = "cheap"  # of what the answer means: none, cheap or all
+    allow_outside: bool = False  # the case may name files outside its own folder
+    progress: Callable[[str], None] = silent  # called with a line as each stage begins
+
+
+DEFAULT = Options()
+
+
 class Stages:
     """A stopwatch with a lap for each stage; ``timing_s`` holds them in the order they ran.
 
@@ -260,11 +278,11 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
 
 
-def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
+def coefficient_files(scene: Scene) -> dict[str, bytes]:
     """coefficients.json and coefficients.h5 of a scene's expansions.
 
-    Names are those of the Python face. For ``linearised`` and, unless ``linear_only``, ``full``:
-    ``indices`` (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
+    Names are those of the Python face. For ``linearised`` and ``full``: ``indices``
+    (n_coefficients, n_q + n_y) and ``coefficients`` (n_modes, n_coefficients) with
     λ = Σ_γ λ_γ (x − x0)^γ in rad²/s², x = (q, y) in SI units; of modes that are expanded together
     ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
     """
@@ -274,8 +292,7 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     for k, (linear, full) in enumerate(each, 1):
         where = f"_at_point_{k}" if k > 1 else ""
         tables[f"linearised{where}"] = _table(linear)
-        if not linear_only:
-            tables[f"full{where}"] = _table(full)
+        tables[f"full{where}"] = _table(full)
     names = [*scene.model.q_names, *scene.model.y_names]
     point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
     document = {

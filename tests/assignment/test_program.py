@@ -3,11 +3,7 @@ import pytest
 from assignment_problems import goal, random_problem, wanted
 from scipy.integrate import trapezoid
 
-from eigassign.assignment import (
-    LinearModel,
-    relative_rows,
-    trapezoidal_weights,
-)
+from eigassign.assignment import LinearModel, relative_rows, trapezoidal_weights
 from eigassign.errors import UsageError
 
 

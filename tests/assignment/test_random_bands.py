@@ -128,7 +128,6 @@ def test_bands_of_every_form_are_judged_as_counting_at_many_instants_does(seed: 
     found = ea.assign(case)
     results, y = found.results, np.array(list(found.design.values()))
     row = results.assignment
-    assert row is not None
     below = [counts(case, y, own) for own in asked]
     constant = [bool((own == own[0, 0]).all()) for own in below]
     assert len(row.clearances) == len(asked)

@@ -3,10 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigassign.assignment import (
-    hz_from_lam,
-    trapezoidal_weights,
-)
+from eigassign.assignment import hz_from_lam, trapezoidal_weights
 from eigassign.errors import AccuracyError
 
 repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=50)

@@ -9,27 +9,18 @@ import resource
 import shutil
 import signal
 from collections.abc import Callable
-from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
 import pytest
-from instant import batch_of, case, instant
-from stopping import can_stop, stopped_at
+from instant import batch_of, case, ran
+from stopping import can_stop, forked, stopped_at
 
-from eigassign.batch import Batch, run
+from eigassign.batch import Batch
 
 MASSES = "0,0.5,0.75,1"  # that of 0.75 has no answer, and a folder without results
 DONE = ["mass=0", "mass=0.5", "mass=0.75", "mass=1"]
 FILES = ("results.json", "case.yaml", "run.json")
-
-
-def ran(batch: Batch) -> list[str]:
-    """Run it; the names of the cases that were not done before."""
-    heard: list[str] = []
-    place = instant(batch.folder, lambda _name: None)
-    run(batch, place, lambda _total, _done: None, lambda found: heard.append(found.name))
-    return heard
 
 
 def summaries(folder: Path) -> dict[str, str]:
@@ -268,16 +259,13 @@ def test_a_disk_that_is_full_at_any_time_loses_nothing(tmp_path: Path, most: int
     undisturbed = changed(tmp_path / "undisturbed")
     ran(undisturbed)
     batch = changed(tmp_path)
-    pid = os.fork()
-    if not pid:
+
+    def starved() -> int:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
-        code = 1
-        with suppress(BaseException):
-            ran(batch)
-            code = 0
-        os._exit(code)
-    os.waitpid(pid, 0)
+        return len(ran(batch)) * 0
+
+    os.waitpid(forked(starved), 0)
     ran(batch)
     assert summaries(batch.folder) == summaries(undisturbed.folder)
     assert ran(batch) == []

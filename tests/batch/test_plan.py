@@ -4,18 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from instant import MASS, TEXT, case
 
 from eigassign.batch import folder_names, plan_of, variant_problem
 from eigassign.errors import Problem
-
-TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
-MASS = "mechanism.bodies.tool_mass.mass"
-
-
-def case(folder: Path, name: str = "arm.yaml", end: str = "") -> Path:
-    file = folder / name
-    file.write_text(TWO_LINK.read_text() + end)
-    return file
 
 
 def names(plan: Any) -> list[str]:
@@ -111,7 +103,7 @@ def test_the_files_of_a_plan_follow_one_another(tmp_path: Path) -> None:
 def test_a_problem_of_a_variant_is_shown_where_its_value_was_given(tmp_path: Path) -> None:
     arm = case(tmp_path, end=f"sweep:\n  parameters:\n    {MASS}: [1, -2]\n")
     wrong = Problem(str(arm), 7, 5, MASS, "must be >= 0 kg, got -2")
-    last = TWO_LINK.read_text().count("\n") + 3
+    last = TEXT.count("\n") + 3
     shown = variant_problem(plan_of([arm]), 1, wrong)
     assert str(shown) == f"{arm}:{last}:5: sweep.parameters.{MASS}: mass=-2: {wrong.message}"
     shown = variant_problem(plan_of([arm], [f"{MASS}=-2"]), 0, wrong)

@@ -13,18 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from instant import MASS, Instant, batch_of, case, instant, names
+from instant import MASS, Instant, batch_of, case, instant, names, ran
+from stopping import forked
 
-from eigassign.batch import Batch, Workers, run
+from eigassign.batch import Batch, Workers
 from eigassign.errors import CaseError, StorageError
-
-
-def ran(batch: Batch, place: Workers | None = None) -> list[str]:
-    """Run it; the names of the cases that were not done before."""
-    heard: list[str] = []
-    place = place or instant(batch.folder, lambda _name: None)
-    run(batch, place, lambda _total, _done: None, lambda found: heard.append(found.name))
-    return heard
 
 
 def summary(batch: Batch) -> dict[str, str]:
@@ -123,8 +116,6 @@ class Failing(Instant):
         self.error, self.broken = error, False
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        if fn.func.__name__ == "check_cases":
-            return super().submit(fn, *args, **kwargs)
         variant, future = args[0], Future[object]()
         hit = variant.values[MASS] == 0.5
         if hit and not isinstance(self.error, Exception):
@@ -157,43 +148,6 @@ def test_of_what_breaks_the_culprit_is_told_and_nobody_else_loses(
     assert "the process that ran it was killed" in found
 
 
-class Dying(Instant):
-    """A pool that dies as a variant of ``mass`` is checked, the first ``times``."""
-
-    def __init__(self, out: Path, mass: float, times: int) -> None:
-        super().__init__(out, lambda _name: None)
-        self.mass, self.left, self.broken = mass, times, False
-
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        checks = fn.func.__name__ == "check_cases"
-        hit = checks and self.left and any(v.values[MASS] == self.mass for v in args[0])
-        self.left -= bool(hit)
-        self.broken |= bool(hit)
-        if not self.broken:
-            return super().submit(fn, *args, **kwargs)
-        future = Future[object]()
-        future.set_exception(BrokenProcessPool())
-        return future
-
-
-@pytest.mark.parametrize("times", [1, 100])
-def test_what_dies_while_it_checks_variants_is_tried_again(times: int, tmp_path: Path) -> None:
-    case(tmp_path)
-    batch = batch_of(tmp_path, "1..2:301")
-    pool = Dying(batch.folder, 1.5, times)
-
-    @contextmanager
-    def opened(_slots: int) -> Iterator[Executor]:
-        pool.broken = False
-        yield pool
-
-    if times == 1:
-        assert len(ran(batch, Workers(3, opened))) == 301
-        return
-    with pytest.raises(StorageError, match=r"mass=1\.33333.* to mass=1\.66.*was killed"):
-        ran(batch, Workers(3, opened))
-
-
 def test_an_interrupt_leaves_a_summary_of_what_was_finished(tmp_path: Path) -> None:
     case(tmp_path)
     batch = batch_of(tmp_path, "0,0.5,1")
@@ -215,7 +169,7 @@ def test_a_second_batch_is_refused_until_the_first_has_ended(tmp_path: Path) -> 
         with open(log, "a") as file:
             file.write(f"{name}\n")
 
-    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    other = forked(lambda: len(ran(batch, instant(batch.folder, heard, 1))) * 0)
     while not log.exists():
         time.sleep(0.01)
     with pytest.raises(StorageError, match=r"another batch is running in .*: wait for it"):
@@ -237,18 +191,7 @@ def test_a_batch_that_was_killed_is_gone_on_with(tmp_path: Path) -> None:
         if name == "mass=1.5":
             os.kill(os.getpid(), signal.SIGKILL)
 
-    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    other = forked(lambda: len(ran(batch, instant(batch.folder, heard, 1))) * 0)
     assert os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]) == -signal.SIGKILL
     done = log.read_text().split()
     assert ran(batch) == names(batch, range(21))[len(done) - 1 :]
-
-
-def _forked(job) -> int:  # type: ignore[no-untyped-def]
-    if pid := os.fork():
-        return pid
-    code = 1
-    try:
-        job()
-        code = 0
-    finally:
-        os._exit(code)

@@ -14,15 +14,7 @@ from typing import Any
 import pytest
 from beam import TEXT
 
-from eigassign.batch import (
-    Batch,
-    CaseOptions,
-    Workers,
-    outcome_of,
-    plan_of,
-    process_pool,
-    run,
-)
+from eigassign.batch import Batch, CaseOptions, Workers, outcome_of, plan_of, process_pool, run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 

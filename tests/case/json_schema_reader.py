@@ -3,9 +3,25 @@
 import re
 from typing import Any
 
-from eigassign.case import json_schema
+from eigassign.case import CaseFile, json_schema, parse, read_yaml
 
 SCHEMA = json_schema()
+
+
+def reads_back(text: str, described: bool = True) -> CaseFile:
+    """The case of a text; resolved it is the same case, and both are as the schema says."""
+    case = parse(text.encode(), "case.yaml")
+    resolved = case.resolved()
+    again = parse(resolved.encode(), "case.yaml")
+    assert (again, hash(again), again.resolved()) == (case, hash(case), resolved)
+    assert (again.design.parameters, again.design.catalogues) == (
+        case.design.parameters,
+        case.design.catalogues,
+    )
+    assert {w.path for w in again.warnings} == {w.path for w in case.warnings}
+    for written in (text, resolved):
+        assert accepts(SCHEMA, read_yaml(written.encode(), "f").tree) == described
+    return case
 
 
 def accepts(schema: dict[str, Any], value: Any) -> bool:

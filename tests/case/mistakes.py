@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from small_case import unmarked
 
 from eigassign.case import load
 from eigassign.errors import CaseError
@@ -23,6 +24,14 @@ def problems_of(text: str, path: Path) -> list[tuple[int, int, str, str]]:
     with pytest.raises(CaseError) as caught:
         load(path)
     return [(p.line, p.column, p.path, p.message) for p in caught.value.problems]
+
+
+def told_once(text: str, path: Path) -> tuple[str, str]:
+    """The key and the message of the only problem of a marked text, which is shown at the mark."""
+    plain, (place, *_) = unmarked(text)
+    found = problems_of(plain, path)
+    assert [each[:2] for each in found] == [place], found
+    return found[0][2:]
 
 
 def tables(name: str) -> dict[str, Any]:

@@ -2,7 +2,18 @@
 
 from pathlib import Path
 
+from eigassign.case import CaseFile, parse
+
 TEXT = Path(__file__).with_name("small_case.yaml").read_text(encoding="utf-8")
+MOTION = """\
+  tip: hand.end
+  waypoints: [[0.3, 0.1], [0.2, 0.2]]
+  branch: {elbow: [10 deg, 170 deg]}
+"""
+
+
+def read(text: str) -> CaseFile:
+    return parse(text.encode(), "case.yaml")
 
 
 def edited(old: str, new: str) -> str:

@@ -9,9 +9,9 @@ from types import MappingProxyType
 
 import pytest
 from pydantic import ValidationError
-from small_case import TEXT, edited
+from small_case import MOTION, TEXT, edited, read
 
-from eigassign.case import CaseFile, load, parse
+from eigassign.case import load
 
 CASES = Path(__file__).parents[2] / "cases"
 MINIMAL = """\
@@ -23,15 +23,6 @@ mechanism:
   links: {beam: {length: 0.5, material: steel, section: bar, elements: 8}}
   joints: {clamp: {type: fixed, base: ground, follower: beam.start}}
 """
-MOTION = """\
-  tip: hand.end
-  waypoints: [[0.3, 0.1], [0.2, 0.2]]
-  branch: {elbow: [10 deg, 170 deg]}
-"""
-
-
-def read(text: str) -> CaseFile:
-    return parse(text.encode(), "case.yaml")
 
 
 def test_the_small_case_is_read_in_si() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from small_case import TEXT, edited, unmarked
+from small_case import MOTION, TEXT, edited, unmarked
 
 from eigassign.case import load, parse
 from eigassign.errors import CaseError, StorageError, UsageError
@@ -172,13 +172,6 @@ def test_a_file_that_may_not_be_read_is_a_storage_error(
     monkeypatch.setattr("os.open", denied)  # root may read anything, so chmod is no test
     with pytest.raises(StorageError, match="cannot be read: Permission denied"):
         load(path)
-
-
-MOTION = """\
-  tip: hand.end
-  waypoints: [[0.3, 0.1], [0.2, 0.2]]
-  branch: {elbow: [10 deg, 170 deg]}
-"""
 
 
 @pytest.mark.parametrize(

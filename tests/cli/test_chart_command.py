@@ -1,6 +1,5 @@
 """The chart command: its folder, its JSON, its exit codes; one case, or several side by side."""
 
-import csv
 import json
 import sys
 from pathlib import Path
@@ -59,21 +58,19 @@ def test_a_folder_is_a_matrix_and_a_broken_case_does_not_stop_the_others(
     assert main(["chart", "cases", "--quick", "--json", "--quiet", "--out", "all"]) == 1
     kept = json.loads(Path("all/matrix.json").read_text())
     assert json.loads(capsys.readouterr().out)["cells"] == kept["cells"]
-    assert {p.name for p in Path("all/figures").iterdir()} == {"errors.png", "costs.png"}
     assert sorted(kept["cases"]) == ["cantilever", "straight_arm"]
     ((name, why),) = kept["refused"]
     assert name == "broken"
     assert "mechanism: required key is missing" in why
     assert [f["kind"] for f in kept["findings"]["straight_arm"]] == ["straight or folded arm"]
-    rows = list(csv.DictReader(Path("all/matrix.csv").read_text().splitlines()))
-    for row, cell in zip(rows, kept["cells"], strict=True):
-        assert (row["case"], row["curve"]) == (cell["case"], cell["curve"])
-        for key in ("error_at_equal_cost", "cost_at_equal_accuracy"):
-            assert (float(row[key]) if row[key] else None) == cell[key]
+    for cell in kept["cells"]:
         if cell["curve"] == "exact, eigassign":
             assert cell["cost_at_equal_accuracy"] == 1.0
     page = Path("all/report.html").read_text()
     assert "2 cases, methods fail by name in 1; 1 refused" in page
+    above = page.partition("<details")[0]
+    assert "Errors at equal cost" in above
+    assert "Refused" in above
 
 
 def test_cases_of_which_none_can_be_charted_are_refused(case: Path, capsys: Captured) -> None:

@@ -56,6 +56,13 @@ def compared(*runs: str, capsys: pytest.CaptureFixture[str]) -> dict[str, dict[s
     return {t["title"]: {row[0]: row[1:] for row in t["rows"]} for t in told["tables"]}
 
 
+def drawn(page: Path) -> dict[str, Any]:
+    """The plot of the frequencies on a page."""
+    text = page.read_text().partition('id="figures">')[2].partition("</script>")[0]
+    plot: dict[str, Any] = json.loads(text)["compared"]
+    return plot
+
+
 def test_runs_stand_side_by_side_and_what_one_lacks_is_empty(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -75,9 +82,7 @@ def test_runs_stand_side_by_side_and_what_one_lacks_is_empty(
 
 def test_the_page_has_every_run_and_makes_no_request(capsys: pytest.CaptureFixture[str]) -> None:
     compared("results/one", "results/two", capsys=capsys)
-    page = Path("side/compare.html").read_text()
-    plots = json.loads(page.partition('id="figures">')[2].partition("</script>")[0])
-    plot = plots["compared"]
+    page, plot = Path("side/compare.html").read_text(), drawn(Path("side/compare.html"))
     assert {"mode 1, results/one", "mode 1, results/two"} <= {d.get("name") for d in plot["data"]}
     assert {"mode 1 at 15 Hz", "mode 1 at 14 Hz"} <= {d.get("name") for d in plot["data"]}
     assert "part of the duration" in json.dumps(plot["layout"])  # 1 s and 2 s
@@ -96,10 +101,9 @@ def test_along_several_trajectories_each_has_its_own_curve(
     Path("both.yaml").write_text(json.dumps(case))
     assert main(["optimize", "both.yaml", *LITTLE]) == 0
     compared("both.yaml", "one.yaml", capsys=capsys)
-    page = Path("side/compare.html").read_text()
-    plot = json.loads(page.partition('id="figures">')[2].partition("</script>")[0])["compared"]
-    drawn = [d["x"][-1] for d in plot["data"] if d.get("name") == "mode 1, both.yaml"]
-    assert sorted(drawn) == [0.5, 1.0]
+    data = drawn(Path("side/compare.html"))["data"]
+    ends = [d["x"][-1] for d in data if d.get("name") == "mode 1, both.yaml"]
+    assert sorted(ends) == [0.5, 1.0]
 
 
 def test_of_equal_durations_the_time_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -132,13 +136,6 @@ def test_what_is_no_run_is_refused_by_its_name(
     assert main(["compare", "results/two", name]) == code
     assert says in capsys.readouterr().err
     assert not Path("results/compare.html").exists()
-
-
-def drawn(page: Path) -> dict[str, Any]:
-    """The plot of the frequencies on a page."""
-    text = page.read_text().partition('id="figures">')[2].partition("</script>")[0]
-    plot: dict[str, Any] = json.loads(text)["compared"]
-    return plot
 
 
 def test_modes_that_are_far_off_do_not_squash_what_is_compared(

@@ -43,12 +43,20 @@ def test_an_update_leaves_a_whole_folder_and_a_case_that_can_be_used(
     assert page.count('class="plot"') == 2
     assert (kept["verdict"], len(kept["measurements"])) == ("fitted", 12)
 
-    assert main(["update", str(folder / "updated.yaml"), "--quiet", "--json", "--figures", "none",
-                 "--allow-outside", "--out", str(case.parent / "again")]) == 0  # fmt: skip
-    again = json.loads(capsys.readouterr().out)
-    for name, row in kept["parameters"].items():
-        assert again["parameters"][name]["initial"] == row["value"]
-        assert again["parameters"][name]["value"] == pytest.approx(row["value"], rel=1e-6)
+    left = folder / "updated.yaml"
+    assert main(["update", str(left), "--quiet", "--allow-outside"]) == 2  # it is one already
+    error = capsys.readouterr().err
+    assert "uncertain: update finds what is not known: write it under design" in error
+    # with a design and targets it is a robust problem, and its deviations are those of the fit
+    text = left.read_text().replace("targets: []", "targets: [{mode: 1, at_least: 9 Hz}]")
+    text = text.replace("robust: false", "robust: true").replace("starts: auto", "starts: 1")
+    tube = "{parameter: sections.tube.outer_diameter, min: 0.056, max: 0.07}"
+    left.write_text(text.replace("design: {}", f"design: {{tube: {tube}, mass: {{price: 1}}}}"))
+    assert main(["optimize", str(left), "--quiet", "--json", "--figures", "none",
+                 "--out", str(case.parent / "robust")]) == 0  # fmt: skip
+    robust = json.loads(capsys.readouterr().out)["assignment"]["robust"]
+    assert robust["wanted"] == 0.95 <= robust["probability"]
+    assert ["tube"] == list(json.loads((case.parent / "robust/results.json").read_text())["design"])
 
 
 def test_measurements_that_are_not_explained_set_the_exit_code(

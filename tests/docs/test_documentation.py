@@ -36,8 +36,6 @@ MOST_WORDS = 1500
 def builder(name: str) -> ModuleType:
     """A script of page_builder as a module."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "page_builder" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
     sys.modules[name] = module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -86,7 +86,6 @@ class Worker:
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         command = [sys.executable, __file__]
         process = subprocess.Popen(command, cwd=self._folder, text=True, **pipes)
-        assert process.stdout is not None
         process.stdout.readline()
         return process
 
@@ -101,8 +100,6 @@ class Worker:
     def ran(self, arguments: Sequence[str], folder: Path, text: str = "") -> Outcome:
         """``eigassign <arguments>`` in this folder; ``text`` says on what."""
         asked, answered = self._process.stdin, self._process.stdout
-        assert asked is not None
-        assert answered is not None
         asked.write(json.dumps([str(folder), arguments]) + "\n")
         asked.flush()
         if not select.select([answered], [], [], PATIENCE * SECONDS)[0]:
@@ -120,7 +117,6 @@ class Worker:
 
     def _close(self) -> None:
         for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
             with suppress(OSError):
                 pipe.close()
 
@@ -166,7 +162,6 @@ def _ran(arguments: list[str]) -> dict[str, float]:
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     most = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
-    assert most is not None
     megabytes = int(most[1]) / 1024  # ru_maxrss would be that of who has begun this process
     return {"code": code, "seconds": _processor_time() - before, "megabytes": megabytes}
 

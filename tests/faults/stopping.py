@@ -97,11 +97,21 @@ def _started(job: Job) -> int:
     return pid
 
 
-def _forked(job: Job, prepare: Callable[[], None]) -> int:
+def forked(job: Job) -> int:
+    """The number of a process that does the job; its exit code is 1 where the job raises."""
     if pid := os.fork():
         return pid
-    code = 70
+    code = 1
     try:
+        code = job()
+    except KeyboardInterrupt:
+        code = 130
+    finally:
+        os._exit(code)
+
+
+def _forked(job: Job, prepare: Callable[[], None]) -> int:
+    def work() -> int:
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in range(3):
             os.dup2(nowhere, stream)
@@ -109,11 +119,9 @@ def _forked(job: Job, prepare: Callable[[], None]) -> int:
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_DFL)
         prepare()
-        code = job()
-    except KeyboardInterrupt:
-        code = 130
-    finally:
-        os._exit(code)
+        return job()
+
+    return forked(work)
 
 
 def _wait_for_tracer() -> None:

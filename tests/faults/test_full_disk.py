@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from run_scenes import Scene, Stage, added, case_text, faults, optimize, write_a_few_files
+from stopping import forked
 
 from eigassign.errors import StorageError
 
@@ -27,14 +28,8 @@ def code_of(job: Callable[[], int]) -> int:
 
 
 def in_a_process(job: Callable[[], int]) -> int:
-    """The exit code of a process that does the job; -1 where it raises."""
-    if pid := os.fork():
-        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    code = 255
-    try:
-        code = job()
-    finally:
-        os._exit(code)
+    """The exit code of a process that does the job."""
+    return os.waitstatus_to_exitcode(os.waitpid(forked(job), 0)[1])
 
 
 def own_disk(folder: Path, options: str) -> None:

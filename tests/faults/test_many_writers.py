@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from run_scenes import CASE, TARGET, snapshot, write_a_few_files
+from stopping import forked
 
 from eigassign.output import Cache, is_untouched
 
@@ -26,24 +27,13 @@ def root(tmp_path: Path) -> Path:
 
 def side_by_side(job: Callable[[int], None]) -> list[int]:
     """The exit codes of the processes that do the job, without those killed at random instants."""
-    writers = [_forked(job, number) for number in range(WRITERS)]
+    writers = [forked(lambda: job(number) or 0) for number in range(WRITERS)]  # noqa: B023
     draw = random.Random(1)
     for pid in writers[:KILLED]:
         time.sleep(draw.uniform(0.0, 0.05))
         os.kill(pid, signal.SIGKILL)
     codes = [os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) for pid in writers]
     return [code for code in codes[:KILLED] if code != -signal.SIGKILL] + codes[KILLED:]
-
-
-def _forked(job: Callable[[int], None], number: int) -> int:
-    if pid := os.fork():
-        return pid
-    code = 1
-    try:
-        job(number)
-        code = 0
-    finally:
-        os._exit(code)
 
 
 def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
@@ -56,7 +46,6 @@ def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
 
     assert not any(side_by_side(store))
     found = Cache(root / "cache").load(KEY)
-    assert found is not None
     assert (found["a"] == found["a"][0]).all()
     assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.h5"]
 

@@ -4,6 +4,8 @@ import json
 from typing import Any
 
 import numpy as np
+from spatial_cases import linkage
+from spatial_examples import straight
 
 from eigassign import Case
 from eigassign.case import parse
@@ -38,40 +40,26 @@ def two_link(
         "m1": {"parameter": at, "min": 0.0, "max": 0.25},
         "m2": {"parameter": end, "min": 0.0, "max": 0.25},
     }
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"al": {"youngs_modulus": 69e9, "density": 1.9 / A_PAPER}},
-            "sections": {"rod": {"area": A_PAPER, "bending_inertia": I_PAPER}},
-            "links": {
-                "upper": {
-                    "length": 0.6,
-                    "material": "al",
-                    "section": "rod",
-                    "elements": elements[0],
-                },
-                "fore": {
-                    "length": 0.45,
-                    "material": "al",
-                    "section": "rod",
-                    "elements": elements[1],
-                },
-            },
-            "joints": {
-                "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
-                "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
-            },
-            "bodies": {
-                "elbow_mass": {"at": "upper.end", "mass": masses[0]},
-                "tool_mass": {"at": "fore.end", "mass": masses[1], "inertia": tip_inertia},
-            },
+    return linkage(
+        {
+            "upper": straight(0.6, elements[0], "rod", "al"),
+            "fore": straight(0.45, elements[1], "rod", "al"),
         },
-        "coordinates": {
+        {
+            "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
+            "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
+        },
+        {
             "q1": {"joint": "shoulder", "angle": angles[0], "drive": drives[0]},
             "q2": {"joint": "elbow", "angle": angles[1], "drive": drives[1]},
         },
-        "design": box if design is None else design,
-    }
+        sections={"rod": {"area": A_PAPER, "bending_inertia": I_PAPER}},
+        materials={"al": {"youngs_modulus": 69e9, "density": 1.9 / A_PAPER}},
+        bodies={
+            "elbow_mass": {"at": "upper.end", "mass": masses[0]},
+            "tool_mass": {"at": "fore.end", "mass": masses[1], "inertia": tip_inertia},
+        },
+    ) | {"design": box if design is None else design}
 
 
 def bar(
@@ -84,18 +72,12 @@ def bar(
     drive: Any = "free",
 ) -> Tree:
     """One straight link on the ground, clamped (``fixed``) or on a revolute joint."""
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": E, "density": density}},
-            "sections": {"s": section},
-            "links": {
-                "bar": {"length": length, "material": "m", "section": "s", "elements": elements}
-            },
-            "joints": {"root": {"type": root, "base": "ground", "follower": "bar.start"}},
-        },
-        "coordinates": {},
-    }
+    tree: Tree = linkage(
+        {"bar": {"length": length, "material": "m", "section": "s", "elements": elements}},
+        {"root": {"type": root, "base": "ground", "follower": "bar.start"}},
+        section=section,
+        material={"youngs_modulus": E, "density": density},
+    )
     if root == "revolute":
         tree["coordinates"] = {"q1": {"joint": "root", "drive": drive}}
     return tree
@@ -105,29 +87,25 @@ def random_chain(seed: int) -> tuple[Tree, np.ndarray]:
     """A random planar tree of 1 to 5 links with every kind of joint and drive, and a pose q."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 6))
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {
-                "steel": {"youngs_modulus": 210e9, "density": 7850.0},
-                "alloy": {"youngs_modulus": 70e9, "density": 2700.0},
+    tree: Tree = linkage(
+        {},
+        {},
+        sections={
+            "round": {"shape": "circle", "diameter": float(rng.uniform(0.01, 0.03))},
+            "flat": {
+                "shape": "rectangle",
+                "width": 0.02,
+                "height": float(rng.uniform(5e-3, 0.02)),
             },
-            "sections": {
-                "round": {"shape": "circle", "diameter": float(rng.uniform(0.01, 0.03))},
-                "flat": {
-                    "shape": "rectangle",
-                    "width": 0.02,
-                    "height": float(rng.uniform(5e-3, 0.02)),
-                },
-                "pipe": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.004},
-                "bare": {"area": 3e-4, "bending_inertia": 8e-9},
-            },
-            "links": {},
-            "joints": {},
-            "bodies": {},
+            "pipe": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.004},
+            "bare": {"area": 3e-4, "bending_inertia": 8e-9},
         },
-        "coordinates": {},
-    }
+        materials={
+            "steel": {"youngs_modulus": 210e9, "density": 7850.0},
+            "alloy": {"youngs_modulus": 70e9, "density": 2700.0},
+        },
+        bodies={},
+    )
     mechanism = tree["mechanism"]
     for k in range(n):
         _random_link(tree, k, rng)

@@ -1,6 +1,6 @@
 """An arm whose links change with the design, and can be reduced."""
 
-from spatial_cases import ALLOY
+from spatial_cases import linkage
 from spatial_oracle import Tree
 
 
@@ -20,27 +20,25 @@ def designed(space: str, reduce_to: float = 900.0) -> Tree:
             "four": {"from": "knee", "to": "end", **bar},
         },
     }
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {
-                "a": {"shape": "circle", "diameter": 0.02},
-                "b": {"shape": "circle", "diameter": 0.014},
-            },
-            "links": {
-                "beam": {**beam, "reduce_to": reduce_to},
-                "frame": {**frame, "reduce_to": reduce_to},
-            },
-            "joints": {
-                "j1": {"type": "revolute", "base": "ground", "follower": "beam.start"},
-                "j2": {"type": "revolute", "base": "beam.end", "follower": "frame.start"},
-            },
-            "bodies": {"load": {"at": "frame.end", "mass": 0.4}},
+    return linkage(
+        {
+            "beam": {**beam, "reduce_to": reduce_to},
+            "frame": {**frame, "reduce_to": reduce_to},
         },
-        "coordinates": {"q1": {"joint": "j1"}, "q2": {"joint": "j2"}},
+        {
+            "j1": {"type": "revolute", "base": "ground", "follower": "beam.start"},
+            "j2": {"type": "revolute", "base": "beam.end", "follower": "frame.start"},
+        },
+        {"q1": {"joint": "j1"}, "q2": {"joint": "j2"}},
+        sections={
+            "a": {"shape": "circle", "diameter": 0.02},
+            "b": {"shape": "circle", "diameter": 0.014},
+        },
+        space=space,
+        bodies={"load": {"at": "frame.end", "mass": 0.4}},
+    ) | {
         "design": {
             "length": {"parameter": "links.beam.length", "min": 0.3, "max": 0.9},
             "thick": {"parameter": "sections.a.diameter", "min": 0.012, "max": 0.03},
-        },
+        }
     }

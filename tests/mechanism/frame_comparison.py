@@ -30,7 +30,6 @@ def same_spectrum(model: Built, frame: World, q: np.ndarray) -> None:
 
 
 def same_places(model: Built, frame: World, tree: Tree, q: np.ndarray) -> None:
-    assert frame.pose is not None
     for link in tree["mechanism"]["links"]:
         for node in nodes(tree, link):
             here = model.poses.position(model.x(q), link, node)[0]

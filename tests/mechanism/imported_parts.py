@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 from scipy.io import mmwrite
-from spatial_cases import ALLOY
+from spatial_cases import ALLOY, linkage
 from spatial_oracle import Tree, element, section
 
 from eigassign.mechanism import matrix_of, read_contents
@@ -43,22 +43,17 @@ def write(folder: Path, kind: str, K: np.ndarray, M: np.ndarray) -> tuple[str, s
 def arm(space: str, links: Tree) -> Tree:
     """A beam, the link "part" hanging on it, and a tip mass on that."""
     turn = {} if space == "planar" else {"axis": [0.3, 1.0, -0.5]}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {"s": FLAT},
-            "links": {
-                "upper": {"length": 0.5, "elements": 2, "material": "m", "section": "s"}, **links
-            },
-            "joints": {
-                "a": {"type": "revolute", "base": "ground", "follower": "upper.start", **turn},
-                "b": {"type": "revolute", "base": "upper.end", "follower": "part.start"},
-            },
-            "bodies": {"tip": {"at": "part.end", "mass": 0.5}},
+    return linkage(
+        {"upper": {"length": 0.5, "elements": 2, "material": "m", "section": "s"}, **links},
+        {
+            "a": {"type": "revolute", "base": "ground", "follower": "upper.start", **turn},
+            "b": {"type": "revolute", "base": "upper.end", "follower": "part.start"},
         },
-        "coordinates": {"q1": {"joint": "a"}, "q2": {"joint": "b", "drive": {"stiffness": 4e3}}},
-    }  # fmt: skip
+        {"q1": {"joint": "a"}, "q2": {"joint": "b", "drive": {"stiffness": 4e3}}},
+        section=FLAT,
+        space=space,
+        bodies={"tip": {"at": "part.end", "mass": 0.5}},
+    )
 
 
 def beam_arm(space: str) -> Tree:

@@ -11,19 +11,29 @@ import numpy as np
 
 from eigassign import Case
 from eigassign.case import CaseFile, parse
-from eigassign.mechanism import (
-    Pencil,
-    build_link_frames,
-    build_pencil,
-    erls_motion,
-    parameters,
-)
+from eigassign.mechanism import Pencil, build_link_frames, build_pencil, erls_motion, parameters
 from eigassign.modal import eigenvalues
 
 Tree = dict[str, Any]
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}
 ALLOY = {"youngs_modulus": 70e9, "density": 2700.0, "shear_modulus": 26e9}
+
+ROD = {"shape": "circle", "diameter": 0.02}
+
+
+def linkage(
+    links: Tree,
+    joints: Tree,
+    coordinates: Tree | None = None,
+    section: Tree = ROD,
+    material: Tree = ALLOY,
+    **more: Any,
+) -> Tree:
+    """A planar mechanism of a material m and a section s, where ``more`` does not say otherwise."""
+    own: Tree = {"space": "planar", "materials": {"m": {**material}}}
+    own |= {"sections": {"s": {**section}}, "links": links, "joints": joints}
+    return {"mechanism": own | more, "coordinates": coordinates or {}}
 
 
 def case_of(tree: Tree, path: Path = Path("test.yaml")) -> CaseFile:

@@ -7,26 +7,15 @@ import numpy as np
 import pytest
 from chains import bar
 from drive_oracle import exerted
-from redesigned_arms import (
-    extrapolated,
-    five_bar,
-    five_bar_in_joints,
-    six_joints,
-    two_link_lengths,
-)
-from spatial_cases import CASES, Built, built, shipped
+from redesigned_arms import extrapolated, five_bar, five_bar_in_joints, six_joints, two_link_lengths
+from spatial_cases import CASES, Built, built, linkage, shipped
 from spatial_oracle import Tree
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 from weight_comparison import pulled
 
 import eigassign as ea
 from eigassign.case import PointTrajectory
-from eigassign.mechanism import (
-    NamedTrajectory,
-    Trajectories,
-    build_trajectory,
-    drive_forces,
-)
+from eigassign.mechanism import NamedTrajectory, Trajectories, build_trajectory, drive_forces
 
 G = 9.81
 PULL = {"planar": "[3.0, -9.0]", "spatial": "[3.0, -2.0, -9.0]"}
@@ -99,27 +88,24 @@ def test_a_two_link_arm_needs_the_torques_of_the_textbook_whatever_its_angles(
     """Point masses m1, m2 at the ends of massless links; τ acts on the joints' relative motion."""
     l1, l2, m1, m2 = 0.6, 0.45, 2.0, 0.7
     light: Tree = {"type": "rigid", "mass": 0.0}
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "links": {
-                "upper": {**light, "length": l1},
-                "fore": {**light, "length": l2},
-            },
-            "joints": {
-                "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
-                "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
-            },
-            "bodies": {
-                "b1": {"at": "upper.end", "mass": m1},
-                "b2": {"at": "fore.end", "mass": m2},
-            },
+    tree: Tree = linkage(
+        {
+            "upper": {**light, "length": l1},
+            "fore": {**light, "length": l2},
         },
-        "coordinates": {
+        {
+            "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
+            "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
+        },
+        {
             "q1": {"joint": "shoulder"},
             "q2": {"joint": "elbow", "angle": "absolute" if absolute else "relative"},
         },
-    }
+        bodies={
+            "b1": {"at": "upper.end", "mass": m1},
+            "b2": {"at": "fore.end", "mass": m2},
+        },
+    )
     (a, b), (da, db), (dda, ddb) = (0.4, 0.9), (1.3, -2.1), (-4.0, 7.0)  # joints
     c, s = np.cos(b), np.sin(b)
     elbow = m2 * l2**2 * (dda + ddb) + m2 * l1 * l2 * (c * dda + s * da**2)

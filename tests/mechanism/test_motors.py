@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from spatial_cases import case_of
+from spatial_cases import case_of, linkage
 from spatial_oracle import Tree
 
 import eigassign as ea
@@ -15,22 +15,20 @@ from eigassign.mechanism import drive_forces
 def arm(drive: Any, kind: str = "revolute", design: Tree | None = None) -> Tree:
     """An elastic link, which an elastic one carries on the driven joint."""
     beam = {"length": 0.5, "material": "m", "section": "s", "elements": 2}
-    return {
-        "title": "Arm",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.03}},
-            "links": {"a": beam, "b": beam},
-            "joints": {
-                "one": {"type": "revolute", "base": "ground", "follower": "a.start"},
-                "two": {"type": kind, "base": "a.end", "follower": "b.start"},
-            },
+    return linkage(
+        {"a": beam, "b": beam},
+        {
+            "one": {"type": "revolute", "base": "ground", "follower": "a.start"},
+            "two": {"type": kind, "base": "a.end", "follower": "b.start"},
         },
-        "coordinates": {
+        {
             "q1": {"joint": "one", "drive": {"stiffness": 5e4}},
             "q2": {"joint": "two", "drive": drive},
         },
+        section={"shape": "circle", "diameter": 0.03},
+        material={"youngs_modulus": 7e10, "density": 2.7e3},
+    ) | {
+        "title": "Arm",
         "trajectory": {"points": [[0.1, 0.2], [0.5, 0.1]], "duration": 1.0, "samples": 9},
         "design": design or {},
     }
@@ -81,24 +79,20 @@ def test_a_rotor_behind_a_gear_that_gives_is_a_link_between_two_joints(loop: flo
     """Two masses in a row: J_m N² on the loop's spring, the arm on the gear's; or free."""
     rotor, ratio, J, gear = 4e-5, 120.0, 2.5, 4e4
     motor: Tree = {"motor_inertia": rotor, "ratio": ratio}
-    tree: Tree = {
-        "title": "Two masses",
-        "mechanism": {
-            "space": "planar",
-            "links": {
-                "shaft": {"type": "rigid"},
-                "arm": {"type": "rigid", "length": 1.0, "inertia": J},
-            },
-            "joints": {
-                "motor": {"type": "revolute", "base": "ground", "follower": "shaft.start"},
-                "gear": {"type": "revolute", "base": "shaft.start", "follower": "arm.start"},
-            },
+    tree: Tree = linkage(
+        {
+            "shaft": {"type": "rigid"},
+            "arm": {"type": "rigid", "length": 1.0, "inertia": J},
         },
-        "coordinates": {
+        {
+            "motor": {"type": "revolute", "base": "ground", "follower": "shaft.start"},
+            "gear": {"type": "revolute", "base": "shaft.start", "follower": "arm.start"},
+        },
+        {
             "m": {"joint": "motor", "drive": motor | ({} if loop is None else {"stiffness": loop})},
             "g": {"joint": "gear", "drive": {"stiffness": gear}},
         },
-    }
+    ) | {"title": "Two masses"}
     K = np.array([[(loop or 0.0) + gear, -gear], [-gear, gear]])
     lam = eigh(K, np.diag([rotor * ratio**2, J]), eigvals_only=True)[loop is None :]
     found = case_of(tree)

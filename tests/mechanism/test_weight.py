@@ -15,13 +15,7 @@ from spatial_cases import ALLOY, built
 from spatial_examples import arm3r, ball_screw, four_bar, gantry, rigid, slotted_lever, straight
 from spatial_oracle import Tree
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
-from weight_comparison import (
-    agree_under_weight,
-    direction,
-    level_carriage,
-    matrices,
-    pulled,
-)
+from weight_comparison import agree_under_weight, direction, level_carriage, matrices, pulled
 from weight_oracle import lowest, sag_slopes, weigh
 from weight_webs import web
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 from scipy.special import jn_zeros
-from spatial_cases import STEEL, Tree, case_of
+from spatial_cases import STEEL, Tree, case_of, linkage
 
 import eigassign as ea
 from eigassign.modal import Model, buckling, sag_of_nodes, weight_changes
@@ -300,21 +300,17 @@ TOWER_STEEL = {"youngs_modulus": 2.1e11, "density": 7850.0, "shear_modulus": 8e1
 def tower(length: float, load: float, **more: Any) -> dict[str, Any]:
     """A tube of 600 × 12 mm at 80° with a load at its tip."""
     tube = {"length": length, "elements": 8, "material": "steel", "section": "tube"}
-    return {
-        "title": "a boom",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"steel": dict(TOWER_STEEL)},
-            "sections": {"tube": {"shape": "tube", "outer_diameter": 0.6, "thickness": 0.012}},
-            "links": {"boom": tube},
-            "joints": {
-                "foot": {"type": "revolute", "base": "ground", "follower": "boom.start"},
-            },
-            "bodies": {"load": {"at": "boom.end", "mass": load}},
-            **more,
+    return linkage(
+        {"boom": tube},
+        {
+            "foot": {"type": "revolute", "base": "ground", "follower": "boom.start"},
         },
-        "coordinates": {"luff": {"joint": "foot", "drive": "locked"}},
-    }
+        {"luff": {"joint": "foot", "drive": "locked"}},
+        sections={"tube": {"shape": "tube", "outer_diameter": 0.6, "thickness": 0.012}},
+        materials={"steel": dict(TOWER_STEEL)},
+        bodies={"load": {"at": "boom.end", "mass": load}},
+        **more,
+    ) | {"title": "a boom"}
 
 
 def test_a_boom_loses_as_much_as_it_loses_with_stated_gravity() -> None:
@@ -333,22 +329,16 @@ def test_modes_that_are_not_near_mix_under_weight_too() -> None:
     """One rod up and one down, a spring between them: neither mode feels the weight by itself."""
     rod = {"type": "rigid", "length": 1.0, "mass": 0.0}
     ends = {"a": "q1", "b": "q2"}
-    tree = {
-        "title": "twins",
-        "mechanism": {
-            "space": "planar",
-            "links": dict.fromkeys(ends, rod),
-            "joints": {
-                name: {"type": "revolute", "base": "ground", "follower": f"{name}.start"}
-                for name in ends
-            },
-            "bodies": {name: {"at": f"{name}.end", "mass": 1.0} for name in ends},
-            "springs": {"s": {"between": ["a.start", "b.start"], "rotational": 1.0}},
+    tree = linkage(
+        dict.fromkeys(ends, rod),
+        {
+            name: {"type": "revolute", "base": "ground", "follower": f"{name}.start"}
+            for name in ends
         },
-        "coordinates": {
-            q: {"joint": name, "drive": {"stiffness": 20.0}} for name, q in ends.items()
-        },
-    }
+        {q: {"joint": name, "drive": {"stiffness": 20.0}} for name, q in ends.items()},
+        bodies={name: {"at": f"{name}.end", "mass": 1.0} for name in ends},
+        springs={"s": {"between": ["a.start", "b.start"], "rotational": 1.0}},
+    ) | {"title": "twins"}
     q = [np.pi / 2, -np.pi / 2]
     model = ea.load_case(tree).model()
     found = weight_changes(model, q, [], (1, 2))

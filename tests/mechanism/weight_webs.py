@@ -4,6 +4,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+from spatial_cases import linkage
 
 STEEL = {"youngs_modulus": 2.1e11, "density": 7850.0}
 
@@ -44,19 +45,14 @@ def web(seed: int, pinned: float) -> dict[str, Any]:
         f"m{k}": {"at": own[0][0], "mass": masses[k], "offset": arms[k]}
         for k, own in enumerate(ends)
     }
-    return {
-        "title": "a web",
-        "mechanism": {
-            "space": "planar",
-            "gravity": rng.normal(size=2).tolist(),
-            "materials": {"steel": STEEL},
-            "sections": {"bar": {"shape": "rectangle", "width": 0.02, "height": 0.02}},
-            "links": links,
-            "joints": {f"j{k}": each for k, each in enumerate(joints)},
-            "bodies": bodies,
-        },
-        "coordinates": {},
-    }
+    return linkage(
+        links,
+        {f"j{k}": each for k, each in enumerate(joints)},
+        sections={"bar": {"shape": "rectangle", "width": 0.02, "height": 0.02}},
+        materials={"steel": STEEL},
+        gravity=rng.normal(size=2).tolist(),
+        bodies=bodies,
+    ) | {"title": "a web"}
 
 
 def bar(length: float) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import copy
 from typing import Any
 
 import numpy as np
-from spatial_cases import ALLOY, Built
+from spatial_cases import Built, linkage
 
 Tree = dict[str, Any]
 
@@ -17,26 +17,23 @@ def random_arm(seed: int, design: bool = True) -> Tree:
     frame_first = bool(rng.integers(2))
     base, tip = ("frame", "beam") if frame_first else ("beam", "frame")
     at = "frame.n3" if frame_first else "beam.end"
-    tree: Tree = {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {
-                "a": {"shape": "circle", "diameter": float(rng.uniform(0.015, 0.03))},
-                "b": {"shape": "circle", "diameter": float(rng.uniform(0.010, 0.015))},
-            },
-            "links": {"beam": _beam(rng), "frame": _frame(rng, space)},
-            "joints": {
-                "j1": {"type": "revolute", "base": "ground", "follower": f"{base}.start", **axis},
-                "j2": {"type": "revolute", "base": at, "follower": f"{tip}.start", **axis},
-            },
-            "bodies": {"load": {"at": f"{at}", "mass": float(rng.uniform(0.0, 1.0))}},
+    tree: Tree = linkage(
+        {"beam": _beam(rng), "frame": _frame(rng, space)},
+        {
+            "j1": {"type": "revolute", "base": "ground", "follower": f"{base}.start", **axis},
+            "j2": {"type": "revolute", "base": at, "follower": f"{tip}.start", **axis},
         },
-        "coordinates": {
+        {
             "q1": {"joint": "j1"},
             "q2": {"joint": "j2", "drive": ["free", "locked", {"stiffness": 2e3}][seed % 3]},
         },
-    }
+        sections={
+            "a": {"shape": "circle", "diameter": float(rng.uniform(0.015, 0.03))},
+            "b": {"shape": "circle", "diameter": float(rng.uniform(0.010, 0.015))},
+        },
+        space=space,
+        bodies={"load": {"at": f"{at}", "mass": float(rng.uniform(0.0, 1.0))}},
+    )
     if design:
         tree["design"] = _design(tree, rng)
     return tree

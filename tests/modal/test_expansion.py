@@ -10,16 +10,9 @@ from rungs import richardson
 
 from eigassign import expand, load_case
 from eigassign.errors import UsageError
-from eigassign.modal import (
-    Expansion,
-    Model,
-    eigenvalues,
-)
+from eigassign.modal import Expansion, Model, eigenvalues
 from eigassign.modal import expand as expand_pencil
 from eigassign.series import lower_set, total_degree
-
-# --- The Taylor expansion: subsets of the series, evaluation, eq. (9), and refusals
-
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 BOTH = ("absolute", "absolute")
@@ -32,9 +25,6 @@ def paper(angles: tuple[str, str] = ("relative", "absolute")) -> Model:
 
 def exact_lam(model: Model, q: np.ndarray, y: np.ndarray, count: int) -> np.ndarray:
     return eigenvalues(model.pencil, model.x(q, y), count)
-
-
-# 2m + 1
 
 
 def agree(a: np.ndarray, b: np.ndarray, tolerance: float) -> None:
@@ -189,9 +179,6 @@ def test_a_structure_without_variables_has_a_constant_expansion() -> None:
     np.testing.assert_allclose(e.frequencies([], []), model.frequencies([], [], 2))
 
 
-# Large pencils
-
-
 # Refusals
 
 
@@ -213,9 +200,6 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
 
 
 # --- What the coefficients say of a polynomial's error: a guide, and where the series ends
-
-
-Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 
 
 def test_the_share_of_the_last_degree_is_what_that_degree_adds():

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from chains import Tree, case_of, model_of
+from spatial_cases import linkage
 from spatial_examples import gantry
 
 from eigassign import Case
@@ -16,16 +17,13 @@ FINE = 24.0
 
 def cantilever(n: int, space: str = "spatial", **beam: object) -> Tree:
     ends = {"shape": "rectangle", "width": 0.03, "height": 0.05}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33}},
-            "sections": {"a": ends, "b": {**ends, "width": 0.02, "height": 0.02}},
-            "links": {"bar": {"length": 0.6, "material": "m", "elements": n, **beam}},
-            "joints": {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
-        },
-        "coordinates": {},
-    }
+    return linkage(
+        {"bar": {"length": 0.6, "material": "m", "elements": n, **beam}},
+        {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
+        sections={"a": ends, "b": {**ends, "width": 0.02, "height": 0.02}},
+        material={"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33},
+        space=space,
+    )
 
 
 def stated_over_true(case: Case, q: Any, modes: tuple[int, ...]) -> np.ndarray:

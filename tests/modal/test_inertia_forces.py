@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from spatial_cases import linkage
 
 import eigassign as ea
 from eigassign.mechanism import velocity_terms
@@ -21,19 +22,14 @@ def blade_tree(space: str) -> dict[str, Any]:
     section = {"shape": "rectangle", "width": 0.05, "height": 0.03}
     if space == "spatial":
         section = {"shape": "rectangle", "width": 0.02, "height": 0.03}
-    return {
-        "title": "a blade",
-        "mechanism": {
-            "space": space,
-            "materials": {
-                "m": {"youngs_modulus": 7e10, "density": 2700.0, "shear_modulus": 2.6e10}
-            },
-            "sections": {"s": section},
-            "links": {"b": beam},
-            "joints": {"hub": {"type": "revolute", "base": "ground", "follower": "b.start"}},
-        },
-        "coordinates": {"turn": {"joint": "hub", "drive": "locked"}},
-    }
+    return linkage(
+        {"b": beam},
+        {"hub": {"type": "revolute", "base": "ground", "follower": "b.start"}},
+        {"turn": {"joint": "hub", "drive": "locked"}},
+        section=section,
+        material={"youngs_modulus": 7e10, "density": 2700.0, "shear_modulus": 2.6e10},
+        space=space,
+    ) | {"title": "a blade"}
 
 
 def change(case: ea.Case, share: float, wanted: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,8 @@ def build(elements) -> Model:
     return model_of(two_link(elements=(elements["upper"], elements["fore"])))
 
 
-def samples() -> np.ndarray:
+@pytest.fixture(scope="module")
+def x() -> np.ndarray:
     """Every fourth pose of the paper's trajectory with random masses of its design box."""
     q = load_case("cases/two_link.yaml").trajectory.q[::4]
     return np.hstack([q, np.random.default_rng(5).uniform(0.0, 0.25, (len(q), 2))])
@@ -21,11 +22,6 @@ def samples() -> np.ndarray:
 
 def exact(model: Model, x: np.ndarray, modes) -> np.ndarray:
     return model.frequencies(x[:, :2], x[:, 2:], max(modes))[:, np.array(modes) - 1]
-
-
-@pytest.fixture(scope="module")
-def x() -> np.ndarray:
-    return samples()
 
 
 def middle(x: np.ndarray) -> np.ndarray:

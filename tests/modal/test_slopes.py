@@ -23,9 +23,6 @@ from eigassign.modal import NearestExpansion, eigenvalues, exact_slopes, expand,
 from eigassign.series import total_degree
 from eigassign.study import Scene
 
-# --- Slopes of eigenvalues and of the coefficient functions are what they say
-
-
 CASES = Path(__file__).parents[2] / "cases"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from chains import model_of
 from reduced_links import random_arm, random_x, reduced_tree
-from spatial_cases import built
+from spatial_cases import built, linkage
 
 from eigassign import Case, load_case
 from eigassign.mechanism import with_elements, with_reduction
@@ -42,20 +42,17 @@ def automatic(tmp_path: Path, elements: int = 24, **more: Any) -> Case:
     """Two slender links of many elements, their masses design, reduced as needed."""
     link = {"length": 0.6, "material": "m", "section": "s", "reduce_to": "auto"}
     link["elements"] = elements
-    tree = {
-        "title": "auto",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": 70e9, "density": 2700}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {"one": dict(link), "two": dict(link)},
-            "joints": {
-                "a": {"type": "revolute", "base": "ground", "follower": "one.start"},
-                "b": {"type": "revolute", "base": "one.end", "follower": "two.start"},
-            },
-            "bodies": {"load": {"at": "two.end", "mass": 0.2}},
+    tree = linkage(
+        {"one": dict(link), "two": dict(link)},
+        {
+            "a": {"type": "revolute", "base": "ground", "follower": "one.start"},
+            "b": {"type": "revolute", "base": "one.end", "follower": "two.start"},
         },
-        "coordinates": {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
+        {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
+        material={"youngs_modulus": 70e9, "density": 2700},
+        bodies={"load": {"at": "two.end", "mass": 0.2}},
+    ) | {
+        "title": "auto",
         "trajectory": {"q": [[0.0, 0.4], [0.2, 1.6]], "duration": 2.0},
         "design": {"load": {"parameter": "bodies.load.mass", "min": 0.0, "max": 0.5}},
         "expansion": {"accuracy": 1e-4, "modes": [1, 2], **more},
@@ -67,7 +64,6 @@ def automatic(tmp_path: Path, elements: int = 24, **more: Any) -> Case:
 def test_auto_is_within_its_share_of_the_accuracy_and_no_finer_than_that(tmp_path: Path) -> None:
     case = automatic(tmp_path)
     model, choice = case.model(), case.settled.reduction
-    assert choice is not None
     assert choice.error <= 0.25e-4
     full = Case(with_reduction(case.file, {"one": None, "two": None})).model()
     assert not full.is_reduced
@@ -86,7 +82,6 @@ def test_auto_leaves_small_links_whole_and_says_so(tmp_path: Path) -> None:
     few = with_elements(case.file, {"one": 2, "two": 2})
     small = Case(few)
     assert not small.model().is_reduced
-    assert small.settled.reduction is not None
     assert (
         small.settled.reduction.reasons[-1] == "not reduced, because it saves too little: one, two"
     )
@@ -99,7 +94,6 @@ def test_a_run_states_what_its_reduced_links_leave_out(tmp_path: Path) -> None:
         said = [n for n in notes if "reduced links raise its frequency by" in n]
         assert [n[:7] for n in said] == ["mode 1:", "mode 2:"]
     found = modes(case.file.path, [0.1, 1.0], [0.2], 2)
-    assert found.truncation_error is not None
     assert 0.0 < max(found.truncation_error) < 1e-3
 
 

@@ -2,6 +2,7 @@
 
 import io
 import math
+from contextlib import redirect_stdout
 
 import pytest
 from synthetic_results import make_results
@@ -33,13 +34,15 @@ def read(stream: io.TextIOWrapper) -> str:
 
 def shown(*tables: Table, encoding: str = "utf-8") -> str:
     out = piped(encoding)
-    print_tables(tables, stream=out)
+    with redirect_stdout(out):
+        print_tables(tables)
     return read(out)
 
 
 def assignment(verbose: bool = True) -> str:
     out = piped()
-    print_assignment(make_results(), verbose=verbose, stream=out)
+    with redirect_stdout(out):
+        print_assignment(make_results(), verbose=verbose)
     return read(out)
 
 
@@ -97,9 +100,10 @@ def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatc
 
     def coloured() -> str:
         out = Terminal()
-        print_tables([Table("", ("limit", "verdict"), rows)], stream=out)
-        print_verdict("Unreachable: mode 1 at 9 Hz", stream=out)
-        print_verdict("k = 3: this explains it", "fitted", stream=out)
+        with redirect_stdout(out):
+            print_tables([Table("", ("limit", "verdict"), rows)])
+            print_verdict("Unreachable: mode 1 at 9 Hz")
+            print_verdict("k = 3: this explains it", "fitted")
         return out.getvalue()
 
     text = coloured()

@@ -77,7 +77,7 @@ def test_the_paper_s_case_has_all_of_its_figures(paper):
 )
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
     files = render(run_figures(studied(make_results(**EVERY[name]))))
-    assert len(files) >= 5
+    assert len(files) >= 4
     for name, data in files.items():
         image = pixels(data)
         assert image.shape[1] == 880, name

@@ -9,12 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import eigassign as ea
-from eigassign.output import (
-    draw,
-    mode_figures,
-    render,
-    write_modes,
-)
+from eigassign.output import draw, mode_figures, render, write_figures
 from eigassign.study import ModePictures, draw_modes, with_middle_loads
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -105,7 +100,7 @@ def test_the_gallery_has_the_first_screen_of_every_report_and_nothing_else() -> 
 
 
 def test_a_folder_has_a_picture_of_each_mode(tmp_path: Path) -> None:
-    write_modes(pictures("four_bar", 3), tmp_path)
+    write_figures(mode_figures(pictures("four_bar", 3)), tmp_path, ["png"])
     assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [
         "mode_1.png",
         "mode_2.png",

@@ -2,6 +2,7 @@
 
 import io
 import math
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +10,7 @@ import pytest
 from synthetic_results import as_limit, make_results
 
 from eigassign.output import CaseOutcome, Table, batch_table, print_assignment, run_tables
-from eigassign.study import (
-    CatalogueRow,
-    ClearanceRow,
-    CombinationRow,
-    ErrorRow,
-    RunResults,
-)
+from eigassign.study import CatalogueRow, ClearanceRow, CombinationRow, ErrorRow, RunResults
 
 
 def table(results: RunResults, title: str) -> Table | None:
@@ -32,7 +27,6 @@ def searched() -> RunResults:
         CombinationRow({"rod": rod, "hub": "20"}, y, cost, missed, price=cost)
         for rod, cost, missed in (("light", 3.5, 0.0), ("heavy", 4.0, 0.02))
     )
-    assert results.assignment is not None
     row = replace(results.assignment, catalogue=CatalogueRow(7, 0.0, best))
     design = (replace(results.design[0], price=10.0), results.design[1])
     return replace(results, assignment=row, targets=(limit,), design=design, price=4.0)
@@ -41,7 +35,6 @@ def searched() -> RunResults:
 def test_bands_say_how_many_modes_are_below_and_whether_that_is_checked() -> None:
     results = make_results()
     assert table(results, "Clearance") is None
-    assert results.assignment is not None
     rows = (
         ClearanceRow("a band", 2, True, 0.013, True, 0.002),
         ClearanceRow("b", 0, False, -0.1, True, None),
@@ -49,7 +42,6 @@ def test_bands_say_how_many_modes_are_below_and_whether_that_is_checked() -> Non
     found = table(
         replace(results, assignment=replace(results.assignment, clearances=rows)), "Clearance"
     )
-    assert found is not None
     assert found.rows == (
         ("a band", "2", "1.30 %", "0.20 %", "checked"),
         ("b", "0", "0 %", "not known", "NO"),
@@ -60,7 +52,6 @@ def test_combinations_take_the_place_of_local_optima_and_have_prices() -> None:
     assert table(make_results(), "Combinations") is None
     results = searched()
     found = table(results, "Combinations")
-    assert found is not None
     assert found.columns == ("combination", "rod", "hub", "price", "limits")
     assert found.rows[1] == ("2", "heavy", "20", "4", "violated by 2.00 %")
     assert table(results, "Local optima") is None
@@ -74,14 +65,13 @@ def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met
         limit.error, initial=ErrorRow(0.681, 0.5), exact=ErrorRow(6e-11, 1e-11), one_shot=None
     )
     both = replace(results, targets=(target, replace(limit, error=error)))
-    said = io.StringIO()
-    print_assignment(both, stream=said)
+    with redirect_stdout(io.StringIO()) as said:
+        print_assignment(both)
     assert (
         "Worst violation of a limit: 68.1 % before (mode 1 at_least), 0 % after.\n"
         in said.getvalue()
     )
     found = table(both, "Limits and bands")
-    assert found is not None
     assert found.rows[0][-2] == "met"
 
 
@@ -96,7 +86,6 @@ def test_parameters_are_shown_in_units_that_people_read() -> None:
         initial=8e4, optimal=68679.2, lower=6.5e4, upper=9.5e4,
     )  # fmt: skip
     found = table(replace(results, design=(wall, drive)), "Design")
-    assert found is not None
     assert found.rows[0][1:6] == ("mm", "5", "5.5", "4.5", "5.5")
     assert found.rows[1][1:4] == ("kN m/rad", "80", "68.68")
 
@@ -110,9 +99,7 @@ def test_values_of_a_catalogue_have_their_unit_and_names_stand_for_themselves() 
     rod = replace(results.design[1], name="rod.width", choice="light")
     changed = replace(results, design=(drive, rod))
     found, design = table(changed, "Combinations"), table(changed, "Design")
-    assert found is not None
     assert found.rows[0][1:3] == ("light", "0.02 kN m/rad")  # "20" of the made-up catalogue
-    assert design is not None
     at = design.columns.index("choice")
     assert [row[at] for row in design.rows[:2]] == ["", "light"]
 

@@ -2,33 +2,26 @@
 
 from pathlib import Path
 
+from scenes import automatic, changed
+
 from eigassign import Case, load_case
+from eigassign.case import parse
 from eigassign.pipeline import Options, Result, solve_case
+from eigassign.study import AssignmentRow
 
 SHIPPED = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 UNCACHED = Options(use_cache=False)
+__all__ = ["automatic", "changed"]  # of other tests' too
+shipped = changed
 TOOL_MASS = "m2: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}"
 TARGET = "{mode: 1, frequency: 190 Hz}"
+DESIGN = """\
+design:
+  m1: {parameter: bodies.elbow_mass.mass, min: 0, max: 250 g}
+  m2: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}
+"""
+TAIL = "\nexpansion: {order: 2, q: [1.817, 5.312], y: auto, modes: [1]}\ntargets:\n"
 ONE_SHOT = "\nassignment: {method: one_shot}\n"
-
-
-def shipped(*changes: tuple[str, str]) -> str:
-    """The shipped case with some of its text replaced."""
-    return changed(SHIPPED.read_text(), *changes)
-
-
-def automatic(*changes: tuple[str, str]) -> str:
-    """The shipped case with its expansion left to the program."""
-    text = SHIPPED.read_text()
-    start, end = text.index("expansion:"), text.index("targets:")
-    return changed(text[:start] + text[end:], *changes)
-
-
-def changed(text: str, *changes: tuple[str, str]) -> str:
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    return text
 
 
 def without(text: str, *keys: str) -> str:
@@ -46,6 +39,21 @@ def moving(*poses: tuple[float, ...], text: str) -> str:
     """The text with joint samples for a trajectory, over one second."""
     rows = ", ".join(str(list(pose)) for pose in poses)
     return without(text, "trajectory") + f"trajectory: {{q: [{rows}], duration: 1 s}}\n"
+
+
+def held(text: str) -> str:
+    """The shipped case on geared drives, under its weight."""
+    return changed(
+        ("{joint: shoulder}", "{joint: shoulder, drive: {stiffness: 2e5}}"),
+        ("absolute}", "absolute, drive: {stiffness: 1e5, inertia: 0.02}}"),
+        ("  space: planar", "  space: planar\n  gravity: [0, -9.81]"),
+        text=text,
+    )
+
+
+def answered(text: str) -> tuple[Result, AssignmentRow]:
+    result = solve_case(Case(parse(text.encode(), "case.yaml")))
+    return result, result.results.assignment
 
 
 def written(folder: Path, text: str, name: str = "case.yaml") -> Path:

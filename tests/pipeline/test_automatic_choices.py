@@ -39,7 +39,6 @@ def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
     case = load_case(automatic(tmp_path, accuracy))
     q, y = case.trajectory.q, np.zeros(2)
     expansions = solve_case(case).results.studies[0].over_time
-    assert expansions is not None
     exact = fine.frequencies(q, y, 1)[:, 0]
     assert np.abs(expansions.taylor_hz / exact - 1.0).max() <= limit
 
@@ -65,7 +64,6 @@ def test_where_one_point_cannot_do_several_share_the_trajectory(tmp_path: Path) 
     )  # fmt: skip
     result = solve_case(load_case(path))
     study = result.results.studies[0].over_time
-    assert study is not None
     assert study.worst["taylor"] <= 1e-5
 
 
@@ -82,7 +80,6 @@ def test_python_is_handed_all_of_several_points(tmp_path: Path) -> None:
     result = solve_case(case)
     q, y = case.trajectory.q, case.initial_design
     study = result.results.studies[0].over_time
-    assert study is not None
     assert isinstance(result.expansion, NearestExpansion)
     assert isinstance(result.linearised, NearestExpansion)
     np.testing.assert_allclose(result.expansion.frequencies(q, y)[:, 0], study.taylor_hz)
@@ -118,7 +115,6 @@ def test_the_error_of_the_mesh_is_stated_at_the_optimum(tmp_path: Path) -> None:
     case = load_case(automatic(tmp_path, "1 %"))
     results = solve_case(case).results
     stated, y = results.discretisation, [row.optimal for row in results.design]
-    assert stated is not None
     assert (stated.design, stated.modes, stated.poses) == ("optimal", (1,), 5)
     fine = build_model(with_elements(case.file, {"upper_arm": 16, "forearm": 16}))
     q = case.trajectory.q

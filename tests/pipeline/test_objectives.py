@@ -24,8 +24,6 @@ def solved(
     case = ea.load_case({key: value for key, value in content.items() if value is not None})
     result = solve_case(case, Options(use_cache=False, study="none", report="none"))
     row = result.results.assignment
-    assert row is not None
-    assert row.aim is not None
     return case, result, row, row.aim
 
 
@@ -124,9 +122,7 @@ def test_a_price_of_the_mass_is_what_is_minimised_where_no_frequency_is_wanted()
     content["assignment"] = {"max_error": 0.05}
     case = ea.load_case({**content, "targets": [limit]})
     result = ea.assign(case).results
-    assert result.assignment is not None
     assert result.assignment.verdict == "reached"
-    assert result.mass is not None
     lightest = solved("crane_boom", "lightest", [limit])[3].optimal
     assert result.mass.optimal == pytest.approx(lightest, rel=1e-7)
     assert result.price == pytest.approx(4.0 * (lightest - result.mass.initial), rel=1e-6)

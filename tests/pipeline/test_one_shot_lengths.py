@@ -26,8 +26,6 @@ def test_a_one_shot_that_cannot_follow_the_path_ends_nothing(tmp_path: Path) -> 
         assert old in text
         text = text.replace(old, new)
     results = solve_case(load_case(written(tmp_path, text)), UNCACHED).results
-    assert results.error is not None
     assert results.error.one_shot is None
-    assert results.assignment is not None
     assert results.assignment.verdict == "reached"
     assert any("no errors of the one-shot design" in note for note in results.notes)

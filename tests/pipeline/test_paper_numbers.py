@@ -45,10 +45,7 @@ def test_the_paper_s_answer_stands_beside_the_exact_optimum(
     result: Result, sequential: Result
 ) -> None:
     row, error = sequential.results.assignment, sequential.results.error
-    assert row is not None
-    assert error is not None
     np.testing.assert_array_equal(row.one_shot, list(result.design.values()))
-    assert result.results.error is not None
     assert error.one_shot == result.results.error.exact
 
 
@@ -57,9 +54,7 @@ def test_the_exact_optimum_is_that_of_least_squares_on_exact_frequencies(
 ) -> None:
     """SciPy's `least_squares` on exact frequencies, several starts: rms 1.29627 %."""
     results = sequential.results
-    assert results.error is not None
     assert results.error.exact.rms_relative == pytest.approx(0.0129627, abs=5e-8)
-    assert results.assignment is not None
     assert results.assignment.objective_optimal == pytest.approx(0.0129627**2, rel=1e-5)
     assert results.assignment.verdict == "reached"
     assert results.shortcoming is None

@@ -65,14 +65,15 @@ def test_a_case_is_drawn_with_and_without_its_trajectory(
     text = (SHIPPED.parent / "gantry.yaml").read_text()
     path = Path("gantry.yaml")
     path.write_text(text if trajectory else text.partition("trajectory:")[0])
-    folder = draw(path, None, False, ("svg",))
+    vector = Options(figures=("svg",))
+    folder = draw(path, vector)
     assert folder == Path("results/gantry_check")
     assert (folder / "figures" / "mechanism.svg").read_bytes().startswith(b"<?xml")
-    assert draw(path, None, False, ("svg",)) == folder  # again: of the same case
+    assert draw(path, vector) == folder  # again: of the same case
     Path("mine").mkdir()
     Path("mine/thesis.txt").touch()
     with pytest.raises(StorageError, match="mine"):
-        draw(path, Path("mine"), False, ("svg",))
+        draw(path, Options(out=Path("mine")))
 
 
 def test_check_needs_neither_trajectory_nor_design_nor_targets(tmp_path: Path) -> None:

@@ -115,7 +115,6 @@ def brute_force(case: BuiltCase) -> list[tuple[float, tuple[float, ...]]]:
 def compared(case: BuiltCase) -> tuple[str, float, float]:
     """The verdict's kind, F of the answer and of the best of all."""
     row = solve_case(case).results.assignment
-    assert row is not None
     best = next((F for F, y in brute_force(case) if is_clear(case, y)), np.inf)
     clear = all(one.clear for one in row.clearances)
     found = row.objective_optimal if row.catalogue.best[0].violation <= 1e-9 and clear else np.inf

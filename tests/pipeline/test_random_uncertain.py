@@ -84,9 +84,9 @@ def random_case(name: str, seed: int) -> tuple[BuiltCase, np.ndarray, np.ndarray
     return BuiltCase(from_mapping(tree, path)), values, covariance
 
 
-def margins(case: BuiltCase, designs: np.ndarray) -> np.ndarray:
+def margins(case: BuiltCase, path: Any, designs: np.ndarray) -> np.ndarray:
     """The room (n, n_targets · n_t) of each limit at each sample, relative, by exact solves."""
-    path, model = case.trajectory, case.model()
+    model = case.model()
     q = np.array([path.at(y)[0] for y in designs])
     hz = model.frequencies(q.reshape(-1, q.shape[2]), np.repeat(designs, q.shape[1], axis=0), 2)
     hz, rooms = hz.reshape(*q.shape[:2], 2), []
@@ -101,7 +101,7 @@ def margins(case: BuiltCase, designs: np.ndarray) -> np.ndarray:
 
 
 def worst_on_the_ellipsoid(
-    case: BuiltCase, y: np.ndarray, values: np.ndarray, L: np.ndarray, r: float
+    case: BuiltCase, path: Any, y: np.ndarray, values: np.ndarray, L: np.ndarray, r: float
 ) -> np.ndarray:
     """The least room of each limit at each sample, by differences and a few turns."""
     n, h = len(values), 1e-4
@@ -109,15 +109,15 @@ def worst_on_the_ellipsoid(
     def at(z: np.ndarray) -> np.ndarray:
         return np.hstack([np.tile(y, (len(z), 1)), values * np.exp(z @ L.T)])
 
-    count = margins(case, at(np.zeros((1, n)))).shape[1]
+    count = margins(case, path, at(np.zeros((1, n)))).shape[1]
     z = np.zeros((count, n))
     for _ in range(4):
         steps = np.concatenate([z + h * e for e in np.eye(n)] + [z - h * e for e in np.eye(n)])
-        rooms = margins(case, at(steps)).reshape(2 * n, count, count)
+        rooms = margins(case, path, at(steps)).reshape(2 * n, count, count)
         own = rooms[:, np.arange(count), np.arange(count)]
         g = (own[:n] - own[n:]).T
         z = -r * g / np.maximum(np.linalg.norm(g, axis=1), 1e-300)[:, None]
-    return margins(case, at(z))[np.arange(count), np.arange(count)]
+    return margins(case, path, at(z))[np.arange(count), np.arange(count)]
 
 
 def held(name: str, seed: int) -> None:
@@ -125,20 +125,22 @@ def held(name: str, seed: int) -> None:
     results = solve_case(case).results
     row, wanted = results.assignment, case.file.assignment.probability
     y = np.array([one.optimal for one in results.design])
+    path = case.trajectory
+    if not path.several:  # with the instants between samples that were looked at, too
+        path = path.with_instants([results.time_s])
     L = np.linalg.cholesky(covariance)
     z = np.random.default_rng(7).normal(size=(DRAWS, len(values)))
     designs = np.hstack([np.tile(y, (DRAWS, 1)), values * np.exp(z @ L.T)])
-    rooms = np.concatenate([margins(case, some).min(axis=1)
+    rooms = np.concatenate([margins(case, path, some).min(axis=1)
                             for some in np.array_split(designs, 50)])  # fmt: skip
     share = float((rooms >= -1e-5).mean())
-    # at instants between the samples, too, limits may be missed
     assert row.robust.probability <= share + 3.0 * (0.25 / DRAWS) ** 0.5
     columns = [*case.file.design.parameters.values()][: len(y)]
     lower, upper = (np.array([getattr(p, end) for p in columns]) for end in ("min", "max"))
     prices, r = np.array([p.price for p in columns]), float(chi2.ppf(wanted, len(values)) ** 0.5)
 
     def room(s: np.ndarray) -> np.ndarray:
-        return worst_on_the_ellipsoid(case, lower + s * (upper - lower), values, L, r)
+        return worst_on_the_ellipsoid(case, path, lower + s * (upper - lower), values, L, r)
 
     starts = [(y - lower) / (upper - lower), *np.random.default_rng(0).random((2, len(y)))]
     ends = [

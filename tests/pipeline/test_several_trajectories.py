@@ -34,7 +34,11 @@ def alone(one: str, targets: str = TARGETS) -> str:
     return REST + targets + f"trajectory: {one}\n"
 
 
-PAIR = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"))
+def pair_of(targets: str = TARGETS) -> str:
+    return several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
+
+
+PAIR = pair_of()
 
 
 @pytest.fixture(scope="module")
@@ -110,8 +114,6 @@ def test_a_common_factor_of_all_weights_changes_nothing(pair: Result, tmp_path: 
     scaled = solved(tmp_path, text)
     np.testing.assert_allclose(list(scaled.design.values()), list(pair.design.values()), rtol=1e-10)
     one, two = (r.results.error for r in (pair, scaled))
-    assert one is not None
-    assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-9)
 
 
@@ -129,8 +131,6 @@ def test_a_trajectory_cut_in_two_is_still_the_same_problem(
         list(halves.design.values()), list(whole.design.values()), rtol=rtol, atol=1e-12
     )
     one, two = (r.results.error for r in (whole, halves))
-    assert one is not None
-    assert two is not None
     for kind in ("initial", "predicted", "exact"):
         a, b = getattr(one, kind), getattr(two, kind)
         assert b.rms_relative == pytest.approx(a.rms_relative, rel=rtol)
@@ -157,12 +157,9 @@ def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
 ) -> None:
     targets = TARGETS.replace("Hz}", "Hz, trajectory: pick}")
     targets += "  - {mode: 1, frequency: 194 Hz, trajectory: return}\n"
-    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
-    split = solved(tmp_path, text)
+    split = solved(tmp_path, pair_of(targets))
     np.testing.assert_allclose(list(split.design.values()), list(pair.design.values()), rtol=1e-10)
     one, two = pair.results.error, split.results.error
-    assert one is not None
-    assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
     assert [t.asked.trajectory for t in split.results.targets] == ["pick", "return"]
     np.testing.assert_array_equal(
@@ -213,8 +210,7 @@ def test_a_target_on_one_trajectory_ignores_the_other(
     singles: tuple[Result, Result], tmp_path: Path
 ) -> None:
     targets = TARGETS.replace("Hz}", "Hz, trajectory: return}")
-    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
-    result = solved(tmp_path, text)
+    result = solved(tmp_path, pair_of(targets))
     assert result.design == pytest.approx(dict(singles[1].design), rel=1e-9, abs=1e-12)
     found = results_document(result.results)
     assert found["targets"][0]["trajectory"] == "return"
@@ -266,10 +262,7 @@ def test_a_quick_trajectory_among_slow_ones_is_named(tmp_path: Path) -> None:
 
 
 def test_the_expansion_point_is_central_over_all(tmp_path: Path) -> None:
-    auto = several(part(PICK, name="pick"), part(BACK, 0.5, name="return")).replace(
-        "q: [1.817, 5.312] #", "q: auto #"
-    )
-    case = case_of(tmp_path, auto)
+    case = case_of(tmp_path, PAIR.replace("q: [1.817, 5.312] #", "q: auto #"))
     elbow = np.concatenate([PICK, BACK])[:, 1] - np.concatenate([PICK, BACK])[:, 0]
     farthest = np.abs(elbow[:, None] - elbow).max(axis=1)
     k = int(np.argmin(farthest))
@@ -280,25 +273,24 @@ def test_the_expansion_point_is_central_over_all(tmp_path: Path) -> None:
 
 
 def test_automatic_orders_look_at_every_trajectory(tmp_path: Path) -> None:
-    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"))
-    result = solved(tmp_path, text.replace("order: 4", "order: auto\n  accuracy: 0.5 %"))
+    result = solved(tmp_path, PAIR.replace("order: 4", "order: auto\n  accuracy: 0.5 %"))
     lines = [note for note in result.results.notes if note.startswith("order ")]
     assert [line.partition(":")[0] for line in lines[:2]] == ["order 2", "order 4"]
     (study,) = result.results.studies
-    assert study.over_time is not None
     assert study.over_time.worst["taylor"] < 0.005
 
 
-def test_validation_has_a_row_for_each_trajectory(tmp_path: Path) -> None:
+def test_each_is_validated_and_counted_and_given_by_itself_and_stacked(tmp_path: Path) -> None:
     rows = validate(written(tmp_path, PAIR), UNCACHED).rows
     assert [row.where for row in rows[:2]] == ["trajectory 'pick'", "trajectory 'return'"]
     assert [row.points for row in rows[:2]] == [21, 21]
-
-
-def test_check_counts_the_samples_of_each(tmp_path: Path) -> None:
     answer = check(written(tmp_path, PAIR))
     assert answer.trajectories == (("pick", 21, 1.0), ("return", 21, 0.5))
     assert (answer.samples, answer.duration_s) == (42, 1.5)
+    case = case_of(tmp_path, PAIR)
+    (name, pick, weight), back = case.trajectories
+    assert (name, weight, back.name) == ("pick", 1.0, "return")
+    np.testing.assert_array_equal(np.vstack([pick.q, back.trajectory.q]), case.trajectory.q)
 
 
 def test_an_error_of_one_trajectory_stands_at_its_own_line(tmp_path: Path) -> None:
@@ -310,13 +302,6 @@ def test_an_error_of_one_trajectory_stands_at_its_own_line(tmp_path: Path) -> No
     assert problem.path == "trajectory[1].file"
     assert problem.line == len(text.splitlines())
     assert "back.csv:3" in problem.message
-
-
-def test_a_case_gives_its_trajectories_one_by_one_and_stacked(tmp_path: Path) -> None:
-    case = case_of(tmp_path, PAIR)
-    (name, pick, weight), back = case.trajectories
-    assert (name, weight, back.name) == ("pick", 1.0, "return")
-    np.testing.assert_array_equal(np.vstack([pick.q, back.trajectory.q]), case.trajectory.q)
 
 
 def numbers(folder: Path) -> dict[str, object]:
@@ -350,7 +335,6 @@ def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> 
 
 def test_the_drawn_tip_path_stops_where_a_trajectory_does(pair: Result) -> None:
     poses = pair.results.poses
-    assert poses.tip_path is not None
     gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
     assert gaps.tolist() == [21]
     assert len(poses.tip_path) == 43

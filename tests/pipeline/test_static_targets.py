@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from run_cases import answered
 
 from eigassign import load_case
 from eigassign.assignment import design_limits
@@ -37,10 +38,7 @@ AT = "at: forearm.end, direction: [0, 1]"
 
 
 def solved(targets: str, design: str = GEARS, head: str = LEVEL) -> tuple[Result, AssignmentRow]:
-    text = f"{head}{design}targets:\n{targets}"
-    result = solve_case(BuiltCase(parse(text.encode(), "case.yaml")))
-    assert result.results.assignment is not None
-    return result, result.results.assignment
+    return answered(f"{head}{design}targets:\n{targets}")
 
 
 @cache
@@ -51,7 +49,6 @@ def drilled() -> Result:
 def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
     results = drilled().results
     row = results.assignment
-    assert row is not None
     assert row.verdict == "reached"
     assert [static.name.split()[0] for static in results.statics] == [
         "stiffness",
@@ -76,7 +73,6 @@ def test_the_cheapest_arm_that_does_not_give_way_is_told_everywhere() -> None:
     (line,) = [each for each in table.rows if each[0].startswith("compliance")]
     assert line[2:] == ("5.5 um/N", "0 %")
     card = verdict_of(results)
-    assert card is not None
     assert any(
         "Compliance of forearm.end along [0, 1] at most 5.5 um/N" in f.label for f in card.findings
     )

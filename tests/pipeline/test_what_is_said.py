@@ -25,7 +25,6 @@ def run(targets: list[Tree], elements: tuple[int, int] = (2, 2), **more: Any) ->
 
 def page(result: Result) -> str:
     screen = verdict_of(result.results)
-    assert screen is not None
     return " ".join(screen.trust)
 
 
@@ -62,7 +61,6 @@ def test_a_search_that_time_has_ended_is_not_called_done() -> None:
     result = run([{"mode": 1, "frequency": 12.0}], assignment={"seconds": 1e-9})
     assert "The search was ended before it was done." in page(result)
     row = result.results.assignment
-    assert row is not None
     assert "time used up" in row.reason
     assert "time used up" in row.optimality.words
 
@@ -80,7 +78,6 @@ def test_an_expansion_that_misleads_is_said_to(order: int) -> None:
     far = target.approximation_error > 0.02
     assert ("the predicted frequency is up to" in said) == far
     row = result.results.assignment
-    assert row is not None
     assert (row.verdict == "do_not_use") or not far
     assert row.optimality.words == "the optimum of the linearised problem only"
 
@@ -106,7 +103,6 @@ def test_out_of_reach_is_what_no_design_of_a_grid_comes_near(share: float, word:
     best = float(case.model().frequencies(q, designs, 1).max())
     tree["targets"] = [{"mode": 1, "at_least": share * best}]
     row = solve_case(case_of(tree), Options(use_cache=False, study="none")).results.assignment
-    assert row is not None
     assert row.verdict == word, row.reason
     assert ("found by a search from 3 starts" in row.reason) == (word == "unreachable")
 
@@ -117,10 +113,8 @@ def test_a_limit_that_the_mesh_alone_may_miss_is_not_proved_to_be_out_of_reach()
     lowest = float(coarse.results.targets[0].exact_hz.max())
     within = run([{"mode": 2, "at_most": lowest * (1.0 - 1e-5)}], elements=(1, 1)).results
     assert finely(coarse, 2)[:, 1].max() < lowest * (1.0 - 1e-5)
-    assert within.assignment is not None
     assert within.assignment.verdict == "do_not_use"
     assert "Give the links more elements" in within.assignment.reason
-    assert coarse.results.assignment is not None
     assert coarse.results.assignment.verdict == "unreachable"
 
 

@@ -25,19 +25,16 @@ def case_of(design: dict[str, Any], targets: list[Any], **more: Any) -> BuiltCas
 
 def said(result: Result) -> tuple[str, str]:
     row = result.results.assignment
-    assert row is not None
     return row.verdict, row.reason
 
 
 def reached(reason: str) -> float:
     found = re.search(r"reaches there is ([\d.]+) Hz", reason)
-    assert found is not None
     return float(found[1])
 
 
 def sample(reason: str) -> int:
     found = re.search(r"sample (\d+)", reason)
-    assert found is not None
     return int(found[1])
 
 
@@ -153,7 +150,6 @@ def test_a_band_that_all_loads_pass_below_is_not_called_infeasible() -> None:
 def test_the_cheapest_of_both_sides_of_a_band_is_proved_on_its_bound() -> None:
     result = one_link(price=1e-3)
     row = result.results.assignment
-    assert row is not None
     assert row.verdict == "reached"
     assert result.design["k"] == pytest.approx(500.0)
     assert row.optimality.kind == "proved"

@@ -33,9 +33,7 @@ def without(result: Result) -> str:
     results = result.results
     assert (result.expansion, result.linearised, result.assignment) == (None, None, None)
     assert (results.studies, results.solver) == ((), None)
-    assert results.assignment is not None
     assert results.assignment.one_shot is None
-    assert results.error is not None
     assert results.error.one_shot is None
     (note,) = (note for note in results.notes if "no expansion" in note or "one-shot" in note)
     return note
@@ -54,8 +52,6 @@ def test_the_design_is_the_one_that_is_found_with_an_expansion(tmp_path: Path) -
     note = without(result)
     assert note.startswith("there is no expansion, and so no one-shot design: ")
     before, after = with_one.results.error, result.results.error
-    assert before is not None
-    assert after is not None
     assert after.exact.rms_relative == pytest.approx(before.exact.rms_relative, rel=1e-6)
     assert after.predicted is not None  # by the last step's own program, of exact slopes
 
@@ -93,10 +89,10 @@ def test_an_expansion_point_that_cannot_follow_the_path_ends_nothing(tmp_path: P
     """The middle of the bounds is too long an arm and too short a one to reach the path."""
     text = between((CASES / "arm_lengths.yaml").read_text(), "expansion:", "targets:", ONCE)
     text = changed(
-        text,
         ("samples: 101", "samples: 11"),
         ("min: 580 mm, max: 610 mm", "min: 580 mm, max: 1000 mm"),
         ("min: 440 mm, max: 480 mm", "min: 100 mm, max: 480 mm"),
+        text=text,
     )
     result = solved(tmp_path, text)
     assert result.assignment is None

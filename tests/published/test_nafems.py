@@ -9,7 +9,7 @@ is fine enough for the printed digits: cubic elements err by (βh)⁴/720 in λ,
 import numpy as np
 import pytest
 from large import large
-from spatial_cases import built
+from spatial_cases import built, linkage
 from spatial_oracle import Tree
 
 from eigassign.modal import modes
@@ -34,16 +34,13 @@ def cross(arms: int, elements: int, space: str = "planar") -> Tree:
             "follower": f"cross.n{k}",
             "position": nodes[f"n{k}"],
         }
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": MATERIAL},
-            "sections": {"s": SQUARE},
-            "links": {"cross": {"type": "frame", "nodes": nodes, "beams": beams}},
-            "joints": joints,
-        },
-        "coordinates": {},
-    }
+    return linkage(
+        {"cross": {"type": "frame", "nodes": nodes, "beams": beams}},
+        joints,
+        section=SQUARE,
+        material=MATERIAL,
+        space=space,
+    )
 
 
 def hertz(tree: Tree, count: int) -> np.ndarray:
@@ -80,16 +77,12 @@ def test_fv1_is_the_published_one_where_the_arms_do_not_stretch() -> None:
 def test_fv71_cantilever() -> None:
     published = [1.010, 6.327, 17.716, 34.717, 57.390, 85.730]
     link = {"length": 10.0, "elements": 80, "material": "m", "section": "s"}
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": MATERIAL},
-            "sections": {"s": SQUARE},
-            "links": {"bar": link},
-            "joints": {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
-        },
-        "coordinates": {},
-    }
+    tree: Tree = linkage(
+        {"bar": link},
+        {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
+        section=SQUARE,
+        material=MATERIAL,
+    )
     found = hertz(tree, 8)
     np.testing.assert_allclose(found[:6], published, atol=5.1e-4)
     np.testing.assert_allclose(found[7], 5000.0 / 40.0, rtol=2e-4)  # the first axial one

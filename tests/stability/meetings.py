@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from chains import Tree, model_of
+from spatial_cases import linkage
 
 from eigassign.modal import Model
 
@@ -18,23 +19,18 @@ def two_bars(stub: float | None = None, stiffer: float = 1.0) -> Model:
     ``stiffer``. The design parameter E is the second bar's modulus.
     """
     bar: dict[str, Any] = {"length": 0.5, "section": "rod", "elements": 3}
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {
-                "a": {"youngs_modulus": E_ONE, "density": 2700.0},
-                "b": {"youngs_modulus": E_ONE, "density": 2700.0},
-            },
-            "sections": {"rod": {"area": 3e-4, "bending_inertia": 8e-9}},
-            "links": {"one": {**bar, "material": "a"}, "two": {**bar, "material": "b"}},
-            "joints": {
-                "j1": {"type": "fixed", "base": "ground", "follower": "one.start"},
-                "j2": {"type": "fixed", "base": "ground", "follower": "two.start"},
-            },
+    tree: Tree = linkage(
+        {"one": {**bar, "material": "a"}, "two": {**bar, "material": "b"}},
+        {
+            "j1": {"type": "fixed", "base": "ground", "follower": "one.start"},
+            "j2": {"type": "fixed", "base": "ground", "follower": "two.start"},
         },
-        "coordinates": {},
-        "design": {"E": {"parameter": "materials.b.youngs_modulus", "min": E_LOW, "max": E_HIGH}},
-    }
+        sections={"rod": {"area": 3e-4, "bending_inertia": 8e-9}},
+        materials={
+            "a": {"youngs_modulus": E_ONE, "density": 2700.0},
+            "b": {"youngs_modulus": E_ONE, "density": 2700.0},
+        },
+    ) | {"design": {"E": {"parameter": "materials.b.youngs_modulus", "min": E_LOW, "max": E_HIGH}}}
     if stub is not None:
         _mount(tree["mechanism"], stub, stiffer)
     return model_of(tree)

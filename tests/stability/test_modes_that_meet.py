@@ -47,19 +47,13 @@ MODULUS = np.linspace(60e9, 80e9, 41)[:, None]
 CROSSING = np.array([70e9])
 
 
-def test_a_cluster_is_right_on_both_sides_of_the_crossing():
-    model = case("exact_crossing").model()
-    expansion = expand(model.pencil, [], CROSSING, (1, 2), order=8)
-    assert [c.modes for c in expansion.clusters] == [(1, 2)]
-    assert "expanded as one cluster" in expansion.notes[0]
-    assert judged(model, expansion, [], MODULUS).max() < 1e-11
-
-
-def test_modes_that_coincide_are_a_cluster_even_where_none_is_wanted():
+@pytest.mark.parametrize("gap", [{}, {"cluster_gap": 0.0}], ids=["as it is", "none wanted"])
+def test_modes_that_coincide_are_a_cluster_that_is_right_on_both_sides(gap):
     """Each by itself would be some mixture of the two: 2.4 % wrong at 5 % more E."""
     model = case("exact_crossing").model()
-    expansion = expand(model.pencil, [], CROSSING, (1, 2), order=8, cluster_gap=0.0)
+    expansion = expand(model.pencil, [], CROSSING, (1, 2), order=8, **gap)
     assert [c.modes for c in expansion.clusters] == [(1, 2)]
+    assert "expanded as one cluster" in expansion.notes[0]
     assert judged(model, expansion, [], MODULUS).max() < 1e-11
 
 

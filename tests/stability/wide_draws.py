@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from calibration import SPAN, Drawn, Floats, with_box
 from chains import Tree, model_of
-from spatial_cases import ALLOY, STEEL
+from spatial_cases import ALLOY, STEEL, linkage
 from spatial_random import random_closed, random_open
 
 from eigassign.errors import EigassignError
@@ -46,20 +46,17 @@ def equal_bending(seed: int, samples: int) -> Drawn | None:
 def hanging_arm(seed: int) -> tuple[Tree, Floats]:
     """The tree of such an arm, and a pose."""
     rng = np.random.default_rng([seed, 7])
-    tree: Tree = {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"steel": STEEL, "alloy": ALLOY},
-            "sections": {
-                "round": {"shape": "circle", "diameter": float(rng.uniform(0.02, 0.04))},
-                "pipe": {"shape": "tube", "outer_diameter": 0.05, "thickness": 0.005},
-            },
-            "links": {},
-            "joints": {},
-            "bodies": {},
+    tree: Tree = linkage(
+        {},
+        {},
+        sections={
+            "round": {"shape": "circle", "diameter": float(rng.uniform(0.02, 0.04))},
+            "pipe": {"shape": "tube", "outer_diameter": 0.05, "thickness": 0.005},
         },
-        "coordinates": {},
-    }
+        materials={"steel": STEEL, "alloy": ALLOY},
+        space="spatial",
+        bodies={},
+    )
     n = int(rng.integers(1, 5))
     q0 = [_hang(tree, k, rng) for k in range(n)]
     return tree, np.array(q0)

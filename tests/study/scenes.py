@@ -19,6 +19,7 @@ def scene_of(folder: Path, text: str) -> Scene:
 
 
 def changed(*changes: tuple[str, str], text: str = SHIPPED) -> str:
+    """The shipped case, or another text, with some of it replaced."""
     for old, new in changes:
         assert old in text, old
         text = text.replace(old, new)
@@ -26,5 +27,6 @@ def changed(*changes: tuple[str, str], text: str = SHIPPED) -> str:
 
 
 def automatic(*changes: tuple[str, str]) -> str:
+    """The shipped case with its expansion left to the program."""
     start, end = SHIPPED.index("expansion:"), SHIPPED.index("targets:")
     return changed(*changes, text=SHIPPED[:start] + SHIPPED[end:])

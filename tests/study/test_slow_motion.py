@@ -11,7 +11,7 @@ from chains import case_of, two_link
 
 from eigassign import load_case
 from eigassign.mechanism import Trajectory, rates, velocity_terms
-from eigassign.modal import change_at, motion_effect
+from eigassign.modal import change_at
 from eigassign.pipeline import solve_case
 from eigassign.study import gap_along
 
@@ -37,36 +37,6 @@ def test_a_motion_in_milliseconds_is_warned_of(
 ) -> None:
     results = solve_case(load_case(slowed(tmp_path, duration))).results
     assert any("not slow" in warning for warning in results.warnings) is expected
-
-
-def test_the_corners_of_a_trapezoid_are_judged_by_its_acceleration(tmp_path: Path) -> None:
-    """The differences of samples never exceed the law's own rates, however many there are."""
-    text = CASE.read_text(encoding="utf-8").replace("timing: quintic", "timing: trapezoidal")
-    changes = []
-    for samples in (152, 1001):
-        path = tmp_path / f"{samples}.yaml"
-        path.write_text(text.replace("samples: 152", f"samples: {samples}"), encoding="utf-8")
-        case = load_case(path)
-        q, time_s = case.trajectory.q, case.trajectory.time_s
-        rate = np.gradient(q, time_s, axis=0, edge_order=2)
-        push = np.gradient(rate, time_s, axis=0, edge_order=2)
-        changes.append((5 * np.abs(rate).sum(axis=1) ** 2 + np.abs(push).sum(axis=1)).max())
-    assert changes[1] == pytest.approx(changes[0], rel=0.05)
-
-
-def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
-    case = load_case(CASE)
-    model, path = case.model(), case.trajectory
-
-    def timed(duration: float) -> Any:
-        return rates(Trajectory(path.time_s * duration, path.q.copy()))
-
-    terms = velocity_terms(case.file, model.poses.parameters, model.motion)
-    effects = [
-        motion_effect(model.pencil, terms, timed(t), np.zeros(2), (1, 2), 5).worst
-        for t in (0.2, 0.1)
-    ]
-    assert effects[1] / effects[0] == pytest.approx(4.0, rel=0.02)
 
 
 def test_near_modes_are_looked_at_first() -> None:
@@ -127,7 +97,6 @@ def test_a_veering_is_said_by_mode_and_sample_and_the_verdict_follows(
     path = tmp_path / "veering.yaml"
     path.write_text(yaml.safe_dump(veering(duration)), encoding="utf-8")
     results = solve_case(load_case(path)).results
-    assert results.assignment is not None
     assert results.assignment.verdict == verdict
     said = [line for line in (*results.warnings, *results.notes) if "velocity terms" in line]
     (change,) = re.findall(

@@ -353,7 +353,7 @@ def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
     """Something deviates where deviations count."""
     deviates = any(entry.tolerance for entry in document.design.entries.values())
     if document.assignment.robust and not deviates and not document.uncertain:
-        message = "no parameter has a tolerance: give at least one, such as tolerance: 2 %"
+        message = "no parameter has a tolerance, such as 2 %, and nothing is uncertain: give one"
         yield ("assignment", "robust"), message
 
 

@@ -319,7 +319,10 @@ def values_are_what_they_are_of(document: Document) -> Iterator[Finding]:
     """Each has the dimension, and keeps the limits, that the other key gives it."""
     amounts = ((path, v.amount if isinstance(v, Tolerance) else v) for path, v in walk(document))
     written = [(path, value) for path, value in amounts if isinstance(value, Written)]
+    told = document.uncertain.entries if document.uncertain else {}  # their columns repeat it
     for path, value in written:
+        if path[0] == "design" and path[1] in told:
+            continue
         try:
             _read(value, _kind_at(document, path))
         except QuantityError as error:

@@ -114,7 +114,7 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
             continue
         loc = each["loc"] = (*below, *each["loc"])
         path = tuple(p for p in loc if not str(p).startswith(TAG) and p != "[key]")
-        if path[0] in WITHOUT_ENTRIES and path[1:2] == ("entries",):
+        if path[1:2] == ("entries",) and path[0] in WITHOUT_ENTRIES:
             path = (path[0], *path[2:])
         more = each.get("ctx", {})
         words = _WORDS.get(each["type"], each["msg"].replace("{", "").replace("}", ""))
@@ -161,7 +161,7 @@ _WORDS = {
 
 def _hint(error: Any) -> str:
     """What goes on behind the words: what else may stand there, and what was probably meant."""
-    kind, value, (place, last) = error["type"], error["input"], ("", *error["loc"])[-2:]
+    kind, value, (place, last) = error["type"], error["input"], ("", "", *error["loc"])[-2:]
     match kind:
         case "literal_error":
             parts = {"drive": "{stiffness: ...}", "objective": "{highest: 1}"}

@@ -8,12 +8,22 @@ ones, each with a covariance of its own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 from eigassign.case.schema.design import Parameter, PropertyPaths, Tolerance, YValue
-from eigassign.case.schema.parts import ByReference, File, FrozenDict, Mistakes, Named, Part, wrong
+from eigassign.case.schema.parts import (
+    ByReference,
+    File,
+    FrozenDict,
+    Mistakes,
+    Named,
+    Part,
+    Quantity,
+    wrong,
+)
+from eigassign.case.units import PLAIN
 
-Correlation: TypeAlias = ByReference[ByReference[float]]
+Correlation: TypeAlias = ByReference[ByReference[Annotated[float, Quantity(PLAIN)]]]
 BESIDE = ("correlation", "others", "file")  # names under `uncertain` that are no properties
 LEAST = 1e-12  # pivot of a correlation matrix: more digits than are known of any
 
@@ -86,7 +96,9 @@ class Uncertain(Part):
     file: File | None = None
 
     def _mistakes(self, space: str | None) -> Mistakes:
-        if not self.entries:
+        if not self.entries and self.file is not None:
+            yield wrong("has no key uncertain: give the folder of an update", "file")
+        elif not self.entries:
             yield wrong("names no property: such as {k: {parameter: …, standard_deviation: 3 %}}")
         named = [*self.spread]
         for k, one in enumerate(self.others):
@@ -105,6 +117,8 @@ class Uncertain(Part):
                     elif a == b or not abs(value) < 1.0:
                         message = "a correlation of two properties is between −1 and 1"
                         yield wrong(message, *place, a, b)
+                    elif given.get(b, {}).get(a, value) != value:
+                        yield wrong(f"is another than that of {b} and {a}", *place, a, b)
             if not _is_definite(_matrix(named, given)):
                 message = "no properties can be correlated so: the matrix is not positive definite"
                 yield wrong(message, *place)

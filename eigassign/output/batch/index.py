@@ -21,7 +21,6 @@ from eigassign.facts import fact
 from eigassign.output.batch.summary import (
     NUMBERS,
     CaseOutcome,
-    Test,
     bare_names,
     junit_xml,
     quantity,
@@ -174,10 +173,4 @@ def write_files(folder: Path, rows: Sequence[CaseOutcome], keys: Sequence[str] =
     replace_synced(folder / "summary.csv", summary_csv(rows).encode())
     replace_synced(folder / "summary.json", summary_json(rows).encode())
     replace_synced(folder / "index.html", index_page(rows, folder, keys))
-    replace_synced(folder / "junit.xml", junit_xml(map(_test, rows)))
-
-
-def _test(row: CaseOutcome) -> Test:
-    output = f"run folder: {row.run_folder}" if row.run_folder else ""
-    status = row.status if row.status in ("ok", "error") else row.word.lower()
-    return row.name, row.path, row.seconds, status, row.message, output
+    replace_synced(folder / "junit.xml", junit_xml(rows))

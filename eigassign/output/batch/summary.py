@@ -257,28 +257,24 @@ def said(rows: Sequence[CaseOutcome]) -> str:
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _MARKUP = re.compile('[&<>"\t\n\r]')
 SUITE = "eigassign"
-# Name, path of the case file, seconds; ok, error or the kind of failure; message, and output
-Test = tuple[str, str, float, str, str, str]
 
 
-def junit_xml(tests: Iterable[Test]) -> bytes:
-    """One suite, a line for each test; missed tolerances and unsolvable cases are failures."""
+def junit_xml(rows: Iterable[CaseOutcome]) -> bytes:
+    """One suite, a line for each case; missed tolerances and unsolvable cases are failures."""
     lines, totals = list[str](), Counter({"tests": 0, "failures": 0, "errors": 0})
     time_s = 0.0
-    for name, path, seconds, status, message, output in tests:
-        line = f'<testcase name="{_escaped(name)}" classname="{SUITE}" '
-        line += f'file="{_escaped(path)}" time="{seconds:.3f}">'
+    for row in rows:
+        line = f'<testcase name="{_escaped(row.name)}" classname="{SUITE}" '
+        line += f'file="{_escaped(row.path)}" time="{row.seconds:.3f}">'
         totals["tests"] += 1
-        time_s += seconds
-        if status != "ok":
-            tag = "error" if status == "error" else "failure"
+        time_s += row.seconds
+        if row.status != "ok":
+            tag, kind = ("error",) * 2 if row.status == "error" else ("failure", row.word.lower())
             totals[f"{tag}s"] += 1
-            first = _escaped((message.splitlines() or [status])[0])
-            line += (
-                f'<{tag} type="{_escaped(status)}" message="{first}">{_escaped(message)}</{tag}>'
-            )
-        if output:
-            line += f"<system-out>{_escaped(output)}</system-out>"
+            first = _escaped((row.message.splitlines() or [kind])[0])
+            line += f'<{tag} type="{kind}" message="{first}">{_escaped(row.message)}</{tag}>'
+        if row.run_folder:
+            line += f"<system-out>run folder: {_escaped(row.run_folder)}</system-out>"
         lines.append(f"{line}</testcase>\n")
     counts = f'name="{SUITE}" ' + " ".join(f'{k}="{v}"' for k, v in totals.items())
     counts += f' time="{time_s:.3f}"'

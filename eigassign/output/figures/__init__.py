@@ -10,5 +10,5 @@ In reading order; each imports from those above it only:
     scene      the mechanism as parts at places: links as thick as their sections, symbols
     mechanism  the parts as curves at one scale: poses, mode shapes
     screen     descriptions as Plotly's data; the scene for a page
-    run        the figures of a run: approximation, reach, and which of all there are
+    run        the figures of a run: approximation, and which of all there are
 """

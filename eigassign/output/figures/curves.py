@@ -22,7 +22,6 @@ from eigassign.study.results import ModeRow, RunResults, StaticRow, TargetStudy
 Floats = NDArray[np.float64]
 
 TARGET = Look(graph.BLACK, 1.6, "dotted")
-OPTIMAL = Look(graph.SKY, 3.2)
 LEVEL = Look(graph.BLACK, 0.8)
 EDGE = Look(graph.VERMILLION, 1.0)
 _MEETS = Look(graph.VERMILLION, 4.0, marker="o")

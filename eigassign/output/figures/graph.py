@@ -184,7 +184,6 @@ class Graph:
     panels: tuple[Panel, ...]
     x_limits: tuple[float, float] | None = None
     x_logarithmic: bool = False
-    x_names: tuple[str, ...] = ()  # of the abscissae 1, 2, 3, …
     beside: bool = False  # where the legend stands; else above
     sheet: str = ""  # on paper only, at one scale in all directions: with axes, or bare
     clock: str | None = None  # the trajectory whose time the abscissa is, "" of a single one

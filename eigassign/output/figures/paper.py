@@ -134,8 +134,7 @@ def _graph(shown: Graph) -> Figure:
     labels += [name for panel in shown.panels for name, _ in panel.key]
     rows = 0 if shown.beside else -(-len(labels) // _columns(labels))
     above = 0.4 + ROW * rows  # with the title
-    letters = max(map(len, shown.x_names), default=0)  # turned by 30 degrees
-    tall = above + sum(heights) + GAP * (len(heights) - 1) + BOTTOM + 0.5 * LETTER * letters
+    tall = above + sum(heights) + GAP * (len(heights) - 1) + BOTTOM
     if shown.beside:
         tall = max(tall, 0.8 + ROW * len(labels))
     figure = Figure((graph.WIDTH, tall))
@@ -182,9 +181,6 @@ def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
         found.append(axes)
         top -= panel.height + GAP
     found[-1].set_xlabel(shown.x_label)
-    if shown.x_names:
-        places = np.arange(1, 1 + len(shown.x_names))
-        found[-1].set_xticks(places, shown.x_names, rotation=30, ha="right")
     below = 0.12 if shown.sheet == "bare" else 0.37  # of ticks and their numbers
     found[-1].xaxis.set_label_coords(0.5, -below / shown.panels[-1].height)
     if shown.sheet:

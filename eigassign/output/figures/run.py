@@ -1,4 +1,4 @@
-"""The figures of a run: approximation, reach, and which of all there are."""
+"""The figures of a run: approximation, and which of all there are."""
 
 from __future__ import annotations
 
@@ -6,22 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from eigassign.facts import capital, percent
+from eigassign.facts import percent
 from eigassign.output.figures import curves, graph, mechanism
-from eigassign.output.figures.curves import OPTIMAL, TARGET, suffix
-from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Shade
+from eigassign.output.figures.curves import suffix
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel
 from eigassign.output.figures.moves import move_figures
 from eigassign.output.figures.responses import response_figures
-from eigassign.study.results import (
-    WEIGHED,
-    Comparison,
-    ModeStudy,
-    RangeRow,
-    RunResults,
-    TargetAlong,
-    TargetStudy,
-    along_each,
-)
+from eigassign.study.results import WEIGHED, Comparison, ModeStudy, RunResults, along_each
 
 EXACT = Look(graph.GREY, 3.2)
 TAYLOR = Look(graph.VERMILLION, 1.4)
@@ -55,43 +46,8 @@ def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> 
     )
 
 
-def reach_figures(results: RunResults) -> Iterator[FigurePlan]:
-    """The frequencies within the bounds of each target."""
-    reach = {row.label: row for row in results.meaning.reach}
-    number = 0
-    for target in results.targets:
-        if (shown := reach.get(target.label)) is not None and target.asked.terms:
-            for along in target.along:
-                number += 1
-                yield _range(results, target, along, shown, number)
-
-
-def _range(
-    results: RunResults, target: TargetStudy, along: TargetAlong, row: RangeRow, number: int
-) -> FigurePlan:
-    """The answer inside the frequencies of all designs within the bounds."""
-    several = len(results.trajectories) > 1
-    place, clock = f" along {along.name!r}" if several else "", along.name if several else ""
-    low, high = row.lowest_hz[along.rows], row.highest_hz[along.rows]
-    curves = (
-        Curve(target.exact_hz[along.rows], OPTIMAL, "answer"),
-        Curve(target.asked.hz[along.rows], TARGET, "wanted"),
-    )
-    shade = Shade(low, high, graph.GREY, "within the bounds", 0.35)
-    panel = Panel(f"{target.asked.axis} [Hz]", (shade, *curves), 2.4, holds=(low, high))
-    time_s = results.time_s[target.asked.rows][along.rows]
-    return FigurePlan(
-        f"range_{number}",
-        f"{capital(target.label)}: reach{place}",
-        f"All designs within the bounds ({row.how}): least error {percent(row.error)}.",
-        "The answer's frequency over time inside the range of others.",
-        Graph(f"{capital(target.label)}{place}", "time [s]", time_s, (panel,), clock=clock),
-        "depends",
-    )
-
-
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
-    """Figures of what was asked, the mechanism, what the answer means, the motion, how exact."""
+    """Figures of what was asked, the mechanism, responses, the motion, how exact."""
     return tuple(_figures(results))
 
 
@@ -108,7 +64,6 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     yield from (curves.exerted(one, "statics") for one in each if one.statics)
     yield from response_figures(results)
     yield from move_figures(results)
-    yield from reach_figures(results)
     yield from (curves.exerted(one, "drives") for one in each if asked)
     yield from (curves.coordinates(one) for one in each if one.q.size)
     for k, study in enumerate(results.studies):

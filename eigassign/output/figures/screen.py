@@ -120,9 +120,8 @@ def _abscissa(shown: Graph) -> Json:
     if shown.x_logarithmic:
         own = [c.x for panel in shown.panels for c in panel.curves if c.x is not None]
         return _decades(shown.x_limits or graph.decades(own))
-    names = {"tickvals": [*range(1, 1 + len(shown.x_names))], "ticktext": shown.x_names}
     if shown.x_limits is not None:
-        return {"range": _numbers(shown.x_limits), **(names if shown.x_names else {})}
+        return {"range": _numbers(shown.x_limits)}
     low, high = (shown.x.min(), shown.x.max()) if shown.x.size else (0.0, 1.0)
     return {"range": _numbers((low, high))} if high > low else {}
 

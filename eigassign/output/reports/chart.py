@@ -1,15 +1,14 @@
 """What a chart leaves: errors against time and against the size of the box; tables; files.
 
 A colour is a kind of method, its orders or sizes stand at its points. What the front passes by is
-pale, not absent. Of several cases there is one picture of scenes × methods.
+pale, not absent. Of several cases there are tables of scenes × methods.
 """
 
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from eigassign.output.documents import dumps, results_document
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import csv_text
 from eigassign.output.tables import Table, facts_table
 
 COLOURS: dict[str, str] = dict(zip(Kind, (
@@ -30,15 +28,15 @@ COLOURS: dict[str, str] = dict(zip(Kind, (
 ), strict=True))  # fmt: skip
 Floats = NDArray[np.float64]
 WANTED = Look(graph.BLACK, 1.0, "fine")
-SHADES = ("#1a6e3c", "#56ae6b", "#c3dd8a", "#d9694a", "#e9e9e9")  # of heat maps, and no answer
-COSTS = {0.01: "≤ 1/100", 0.1: "≤ 1/10", 1.0: "≤ 1", np.inf: "over 1"}
 SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
-            "reach": "How far each method goes"}  # fmt: skip
+            "reach": "How far each method goes", "scenes": "Scenes × methods"}  # fmt: skip
 
 
-def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
-    """Error against time; where something varies, against the size of the box."""
-    return (_plane(chart), *((_boxes(chart),) if chart.boxes else ()))
+def chart_figures(made: Chart | Matrix) -> tuple[FigurePlan, ...]:
+    """Error against time; where something varies, against the size of the box; none of several."""
+    if isinstance(made, Matrix):
+        return ()
+    return (_plane(made), *((_boxes(made),) if made.boxes else ()))
 
 
 def _figure(
@@ -149,19 +147,15 @@ def _facts(section: str, rows: Sequence[Any], names: str, caption: str = "") -> 
 def _tables(chart: Chart) -> Iterator[Table]:
     yield _facts("fails", chart.findings, "kind where modes gap methods why instead")
     yield _facts("write", chart.advice, "question words")
-    table = _facts("write", chart.orders, "order moved one_shot")
-    yield table._replace(title="What optimize makes of each order")
     limited = [row for row in chart.reach if row.half_width < 1.0]
     wanted, clock = percent(chart.asked.accuracy), f"{chart.asked.clock_s:.0e} s"
     caption = f"To {wanted}; methods that are not here hold all of the ranges."
     yield _facts("reach", limited, "method varied half_width error_at_all", caption)
     points = sorted(chart.points, key=lambda p: p.worst_relative)
-    names = "method preparation_s trajectory_s spread_s worst_relative rms_relative worst_by_shape"
-    caption = f"Least processor time of repeats in turns; the clock resolves {clock}. By shape: "
-    caption += "against the mode that has the shape, where modes meet and numbers change places."
-    yield facts_table("All methods", points, f"{names} failed use", caption)
-    names = "method varied half_width worst_relative claimed"
-    yield facts_table("All boxes", chart.boxes, names)
+    names = "method preparation_s trajectory_s spread_s worst_relative rms_relative failed use"
+    caption = f"Least processor time of repeats in turns; the clock resolves {clock}."
+    yield facts_table("All methods", points, names, caption)
+    yield facts_table("All boxes", chart.boxes, "method varied half_width worst_relative")
     fronts = tuple((f"{f.evaluations:,}", "; ".join(f.methods)) for f in chart.fronts)
     yield Table("Fronts", ("trajectories", "no other is quicker and more accurate"), fronts)
     yield Table("Left out", ("method", "why"), chart.skipped)
@@ -175,62 +169,18 @@ def write_chart(
 ) -> None:
     """Into ``folder``, which must exist: the numbers, a report of this kind, the figures.
 
-    Numbers are chart.json, or matrix.json and matrix.csv.
+    Numbers are chart.json, or matrix.json.
     """
-    if isinstance(made, Chart):
-        name, plans = "chart", chart_figures(made)
-    else:
-        name, plans = "matrix", matrix_figures(made)
-        names = [each.name for each in fields(Cell)]
-        text = csv_text([(each, [getattr(cell, each) for cell in made.cells]) for each in names])
-        (folder / "matrix.csv").write_bytes(text)
+    name, tone = type(made).__name__.lower(), "fair" if made.findings else "good"
     data = f"{dumps(results_document(made, may_lack=True))}\n".encode()
-    tone = "fair" if made.findings else "good"
+    numbers, plans = (f"{name}.json", data), chart_figures(made)
     report.write_page(
-        made, chart_tables(made), plans, folder, formats, kind, (f"{name}.json", data),
+        made, chart_tables(made), plans, folder, formats, kind, numbers,
         line=made.headline, tone=tone, headings=SECTIONS,
     )  # fmt: skip
 
 
 # --- Several cases
-
-
-def matrix_figures(matrix: Matrix) -> tuple[FigurePlan, ...]:
-    """Two heat maps: errors at equal cost, costs at equal accuracy."""
-    wanted, steps = percent(matrix.accuracy), [1e-4 * matrix.accuracy, 1e-2 * matrix.accuracy]
-    errors = {e: f"≤ {percent(e)}" for e in (*steps, matrix.accuracy)} | {np.inf: f"over {wanted}"}
-    exact, time = "Worst error for the time of exact solves", f"Time for {wanted}, of that of exact"
-    return (
-        _heat(matrix, "errors", exact, errors, "error_at_equal_cost"),
-        _heat(matrix, "costs", f"{time} solves", COSTS, "cost_at_equal_accuracy"),
-    )
-
-
-def _heat(
-    matrix: Matrix, name: str, heading: str, levels: Mapping[float, str], fact: str
-) -> FigurePlan:
-    marks, limits, kinds = list[Mark](), list(levels), tuple(Kind)
-    shades: list[list[Cell]] = [[] for _ in (*levels, None)]
-    for cell in matrix.cells:
-        value = getattr(cell, fact)
-        shades[len(levels) if value is None else bisect_left(limits, value)].append(cell)
-    for own, label, shade in zip(shades, (*levels.values(), "none"), SHADES, strict=True):
-        at = np.array([kinds.index(cell.curve) + 1.0 for cell in own])
-        below = np.array([-float(matrix.cases.index(cell.case)) for cell in own])
-        names = tuple(f"{c.case}: {c.curve}, {getattr(c, fact)}" for c in own)
-        marks.append(Curve(below, Look(shade, 0.0, "solid", "s", 15.0), label, at, names=names))
-    failing = {c: ", ".join(f.kind for f in matrix.findings[c]) for c in matrix.cases}
-    rows = np.array([-float(k) for k, c in enumerate(matrix.cases) if failing[c]])
-    look, names = Look(graph.VERMILLION, 0.0, marker="o"), tuple(filter(None, failing.values()))
-    marks.append(Curve(rows, look, "something fails by name", 0.0 * rows, names=names))
-    caption = f"Preparations are spread over {matrix.evaluations} trajectories."
-    room = np.array([0.6, 0.4 - len(matrix.cases)])
-    panel = Panel(
-        "", tuple(marks), 0.5 + 0.3 * len(matrix.cases), holds=(room,), names=matrix.cases
-    )
-    ends = (-0.6, len(kinds) + 0.6)
-    shows = Graph(heading, "", np.zeros(0), (panel,), ends, x_names=kinds)
-    return FigurePlan(name, heading, caption, f"Heat map: {heading}.", shows, "answer")
 
 
 def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
@@ -239,12 +189,15 @@ def _matrix_tables(matrix: Matrix) -> Iterator[Table]:
     failing = [(c, f) for c in matrix.cases for f in matrix.findings[c]]
     rows = tuple((c, f.kind, f.where, f.methods, f.instead) for c, f in failing)
     yield Table(SECTIONS["fails"], columns, rows, section="fails")
-    for title, name in (
-        ("Errors at equal cost", "error_at_equal_cost"),
-        ("Costs at equal accuracy", "cost_at_equal_accuracy"),
+    spread = f"Preparations are spread over {matrix.evaluations} trajectories."
+    error = f"The worst error for the time of exact solves. {spread}"
+    time = f"Time for {percent(matrix.accuracy)}, of that of exact solves."
+    for title, name, caption in (
+        ("Errors at equal cost", "error_at_equal_cost", error),
+        ("Costs at equal accuracy", "cost_at_equal_accuracy", time),
     ):
         text = fact(Cell, name).text
         found = {(c.case, c.curve): text(getattr(c, name)) for c in matrix.cells}
         body = tuple((c, *(found[c, curve] for curve in Kind)) for c in matrix.cases)
-        yield Table(title, ("case", *Kind), body)
+        yield Table(title, ("case", *Kind), body, caption, "scenes")
     yield Table("Refused", ("case", "why"), matrix.refused, section="fails")

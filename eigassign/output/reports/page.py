@@ -2,7 +2,7 @@
 
 A page begins with the verdict. A full one plots in the browser with Plotly's own script, which it
 carries; a light one shows figures as pictures and has no script. `write_run` leaves everything that
-a run shows, `write_modes` the mode shapes as figures.
+a run shows.
 """
 
 from __future__ import annotations
@@ -27,13 +27,12 @@ from eigassign.facts import about, capital, number, percent, positive_percent, p
 from eigassign.files import printable
 from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.mechanism import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import motions, screen_figure
 from eigassign.output.result_files import sample_files
 from eigassign.output.tables import SECTIONS, TONES, Table, headline, helps, run_tables, tone_of
-from eigassign.study.results import LimitRow, ModePictures, RunResults, TargetStudy, violated
+from eigassign.study.results import LimitRow, RunResults, TargetStudy, violated
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -378,8 +377,3 @@ def write_figures(
     for name, data in files.items():
         (folder / "figures" / name).write_bytes(data)
     return files
-
-
-def write_modes(pictures: ModePictures, folder: Path, formats: Sequence[str] = ("png",)) -> None:
-    """figures/mode_1.png, …."""
-    write_figures(mode_figures(pictures), folder, formats)

@@ -232,14 +232,14 @@ class UpdateResults(Origin):
 
 def require_updatable(file: CaseFile) -> None:
     """Raise CaseError naming every key that updating needs and the case lacks."""
+    if file.uncertain is not None:
+        message = "update finds what is not known: write it under design, with bounds"
+        raise CaseError((file.problem("uncertain", message),))
     needs = {
         "design": (bool(file.design.parameters), "at least one parameter that is not known"),
         "measurements": (file.measurements is not None, "frequencies that were measured"),
     }
     file.require("update", needs)
-    if file.uncertain is not None:
-        message = "update finds what is not known: write it under design, with bounds"
-        raise CaseError((file.problem("uncertain", message),))
 
 
 @dataclass(frozen=True)

@@ -140,8 +140,11 @@ def _from_file(
         CsvColumn(TIME, (DIMENSIONS["time"],), optional=True),
         CsvColumn("trajectory", optional=True),
         CsvColumn("mode", (DIMENSIONS["fraction"],), optional=True),
-        *(CsvColumn(name, (hz,), optional=True) for name in ("frequency", "lower", "upper")),
-        CsvColumn("deviation", (hz, DIMENSIONS["fraction"]), optional=True),
+        CsvColumn("frequency", (hz,), instead="lower"),
+        CsvColumn(
+            "deviation", (hz, DIMENSIONS["fraction"]), given.deviation is not None, "", "lower"
+        ),
+        *(CsvColumn(name, (hz,), optional=True) for name in ("lower", "upper")),
         *(
             CsvColumn(column.name, column.dimensions, optional=True)
             for column in coordinate_columns(names, file.coordinate_units)
@@ -153,10 +156,9 @@ def _from_file(
             "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
         )
         raise MechanismError(_KEY, f"{table.file}: {some}")
-    own = {"frequency", "lower", "upper"} & table.numbers.keys()
-    with_deviation = given.deviation is not None or "deviation" in table.numbers
-    if own != {"lower", "upper"} and (own != {"frequency"} or not with_deviation):
-        expected = "expected the columns frequency and deviation, or of ranges lower and upper"
+    own = {"frequency", "deviation", "lower", "upper"} & table.numbers.keys()
+    if own & {"lower", "upper"} and (own != {"lower", "upper"} or given.deviation is not None):
+        expected = "of ranges give lower and upper alone, without frequency and deviation"
         raise MechanismError(_KEY, f"{table.file}: {expected}")
     with_q = [name for name in names if name in table.numbers]
     if len(with_q) != (0 if TIME in table.numbers else len(names)):

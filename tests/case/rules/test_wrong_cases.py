@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-from mistakes import Wrong, problems_of, tables
-from small_case import edited, unmarked
+from mistakes import Wrong, problems_of, tables, told_once
+from small_case import edited
 
 TABLES = tables("wrong_cases")
 MECHANISM = [Wrong(*row) for row in TABLES["mechanism"]]
@@ -16,17 +16,9 @@ SAMPLED = [Wrong(*row) for row in TABLES["sampled"]]
 def test_a_mistake_is_told_once_where_it_is_and_what_is_allowed(
     wrong: Wrong, tmp_path: Path
 ) -> None:
-    text, places = unmarked(edited(wrong.old, wrong.new))
-    found = problems_of(text, tmp_path / "case.yaml")
-    assert [(line, column, path) for line, column, path, _ in found] == [
-        (*places[0], wrong.path)
-    ], found
-    assert wrong.message in found[0][3]
-
-
-def test_names_of_the_table_are_unique() -> None:
-    names = [wrong.name for wrong in (*MECHANISM, *STUDY, *SAMPLED)]
-    assert len(names) == len(set(names)) > 100
+    path, message = told_once(edited(wrong.old, wrong.new), tmp_path / "case.yaml")
+    assert path == wrong.path
+    assert wrong.message in message
 
 
 def messages(old: str, new: str, path: Path) -> list[str]:

@@ -5,15 +5,12 @@ import json
 from pathlib import Path
 
 import pytest
-from json_schema_reader import SCHEMA, accepts
-from small_case import edited, unmarked
+from json_schema_reader import reads_back
+from mistakes import told_once
+from small_case import MOTION, TEXT, edited, read
 
-from eigassign.case import CaseFile, parse, read_yaml
 from eigassign.errors import CaseError
 
-ONE = (
-    "  tip: hand.end\n  waypoints: [[0.3, 0.1], [0.2, 0.2]]\n  branch: {elbow: [10 deg, 170 deg]}\n"
-)
 LIST = """\
   - {name: pick, tip: hand.end, waypoints: [[0.3, 0.1], [0.2, 0.2]], branch: {elbow: [10 deg, 170 deg]}}
   - {q: [[0, 90 deg], [1, 2]], time: [1 s, 3 s], weight: 2.5}
@@ -21,12 +18,8 @@ LIST = """\
 TARGETS = "  - {mode: 1, frequency: 190 Hz}\n"
 
 
-def read(text: str) -> CaseFile:
-    return parse(text.encode(), "case.yaml")
-
-
 def listed(*changes: tuple[str, str], targets: str = TARGETS) -> str:
-    text = edited(ONE, LIST).replace(TARGETS, targets)
+    text = edited(MOTION, LIST).replace(TARGETS, targets)
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -42,23 +35,15 @@ def test_a_list_is_read_in_order_with_names_and_weights() -> None:
 
 
 def test_a_mapping_stays_what_it_was_and_is_called_1() -> None:
-    file = read(edited(ONE, ONE))
+    file = read(TEXT)
     assert file.trajectory.tip == "hand.end"
     assert [(path, name) for path, name, _ in file.trajectories] == [("trajectory", "1")]
 
 
 def test_a_list_resolves_to_itself_in_lines_short_enough_to_read() -> None:
     targets = "  - {mode: 1, frequency: 190 Hz, trajectory: pick}\n"
-    file = read(listed(targets=targets))
-    again = read(file.resolved())
-    assert again == file
-    assert again.resolved() == file.resolved()
+    file = reads_back(listed(targets=targets))
     assert max(map(len, file.resolved().splitlines())) <= 90
-
-
-def test_the_schema_accepts_both_forms() -> None:
-    for text in (listed(), edited(ONE, ONE)):
-        assert accepts(SCHEMA, read_yaml(text.encode(), "x").tree)
 
 
 def test_a_mode_may_have_a_target_of_its_own_on_each_trajectory() -> None:
@@ -75,12 +60,9 @@ WRONG = json.loads(MISTAKES.read_text("utf-8"))
 @pytest.mark.parametrize("name", WRONG)
 def test_a_mistake_is_told_at_its_place(name: str, tmp_path: Path) -> None:
     change, path, message = WRONG[name]
-    text, ((line, column),) = unmarked(listed(change))
-    with pytest.raises(CaseError) as caught:
-        parse(text.encode(), tmp_path / "case.yaml")
-    (problem,) = caught.value.problems
-    assert (problem.line, problem.column, problem.path) == (line, column, path)
-    assert message in problem.message
+    found, told = told_once(listed(change), tmp_path / "case.yaml")
+    assert found == path
+    assert message in told
 
 
 def test_a_profile_need_only_reach_over_the_trajectory_it_is_for() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built, shipped
+from spatial_cases import ALLOY, Built, built, linkage, shipped
 from spatial_oracle import Tree
 
 from eigassign.mechanism import fields, local_links, velocity_terms
@@ -37,22 +37,19 @@ def unit(M: np.ndarray, A: np.ndarray) -> np.ndarray:
 def cantilever(space: str, shear: bool, **more: Any) -> Tree:
     """A clamped beam on which a carriage without mass travels."""
     beam = {"length": LENGTH, "elements": ELEMENTS, "material": "m", "section": "s"}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {"s": SECTION},
-            "links": {
-                "b": {**beam, "shear": shear, **more},
-                "car": {"type": "rigid", "mass": 0.0},
-            },
-            "joints": {
-                "foot": {"type": "fixed", "base": "ground", "follower": "b.start"},
-                "rail": {"type": "carriage", "base": "b", "follower": "car.start"},
-            },
+    return linkage(
+        {
+            "b": {**beam, "shear": shear, **more},
+            "car": {"type": "rigid", "mass": 0.0},
         },
-        "coordinates": {"x": {"joint": "rail", "drive": "locked"}},
-    }
+        {
+            "foot": {"type": "fixed", "base": "ground", "follower": "b.start"},
+            "rail": {"type": "carriage", "base": "b", "follower": "car.start"},
+        },
+        {"x": {"joint": "rail", "drive": "locked"}},
+        section=SECTION,
+        space=space,
+    )
 
 
 def nodes(s: float, rate: float, acceleration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,10 +11,7 @@ from spatial_random import random_closed
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.mechanism import (
-    shapes,
-    with_reduction,
-)
+from eigassign.mechanism import shapes, with_reduction
 from eigassign.study import with_middle_loads
 
 CASES = Path(__file__).parents[3] / "cases"

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built, shipped
+from spatial_cases import ALLOY, Built, built, linkage, shipped
 from spatial_examples import four_bar
 from timed_motions import RestToRest, integrated
 
@@ -131,24 +131,22 @@ def whirling(width: float) -> Built:
     rod = {"shape": "rectangle", "width": width, "height": 0.02}
     beam = {"length": 1.0, "elements": 1, "material": "m", "section": "s"}
     return built(
-        {
-            "mechanism": {
-                "space": "spatial",
-                "materials": {"m": {**ALLOY, "density": 1e-6}},
-                "sections": {"s": rod},
-                "links": {"b": beam},
-                "joints": {
-                    "r": {
-                        "type": "revolute",
-                        "base": "ground",
-                        "follower": "b.start",
-                        "axis": [1, 0, 0],
-                    }
-                },
-                "bodies": {"tip": {"at": "b.end", "mass": 2.0}},
+        linkage(
+            {"b": beam},
+            {
+                "r": {
+                    "type": "revolute",
+                    "base": "ground",
+                    "follower": "b.start",
+                    "axis": [1, 0, 0],
+                }
             },
-            "coordinates": {"q": {"joint": "r", "drive": "locked"}},
-        }
+            {"q": {"joint": "r", "drive": "locked"}},
+            section=rod,
+            material={**ALLOY, "density": 1e-6},
+            space="spatial",
+            bodies={"tip": {"at": "b.end", "mass": 2.0}},
+        )
     )
 
 

@@ -17,8 +17,6 @@ from eigassign.modal import Model, rounding_error
 from eigassign.series import Truncated, on_faces, total_degree
 from eigassign.study import BuiltCase, load_case
 
-# --- The affine ERLS pencil K = Bᵀ k B, M = Bᵀ m B: structure, limits, and what drops out
-
 
 def matrices(seed: int) -> tuple[Model, np.ndarray, np.ndarray, np.ndarray]:
     tree, q = random_chain(seed)

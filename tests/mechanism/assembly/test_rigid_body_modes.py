@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built, changed
+from spatial_cases import Built, built, changed, linkage
 from spatial_oracle import Tree, world
 from spatial_random import add_springs as add_random_springs
 from spatial_random import random_closed, random_open
@@ -20,20 +20,16 @@ def chain(springs: Tree, n: int = 3, **joint: Any) -> Tree:
     link = {"length": 0.4, "elements": 2, "material": "m", "section": "s"}
     names = [f"l{k}" for k in range(n)]
     ends = ["ground", *(f"{name}.end" for name in names[:-1])]
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.003}},
-            "links": {name: dict(link) for name in names},
-            "joints": {
-                f"j{k}": {"type": "revolute", "base": ends[k], "follower": f"l{k}.start", **joint}
-                for k in range(n)
-            },
-            "springs": springs,
+    return linkage(
+        {name: dict(link) for name in names},
+        {
+            f"j{k}": {"type": "revolute", "base": ends[k], "follower": f"l{k}.start", **joint}
+            for k in range(n)
         },
-        "coordinates": {f"q{k}": {"joint": f"j{k}"} for k in range(n)},
-    }  # fmt: skip
+        {f"q{k}": {"joint": f"j{k}"} for k in range(n)},
+        section={"shape": "tube", "outer_diameter": 0.03, "thickness": 0.003},
+        springs=springs,
+    )
 
 
 def turning(a: str, b: str, k: float = 400.0) -> Tree:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built
+from spatial_cases import ALLOY, Built, built, linkage
 from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
@@ -36,16 +36,13 @@ def blade(elements: int, space: str = "planar", drive: str = "locked") -> Tree:
     stiff = {"area": 5e-4, "inertia_z": 1e-9, "inertia_y": 4e-9, "torsion_constant": 4e-9}
     if space == "planar":
         stiff = {"area": 5e-4, "bending_inertia": 1e-9}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {"s": stiff},
-            "links": {"b": {"length": 1.0, "elements": elements, "material": "m", "section": "s"}},
-            "joints": {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
-        },
-        "coordinates": {"q": {"joint": "r", "drive": drive}},
-    }
+    return linkage(
+        {"b": {"length": 1.0, "elements": elements, "material": "m", "section": "s"}},
+        {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
+        {"q": {"joint": "r", "drive": drive}},
+        section=stiff,
+        space=space,
+    )
 
 
 def softened(model: Built, rate: float) -> np.ndarray:

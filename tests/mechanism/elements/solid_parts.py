@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from spatial_cases import linkage
 
 METAL = {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33}
 HEX = [
@@ -182,17 +183,13 @@ def case(folder: Path, part: Bar, held: str = "weld", **more: Any) -> dict[str, 
     }
     solid["nodes"] = {"start": {"surface": "root"}, "end": {"surface": "tip"}}
     base = {"type": "prismatic", "base": "ground", "follower": "base.start"}
-    return {
-        "title": "a bar",
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"metal": METAL},
-            "links": {"base": {"type": "rigid", "mass": 1.0}, "bar": solid | more},
-            "joints": {
-                "slide": base,
-                "weld": {"type": "fixed", "base": "base.start", "follower": "bar.start"},
-            },
+    return linkage(
+        {"base": {"type": "rigid", "mass": 1.0}, "bar": solid | more},
+        {
+            "slide": base,
+            "weld": {"type": "fixed", "base": "base.start", "follower": "bar.start"},
         },
-        "coordinates": {"x": {"joint": "slide", "drive": "locked"}},
-        "expansion": {"q": [0.0]},
-    }
+        {"x": {"joint": "slide", "drive": "locked"}},
+        materials={"metal": METAL},
+        space="spatial",
+    ) | {"title": "a bar", "expansion": {"q": [0.0]}}

@@ -6,15 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from chains import Tree, bar, model_of
-from spatial_cases import ALLOY, STEEL, built
+from spatial_cases import ALLOY, STEEL, built, linkage
 from spatial_oracle import world
 
 from eigassign.errors import CaseError
 from eigassign.mechanism import local_links, section_values
 from eigassign.modal import eigenvalues
-
-# --- Beam element matrices: the published values
-
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741
 
@@ -108,17 +105,13 @@ def test_the_torsion_constant_of_a_rectangle_is_saint_venant_s(
 
 def test_a_design_may_swap_the_sides_of_a_rectangle() -> None:
     def arm(height: float) -> Tree:
-        return {
-            "mechanism": {
-                "space": "spatial",
-                "materials": {"m": ALLOY},
-                "sections": {"s": {"shape": "rectangle", "width": 0.02, "height": height}},
-                "links": {"b": {"length": 1.0, "elements": 1, "material": "m", "section": "s"}},
-                "joints": {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
-            },
-            "coordinates": {"q": {"joint": "r", "drive": {"stiffness": 1e5}}},
-            "design": {"h": {"parameter": "sections.s.height", "min": 0.005, "max": 0.08}},
-        }
+        return linkage(
+            {"b": {"length": 1.0, "elements": 1, "material": "m", "section": "s"}},
+            {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
+            {"q": {"joint": "r", "drive": {"stiffness": 1e5}}},
+            section={"shape": "rectangle", "width": 0.02, "height": height},
+            space="spatial",
+        ) | {"design": {"h": {"parameter": "sections.s.height", "min": 0.005, "max": 0.08}}}
 
     designed = built(arm(0.03))
     for height, rel in ((0.08, 1e-12), (0.02, 1e-12), (0.01, 1e-12), (0.005, 1e-10)):
@@ -130,22 +123,18 @@ def test_a_design_may_swap_the_sides_of_a_rectangle() -> None:
 
 
 def on_a_drive(space: str, link: Tree, follower: str = "link.start") -> Tree:
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY, "steel": STEEL},
-            "sections": {
-                "s": {"shape": "rectangle", "width": 0.02, "height": 0.05},
-                "bar": {"shape": "tube", "outer_diameter": 0.02, "thickness": 0.002},
-            },
-            "links": {"link": link},
-            "joints": {
-                "root": {"type": "revolute", "base": "ground", "follower": follower}
-            },
-            "bodies": {"tip": {"at": "link.end", "mass": 0.4}},
+    return linkage(
+        {"link": link},
+        {"root": {"type": "revolute", "base": "ground", "follower": follower}},
+        {"q": {"joint": "root", "drive": {"stiffness": 2e4}}},
+        sections={
+            "s": {"shape": "rectangle", "width": 0.02, "height": 0.05},
+            "bar": {"shape": "tube", "outer_diameter": 0.02, "thickness": 0.002},
         },
-        "coordinates": {"q": {"joint": "root", "drive": {"stiffness": 2e4}}},
-    }  # fmt: skip
+        materials={"m": ALLOY, "steel": STEEL},
+        space=space,
+        bodies={"tip": {"at": "link.end", "mass": 0.4}},
+    )
 
 
 def frame(nodes: Tree, beams: list[tuple[str, str, int]], **more: object) -> Tree:
@@ -210,17 +199,14 @@ def tapered(shape: str, shear: bool, design: Tree) -> Tree:
     thick, change = sizes[shape]
     thick = {"shape": shape, **thick}
     beam = {"length": 0.7, "material": "m", "section": TAPER, "elements": 5, "shear": shear}
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33}},
-            "sections": {"thick": thick, "thin": {**thick, **change}},
-            "links": {"beam": {**beam, "roll": 0.3}},
-            "joints": {"hinge": {"type": "revolute", "base": "ground", "follower": "beam.start"}},
-        },
-        "coordinates": {"q": {"joint": "hinge"}},
-        "design": design,
-    }
+    return linkage(
+        {"beam": {**beam, "roll": 0.3}},
+        {"hinge": {"type": "revolute", "base": "ground", "follower": "beam.start"}},
+        {"q": {"joint": "hinge"}},
+        sections={"thick": thick, "thin": {**thick, **change}},
+        material={"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33},
+        space="spatial",
+    ) | {"design": design}
 
 
 @pytest.mark.parametrize("shear", [False, True])
@@ -238,21 +224,17 @@ def twins(second: Tree, bodies: Tree | None = None, design: Tree | None = None) 
     """Two beams on two hinges in a row, alike but for what ``second`` changes."""
     beam = {"length": 0.5, "material": "m", "section": "rod", "elements": 3}
     joint = {"type": "revolute", "base": "ground", "follower": "one.start"}
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3}},
-            "sections": {name: {"shape": "circle", "diameter": 0.02} for name in ("rod", "bar")},
-            "links": {"one": beam, "two": {**beam, **second}},
-            "joints": {
-                "a": joint,
-                "b": {**joint, "base": "one.end", "follower": "two.start"},
-            },
-            "bodies": bodies or {},
+    return linkage(
+        {"one": beam, "two": {**beam, **second}},
+        {
+            "a": joint,
+            "b": {**joint, "base": "one.end", "follower": "two.start"},
         },
-        "coordinates": {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
-        "design": design or {},
-    }
+        {"q1": {"joint": "a"}, "q2": {"joint": "b"}},
+        sections={name: {"shape": "circle", "diameter": 0.02} for name in ("rod", "bar")},
+        material={"youngs_modulus": 7e10, "density": 2.7e3},
+        bodies=bodies or {},
+    ) | {"design": design or {}}
 
 
 def test_copies_move_as_if_each_had_its_own_mesh() -> None:

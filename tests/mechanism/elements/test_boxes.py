@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.sparse.linalg import splu
-from spatial_cases import ALLOY, built
+from spatial_cases import built, linkage
 from spatial_oracle import Tree, world
 
 from eigassign.mechanism import section_values
@@ -112,25 +112,23 @@ def test_thin_walls_have_bredts_torsion_and_cowpers_shear() -> None:
 def arm(space: str, section: Tree, shear: bool) -> Tree:
     thin = {**section, "width": 0.03, "height": 0.05, "thickness": 0.0025}
     beam = {"length": 0.5, "elements": 3, "material": "m", "shear": shear}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": ALLOY},
-            "sections": {"s": section, "e": thin},
-            "links": {
-                "a": {**beam, "section": "s"},
-                "b": {**beam, "section": {"start": "s", "end": "e"}},
-            },
-            "joints": {
-                "r": {"type": "revolute", "base": "ground", "follower": "a.start"},
-                "f": {"type": "fixed", "base": "a.end", "follower": "b.start"},
-            },
+    return linkage(
+        {
+            "a": {**beam, "section": "s"},
+            "b": {**beam, "section": {"start": "s", "end": "e"}},
         },
-        "coordinates": {"q": {"joint": "r", "drive": {"stiffness": 1e5}}},
+        {
+            "r": {"type": "revolute", "base": "ground", "follower": "a.start"},
+            "f": {"type": "fixed", "base": "a.end", "follower": "b.start"},
+        },
+        {"q": {"joint": "r", "drive": {"stiffness": 1e5}}},
+        sections={"s": section, "e": thin},
+        space=space,
+    ) | {
         "design": {
             "t": {"parameter": "sections.s.thickness", "min": 0.001, "max": 0.01},
             "h": {"parameter": "sections.s.height", "min": 0.03, "max": 0.1},
-        },
+        }
     }
 
 

@@ -10,6 +10,7 @@ import pytest
 from scipy import sparse
 from scipy.sparse import linalg
 from solid_parts import METAL, Bar, bar, bdf, case, inp, msh
+from spatial_cases import linkage
 
 import eigassign
 import eigassign as ea
@@ -112,27 +113,23 @@ def test_two_brackets_are_calculix_arm() -> None:
     solid = {"type": "solid", "mesh": str(BRACKET), "units": "mm-t-s", "material": "metal"}
     nodes = {name: {"surface": name} for name in ("bore", "bolt_a", "bolt_b")}
     solid |= {"nodes": nodes, "reduce_to": 2e4}
-    arm = {
-        "title": "two brackets",
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"metal": METAL},
-            "links": {"base": {"type": "rigid", "mass": 1.0}, "one": solid, "two": solid},
-            "joints": {
-                "slide": {"type": "prismatic", "base": "ground", "follower": "base.start"},
-                "weld": {"type": "fixed", "base": "base.start", "follower": "one.bolt_a"},
-                "hinge": {
-                    **{"type": "revolute", "base": "one.bore", "follower": "two.bolt_a"},
-                    "axis": [0, 0, 1],
-                },
+    arm = linkage(
+        {"base": {"type": "rigid", "mass": 1.0}, "one": solid, "two": solid},
+        {
+            "slide": {"type": "prismatic", "base": "ground", "follower": "base.start"},
+            "weld": {"type": "fixed", "base": "base.start", "follower": "one.bolt_a"},
+            "hinge": {
+                **{"type": "revolute", "base": "one.bore", "follower": "two.bolt_a"},
+                "axis": [0, 0, 1],
             },
         },
-        "coordinates": {
+        {
             "x": {"joint": "slide", "drive": "locked"},
             "turn": {"joint": "hinge", "drive": "locked"},
         },
-        "expansion": {"q": [0.0, 0.0]},
-    }
+        materials={"metal": METAL},
+        space="spatial",
+    ) | {"title": "two brackets", "expansion": {"q": [0.0, 0.0]}}
     model = ea.load_case(arm, allow_outside=True).model()
     joined_hz = [89.38297, 144.1505, 409.0060, 575.7838, 671.3159, 833.3913]
     found = model.frequencies([0.0, np.deg2rad(30.0)], [], 6)[0]

@@ -146,32 +146,31 @@ def good(tmp_path: Path) -> Tree:
     return part("planar", write(tmp_path, "npy", *exported("planar")))
 
 
-@pytest.mark.parametrize("dofs", [[24, 25, 27], [24, 25, 25], [0, 1, 2]])
-def test_dof_numbers_outside_the_matrix_or_given_twice_are_refused(
-    tmp_path: Path, good: Tree, dofs: list[int]
+OUTSIDE = ("dofs", "nodes", "different and within 0 to 26")
+OTHER = ("dofs", "stiffness", "strains under rigid motion")
+ELSEWHERE = ("position", "stiffness", "positions or dof numbers")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "value"),
+    [
+        *((OUTSIDE, dofs) for dofs in ([24, 25, 27], [24, 25, 25], [0, 1, 2])),
+        *((OTHER, dofs) for dofs in ([25, 24, 26], [24, 26, 25], [21, 22, 23], [24, 22, 26])),
+        *((ELSEWHERE, at) for at in ([0.5, 0.0], [0.6, 0.1], [-0.6, 0.0], [600.0, 0.0])),
+    ],
+)
+def test_dof_numbers_and_positions_that_do_not_fit_the_matrix_are_refused(
+    tmp_path: Path, good: Tree, wrong: tuple[str, str, str], value: list[float]
 ) -> None:
-    good["nodes"]["end"]["dofs"] = dofs
-    refused(tmp_path, good, "nodes", "different and within 0 to 26")
+    key, path, message = wrong
+    good["nodes"]["end"][key] = value
+    refused(tmp_path, good, path, message)
 
 
 def test_negative_dof_numbers_are_refused_in_the_file(tmp_path: Path, good: Tree) -> None:
     good["nodes"]["end"]["dofs"] = [-1, 25, 26]
     with pytest.raises(CaseError, match=">= 0"):
         built(arm("planar", {"part": good}), tmp_path / "case.yaml")
-
-
-@pytest.mark.parametrize("dofs", [[25, 24, 26], [24, 26, 25], [21, 22, 23], [24, 22, 26]])
-def test_dof_numbers_that_do_not_fit_the_matrix_are_refused(
-    tmp_path: Path, good: Tree, dofs: list[int]
-) -> None:
-    good["nodes"]["end"]["dofs"] = dofs
-    refused(tmp_path, good, "stiffness", "strains under rigid motion")
-
-
-@pytest.mark.parametrize("place", [[0.5, 0.0], [0.6, 0.1], [-0.6, 0.0], [600.0, 0.0]])
-def test_a_wrong_position_is_refused(tmp_path: Path, good: Tree, place: list[float]) -> None:
-    good["nodes"]["end"]["position"] = place
-    refused(tmp_path, good, "stiffness", "positions or dof numbers")
 
 
 def entry(A: np.ndarray, at: int, value: float) -> np.ndarray:
@@ -232,25 +231,6 @@ def test_a_part_with_something_loose_inside_is_refused(tmp_path: Path) -> None:
     tree = arm("planar", {"part": part("planar", files)})
     with pytest.raises(MechanismError, match=r"links\.part: is loose inside"):
         _ = built(tree, tmp_path / "case.yaml").pencil
-
-
-@pytest.mark.parametrize(
-    ("header", "body", "message"),
-    [
-        ("complex general", "1 1 1 0", "no matrix of real numbers"),
-        ("pattern general", "1 1", "no matrix of real numbers"),
-        ("real skew-symmetric", "2 1 1", "general or symmetric"),
-        ("real general", "1 9 1", "cannot read"),
-        ("real general", "1 1 one", "cannot read"),
-    ],
-)
-def test_matrix_market_files_of_other_kinds_are_refused(
-    tmp_path: Path, good: Tree, header: str, body: str, message: str
-) -> None:
-    text = f"%%MatrixMarket matrix coordinate {header}\n3 3 1\n{body}\n"
-    (tmp_path / "K.mtx").write_text(text)
-    good["stiffness"] = "K.mtx"
-    refused(tmp_path, good, "stiffness", message)
 
 
 def test_integers_and_single_precision_are_read(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import built
+from spatial_cases import built, linkage
 from spatial_oracle import Tree
 from tapered_cantilever import Values, frequency_beside
 
@@ -21,16 +21,13 @@ LYING = (
 def bar(n: int, ends: Any, space: str = "planar", **beam: Any) -> Tree:
     """One beam clamped to the ground, from one section to another."""
     link = {"length": LENGTH, "elements": n, "section": {"start": "a", "end": "b"}, "material": "m"}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": {"youngs_modulus": E, "density": RHO, "shear_modulus": G}},
-            "sections": dict(zip("ab", ends, strict=True)),
-            "links": {"bar": {**link, **beam}},
-            "joints": {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
-        },
-        "coordinates": {},
-    }
+    return linkage(
+        {"bar": {**link, **beam}},
+        {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
+        sections=dict(zip("ab", ends, strict=True)),
+        material={"youngs_modulus": E, "density": RHO, "shear_modulus": G},
+        space=space,
+    )
 
 
 def hz(tree: Tree, count: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from spatial_cases import built
+from spatial_cases import built, linkage
 from spatial_oracle import Tree
 
 from eigassign.mechanism import section_values
@@ -21,16 +21,13 @@ A, I, KAPPA = B * H, B * H**3 / 12, 5 / 6  # noqa: E741
 def bar(length: float, n: int, space: str = "planar", **beam: Any) -> Tree:
     """One beam clamped to the ground; H lies in the plane."""
     link = {"length": length, "elements": n, "section": "s", "material": "m", **beam}
-    return {
-        "mechanism": {
-            "space": space,
-            "materials": {"m": {"youngs_modulus": E, "density": RHO, "poissons_ratio": NU}},
-            "sections": {"s": {"shape": "rectangle", "width": B, "height": H}},
-            "links": {"bar": link},
-            "joints": {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
-        },
-        "coordinates": {},
-    }
+    return linkage(
+        {"bar": link},
+        {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
+        section={"shape": "rectangle", "width": B, "height": H},
+        material={"youngs_modulus": E, "density": RHO, "poissons_ratio": NU},
+        space=space,
+    )
 
 
 def pinned(tree: Tree) -> Tree:

@@ -29,6 +29,7 @@ from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism import part_lines
 
 CCX = Path(__file__).parent / "calculix"
+MARKET = "%%MatrixMarket matrix coordinate"
 PRINTED_HZ = [6634.938, 8549.826, 11988.96, 18453.90, 21866.74, 22228.68]  # by CalculiX
 
 
@@ -314,6 +315,11 @@ def test_an_asymmetry_is_told_by_its_own_rows(tmp_path: Path) -> None:
         ("1,1, 1,1\n", "cannot read"),
         ("MATLAB 7.3 MAT-file, Platform: GLNXA64" + 90 * " ", "save it with '-v7'"),
         ("MATLAB 5.0 MAT-file" + 109 * " ", "cannot read"),
+        (f"{MARKET} complex general\n3 3 1\n1 1 1 0\n", "no matrix of real numbers"),
+        (f"{MARKET} pattern general\n3 3 1\n1 1\n", "no matrix of real numbers"),
+        (f"{MARKET} real skew-symmetric\n3 3 1\n2 1 1\n", "general or symmetric"),
+        (f"{MARKET} real general\n3 3 1\n1 9 1\n", "cannot read"),
+        (f"{MARKET} real general\n3 3 1\n1 1 one\n", "cannot read"),
         ("hello\n", "cannot read"),
         ("", "cannot read"),
     ],

@@ -6,19 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from planar_arms import open_chain_tip, serial_arm, two_link_angles
-from spatial_cases import built
+from spatial_cases import built, linkage
 from tip_paths import chain_of, course
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism import (
-    Course,
-    TipChain,
-    follow,
-    tip_path,
-)
-
-# --- Inverse kinematics along paths, against closed forms
-
+from eigassign.mechanism import Course, TipChain, follow, tip_path
 
 straight, spline = (partial(tip_path, kind=kind) for kind in ("straight", "spline"))
 TAU = 2.0 * np.pi
@@ -270,12 +262,7 @@ RIGID = {"type": "rigid", "mass": 1.0}
 
 
 def spatial(joints: dict, links: dict, coordinates: dict) -> dict:
-    return {
-        "mechanism": {
-            "space": "spatial", "materials": {}, "sections": {}, "joints": joints, "links": links,
-        },
-        "coordinates": coordinates,
-    }  # fmt: skip
+    return linkage(links, joints, coordinates, sections={}, materials={}, space="spatial")
 
 
 def link(*end: float) -> dict:

@@ -6,14 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_arms import two_link_angles
-from redesigned_arms import (
-    cart,
-    extrapolated,
-    five_bar,
-    six_joints,
-    slider_crank,
-    two_link_lengths,
-)
+from redesigned_arms import cart, extrapolated, five_bar, six_joints, slider_crank, two_link_lengths
 
 from eigassign import Case
 from eigassign.errors import CaseError, TrajectoryError

@@ -146,10 +146,15 @@ def equal_chords(curve: Any, first: float, step: float, n: int) -> np.ndarray:
     return np.array(u)
 
 
+def coupler(angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends of the four-bar's coupler."""
+    b = 0.12 * np.array([np.cos(angle), np.sin(angle)])
+    return b, circles(b, 0.45, np.array([0.5, 0.0]), 0.4, +1.0)
+
+
 def coupler_point(angle: float) -> np.ndarray:
     """The tip of a plate on the four-bar's coupler, 0.2 m along it and 0.1 m above."""
-    b = 0.12 * np.array([np.cos(angle), np.sin(angle)])
-    c = circles(b, 0.45, np.array([0.5, 0.0]), 0.4, +1.0)
+    b, c = coupler(angle)
     e = (c - b) / 0.45
     return b + 0.2 * e + 0.1 * np.array([-e[1], e[0]])
 
@@ -181,16 +186,11 @@ def test_a_four_bars_coupler_point_follows_its_curve() -> None:
 
 
 def test_a_point_beside_the_coupler_curve_is_refused_with_advice() -> None:
-    points = [coupler_end(a).tolist() for a in (80 * DEG, 120 * DEG)]
+    points = [coupler(a)[1].tolist() for a in (80 * DEG, 120 * DEG)]
     message = refused("four_bar", {"tip": "coupler.end", "waypoints": points})
     assert "m out of reach" in message
     assert "move 1 of the 2 components" in message
     assert "give points or samples of the coordinates instead" in message
-
-
-def coupler_end(angle: float) -> np.ndarray:
-    b = 0.12 * np.array([np.cos(angle), np.sin(angle)])
-    return circles(b, 0.45, np.array([0.5, 0.0]), 0.4, +1.0)
 
 
 def test_a_slider_is_placed_by_its_crank() -> None:

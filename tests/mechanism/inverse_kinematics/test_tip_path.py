@@ -12,9 +12,6 @@ from tip_paths import course
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism import follow, tip_path
 
-# --- Tip paths: polyline and not-a-knot cubic spline
-
-
 straight, spline = (partial(tip_path, kind=kind) for kind in ("straight", "spline"))
 S = np.linspace(0.0, 1.0, 301)
 BOTH = pytest.mark.parametrize("path", [straight, spline])

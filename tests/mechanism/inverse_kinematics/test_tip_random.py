@@ -12,9 +12,6 @@ from tip_paths import between, chain_of, course, states, tips
 
 from eigassign.mechanism import TipChain, follow, reduced
 
-# --- What inverse kinematics sees of a mechanism, against differences and an independent oracle
-
-
 H = 1e-6  # central differences: error about h² and 1e-16 / h
 SPACES = ["planar", "spatial"]
 
@@ -125,30 +122,19 @@ def mechanism(seed: int, space: str, oriented: bool, closed: bool) -> tuple[Tree
     raise AssertionError("no mechanism found")
 
 
-@pytest.mark.parametrize("oriented", [False, True])
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize(
-    "seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 8))]
-)
-def test_open_chains_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
-    follow_and_judge(*mechanism(seed, space, oriented, closed=False), seed, oriented)
+OPEN = [(k, space, False) for k in range(8) for space in SPACES]
+DRAWN = [*OPEN, (0, "planar", True), (1, "spatial", True), (1, "planar", True), (2, "planar", True)]
+QUICK = [*OPEN[:6], *DRAWN[16:18]]
 
 
 @pytest.mark.parametrize("oriented", [False, True])
 @pytest.mark.parametrize(
-    ("seed", "space"),
-    [
-        (0, "planar"),
-        (1, "spatial"),
-        *(pytest.param(k, "planar", marks=pytest.mark.slow) for k in (1, 2)),
-    ],
+    "drawn", [d if d in QUICK else pytest.param(d, marks=pytest.mark.slow) for d in DRAWN], ids=str
 )
-def test_mechanisms_with_loops_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
-    follow_and_judge(*mechanism(seed, space, oriented, closed=True), seed, oriented)
-
-
-def follow_and_judge(tree: Tree, q: np.ndarray, seed: int, oriented: bool) -> None:
+def test_mechanisms_stay_on_their_paths(drawn: tuple[int, str, bool], oriented: bool) -> None:
     """From the tip's place at q along a short bent path, turning a little if oriented."""
+    seed, space, closed = drawn
+    tree, q = mechanism(seed, space, oriented, closed)
     tip, rng = last_node(tree), np.random.default_rng(seed)
     chain = chain_of(built(tree), tip, oriented)
     seen = chain.evaluate(states(chain, q))

@@ -19,9 +19,6 @@ from eigassign.mechanism import JointEdge, Placement, all_moving, joint_motion, 
 from eigassign.modal import eigenvalues
 from eigassign.series import Samples, compile_table
 
-# --- Joints by differences: freedoms from their own motion, twists from world frames
-
-
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
 JOINTS = [
     Given(type="fixed"),
@@ -232,7 +229,6 @@ def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:
         foot = none if link is None else end
         edge = JointEdge("", ("ground", ""), ("", "start"))
         link = Placement("", edge, R, none, np.zeros((6, 0)), np.zeros((6, 0)), link, foot, none)
-    assert link is not None
     angles = bend * np.arange(1, count)  # of all links that carry another
     reached = [length * np.cos(angles).sum(), length * np.sin(angles).sum(), 0.0]
     np.testing.assert_allclose(link.world_origin.astype(float), reached, rtol=1e-10)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built, changed
+from spatial_cases import ALLOY, Built, built, changed, linkage
 from spatial_examples import arm3r, four_bar, slider_crank, straight
 from spatial_oracle import Tree, world
 
@@ -65,16 +65,12 @@ def rssr(driven: int) -> Tree:
         "B": {"type": "revolute", "base": "ground", "follower": "rocker.start", "axis": [0, 1, 0]},
     }
     joints["B"]["position"] = [0.4, 0.1, 0.0]
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {name: straight(length, 2) for name, length in beams.items()},
-            "joints": joints,
-        },
-        "coordinates": {"th": {"joint": "A"}, "spin": {"joint": "S1", "component": driven}},
-    }
+    return linkage(
+        {name: straight(length, 2) for name, length in beams.items()},
+        joints,
+        {"th": {"joint": "A"}, "spin": {"joint": "S1", "component": driven}},
+        space="spatial",
+    )
 
 
 @pytest.mark.parametrize("driven", [1, 3])
@@ -120,18 +116,7 @@ def test_loops_that_close_as_they_are_drawn_need_no_guess() -> None:
         "right": {"type": "revolute", "base": "roller.start", "follower": "beam.end"},
     }
     joints["slide"]["position"] = [1.0, 0.0]
-    model = built(
-        {
-            "mechanism": {
-                "space": "planar",
-                "materials": {"m": ALLOY},
-                "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-                "links": {"beam": beam, "roller": roller},
-                "joints": joints,
-            },
-            "coordinates": {},
-        }
-    )
+    model = built(linkage({"beam": beam, "roller": roller}, joints))
     d, E, rho = 0.02, ALLOY["youngs_modulus"], ALLOY["density"]
     exact = np.array([(n * np.pi) ** 4 * E * d**2 / (16 * rho) for n in (1, 2)])
     np.testing.assert_allclose(model.lam([[]], 2), exact, rtol=2e-3)
@@ -142,19 +127,13 @@ def clamped_triangle(side: float, turn: float = -np.pi / 2) -> Tree:
     beams = {"a": 1.0, "b": side, "c": side}
     ends = {"j0": ("ground", "a.start"), "j1": ("a.start", "b.start"), "j2": ("b.end", "c.start")}
     angles = {"j0": 0.0, "j1": np.pi / 4, "j2": turn, "j3": np.pi / 4}
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {name: straight(length, 3) for name, length in beams.items()},
-            "joints": {
-                name: {"type": "fixed", "base": base, "follower": follower, "angle": angles[name]}
-                for name, (base, follower) in {**ends, "j3": ("c.end", "a.end")}.items()
-            },
+    return linkage(
+        {name: straight(length, 3) for name, length in beams.items()},
+        {
+            name: {"type": "fixed", "base": base, "follower": follower, "angle": angles[name]}
+            for name, (base, follower) in {**ends, "j3": ("c.end", "a.end")}.items()
         },
-        "coordinates": {},
-    }
+    )
 
 
 def test_a_clamped_loop_of_rounded_dimensions_is_closed_as_if_it_met() -> None:
@@ -187,17 +166,13 @@ def cardan_shaft(place: list[float]) -> Tree:
         "V": {**cross, "base": "middle.end", "follower": "driven.start", "axes": [z, y]},
         "B": {**turning, "follower": "driven.end", "position": [*place, 0.0]},
     }
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {name: straight(length, 2) for name, length in beams.items()},
-            "joints": joints,
-            "assembly": {"at": {"th": 0.4}, "guess": {"U": [0.18, 0.4], "V": [-0.4, -0.18]}},
-        },
-        "coordinates": {"th": {"joint": "A"}},
-    }
+    return linkage(
+        {name: straight(length, 2) for name, length in beams.items()},
+        joints,
+        {"th": {"joint": "A"}},
+        space="spatial",
+        assembly={"at": {"th": 0.4}, "guess": {"U": [0.18, 0.4], "V": [-0.4, -0.18]}},
+    )
 
 
 def test_a_cardan_shaft_of_rounded_dimensions_is_told_its_gap_and_what_to_do() -> None:
@@ -224,16 +199,7 @@ def test_loops_that_do_not_reach_where_they_are_put_together_ask_for_another_pos
         "S": {"type": "prismatic", "base": "foot.end", "follower": "head.start"},
         "C": {**hinge, "base": "head.end", "follower": "boom.end"},
     }
-    tree: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": links,
-            "joints": joints,
-        },
-        "coordinates": {"stroke": {"joint": "S"}},
-    }
+    tree: Tree = linkage(links, joints, {"stroke": {"joint": "S"}})
     says = r"at stroke = 0 m: links do not reach.* nearest pose found leaves 0.2 m.*assembly: \{at"
     with pytest.raises(MechanismError, match=says) as caught:
         built(tree)
@@ -284,19 +250,15 @@ def parallelogram(arm: float = 1.0, crank: float = 0.3) -> Tree:
         "eye": ("rod.end", "fore.lever"),
     }
     links = {"lower": straight(arm, 2), "crank": straight(crank, 2), "rod": straight(arm, 2)}
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": ALLOY},
-            "sections": {"s": {"shape": "circle", "diameter": 0.03}},
-            "links": {**links, "fore": fore},
-            "joints": {
-                name: {"type": "revolute", "base": base, "follower": follower}
-                for name, (base, follower) in pins.items()
-            },
+    return linkage(
+        {**links, "fore": fore},
+        {
+            name: {"type": "revolute", "base": base, "follower": follower}
+            for name, (base, follower) in pins.items()
         },
-        "coordinates": {"q1": {"joint": "shoulder"}, "q2": {"joint": "motor"}},
-    }
+        {"q1": {"joint": "shoulder"}, "q2": {"joint": "motor"}},
+        section={"shape": "circle", "diameter": 0.03},
+    )
 
 
 def five_bar() -> Tree:
@@ -498,6 +460,14 @@ def test_an_absolute_angle_carried_by_a_passive_joint_is_refused_by_name() -> No
 
 
 # More mechanisms
+
+
+def test_a_second_joint_on_the_same_pin_changes_nothing() -> None:
+    tree = four_bar("free")
+    pin = {"type": "revolute", "base": "crank.end", "follower": "coupler.start"}
+    tree["mechanism"]["joints"]["again"] = pin
+    expected = built(four_bar("free")).lam([0.6], 3)
+    np.testing.assert_allclose(built(tree).lam([0.6], 3), expected, rtol=1e-8)
 
 
 def test_a_planar_linkage_is_the_same_in_space_where_its_loop_is_overconstrained() -> None:

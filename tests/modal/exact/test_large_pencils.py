@@ -8,14 +8,11 @@ import pytest
 from chains import model_of, random_chain, two_link
 from large import large
 from scipy import sparse
+from spatial_cases import linkage
 
 from eigassign.errors import MissingMassError
 from eigassign.mechanism import Pencil
-from eigassign.modal import (
-    modes,
-    rounding_error,
-    solve_large,
-)
+from eigassign.modal import modes, rounding_error, solve_large
 
 CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
 SAMPLES = 8
@@ -55,35 +52,32 @@ def twins(arms: int = 3) -> dict[str, Any]:
     """A driven beam with equal beams fixed to its end: modes of these alone that no joint feels."""
     names = [f"arm{k}" for k in range(arms)]
     beam = {"material": "steel", "section": "rod", "elements": 4}
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"steel": {"youngs_modulus": 2e11, "density": 7800.0}},
-            "sections": {"rod": {"shape": "circle", "diameter": 0.02}},
-            "links": {
-                "base": {"length": 0.5, **beam},
-                "trunk": {"length": 0.3, **beam},
-                **{name: {"length": 0.4, **beam} for name in names},
-            },
-            "joints": {
-                "first": {"type": "revolute", "base": "ground", "follower": "base.start"},
-                "hinge": {"type": "revolute", "base": "base.end", "follower": "trunk.start"},
-                **{
-                    f"at_{name}": {
-                        "type": "fixed",
-                        "base": "trunk.end",
-                        "follower": f"{name}.start",
-                        "angle": 2.0 * np.pi * k / arms,
-                    }
-                    for k, name in enumerate(names)
-                },
+    return linkage(
+        {
+            "base": {"length": 0.5, **beam},
+            "trunk": {"length": 0.3, **beam},
+            **{name: {"length": 0.4, **beam} for name in names},
+        },
+        {
+            "first": {"type": "revolute", "base": "ground", "follower": "base.start"},
+            "hinge": {"type": "revolute", "base": "base.end", "follower": "trunk.start"},
+            **{
+                f"at_{name}": {
+                    "type": "fixed",
+                    "base": "trunk.end",
+                    "follower": f"{name}.start",
+                    "angle": 2.0 * np.pi * k / arms,
+                }
+                for k, name in enumerate(names)
             },
         },
-        "coordinates": {
+        {
             "q1": {"joint": "first", "drive": "locked"},
             "q2": {"joint": "hinge", "drive": "locked"},
         },
-    }
+        sections={"rod": {"shape": "circle", "diameter": 0.02}},
+        materials={"steel": {"youngs_modulus": 2e11, "density": 7800.0}},
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])

@@ -5,24 +5,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from spatial_cases import linkage
 
 import eigassign as ea
 from eigassign.errors import CaseError, MechanismError
 
 EI = 210e9 * np.pi * 0.02**4 / 64
-ROD: dict[str, Any] = {
-    "title": "rod",
-    "mechanism": {
-        "space": "planar",
-        "gravity": [0.0, -9.81],
-        "materials": {"steel": {"youngs_modulus": 210e9, "density": 1e-3}},
-        "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-        "links": {"rod": {"length": 2.0, "elements": 8, "section": "s", "material": "steel"}},
-        "joints": {"hinge": {"type": "revolute", "base": "ground", "follower": "rod.start"}},
-        "bodies": {"b": {"at": "rod.end", "mass": 5.0}},
-    },
-    "coordinates": {"q": {"joint": "hinge", "drive": "free"}},
-}
+ROD: dict[str, Any] = linkage(
+    {"rod": {"length": 2.0, "elements": 8, "section": "s", "material": "steel"}},
+    {"hinge": {"type": "revolute", "base": "ground", "follower": "rod.start"}},
+    {"q": {"joint": "hinge", "drive": "free"}},
+    materials={"steel": {"youngs_modulus": 210e9, "density": 1e-3}},
+    gravity=[0.0, -9.81],
+    bodies={"b": {"at": "rod.end", "mass": 5.0}},
+) | {"title": "rod"}
 
 
 def rod(drive: Any = "free", mass: float = 5.0, elements: int = 8, **more: Any) -> ea.Case:

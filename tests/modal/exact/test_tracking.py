@@ -5,14 +5,7 @@ import pytest
 from meetings import E_ONE, line, two_bars
 
 from eigassign.errors import LostModeError
-from eigassign.modal import (
-    FollowedShape,
-    Model,
-    ModesAtPoint,
-    MoreModesError,
-    follow,
-    places,
-)
+from eigassign.modal import FollowedShape, Model, ModesAtPoint, MoreModesError, follow, places
 
 
 def start(at: ModesAtPoint, number: int) -> FollowedShape:

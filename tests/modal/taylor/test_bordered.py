@@ -11,12 +11,7 @@ from scipy.sparse.linalg import splu
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism import Pencil, factorise
-from eigassign.modal import (
-    expand,
-    factor_dense,
-    factor_sparse,
-    modes,
-)
+from eigassign.modal import expand, factor_dense, factor_sparse, modes
 
 
 def mode_system(pencil: Pencil, x0: np.ndarray, mode: int) -> tuple[np.ndarray, ...]:

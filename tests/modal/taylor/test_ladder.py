@@ -70,7 +70,6 @@ def test_first_derivatives_are_those_of_the_plain_frame_rebuilt(name: str) -> No
     """The oracle is built anew for every value: a design parameter that reaches only part of the
     model, or a passive joint that does not follow a length, would show."""
     s = scene(name)
-    assert s.tree is not None
     e = s.expand(1)
     size = float(e.coefficients[0, 0])
     for k, width in enumerate(s.span):

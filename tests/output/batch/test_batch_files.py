@@ -8,15 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from eigassign.output import (
-    CaseOutcome,
-    from_plain,
-    index_page,
-    to_plain,
-    write_files,
-)
+from eigassign.output import CaseOutcome, from_plain, index_page, to_plain, write_files
 
 KEYS = ("body.mass", "kind")
 NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html")
@@ -71,12 +63,6 @@ def test_links_of_the_page_are_those_of_folders_whose_names_are_no_text(tmp_path
     (tmp_path / name / "results.json").touch()
     write_files(tmp_path, [CaseOutcome("c", "arm.yaml", "ok", 0.5, run_folder=name)])
     assert page_data(tmp_path)["links"] == [["caf%E9/results.json", ""]]
-
-
-@pytest.mark.parametrize("n", [0, 1])
-def test_a_batch_may_be_empty(tmp_path, n):
-    write_files(tmp_path, rows_of(n), KEYS)
-    assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + n
 
 
 def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_path):

@@ -26,7 +26,6 @@ def assigned(text: str) -> tuple[ea.Case, Result, AssignmentRow]:
     case = ea.Case(parse(text.encode(), "case.yaml"))
     result = ea.assign(case)
     row = result.results.assignment
-    assert row is not None
     return case, result, row
 
 

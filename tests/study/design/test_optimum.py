@@ -88,7 +88,6 @@ def test_what_is_cheapest_of_all_and_meets_all_limits_ends_the_search(tmp_path: 
 
 def test_starts_go_on_until_no_half_optimum_more_is_expected(tmp_path: Path) -> None:
     tally = found_of(tmp_path, SHIPPED, []).tally
-    assert tally is not None
     assert (tally.starts, tally.optima, tally.unseen) == (7, 1, 0.5)
 
 
@@ -97,5 +96,4 @@ def test_two_masses_at_one_place_make_no_optima_distinct(tmp_path: Path) -> None
     second = ("    tool_mass: {at: forearm.end, mass: 0}", "    more: {at: forearm.end, mass: 0}")
     more = ("  m2: {", "  m3: {parameter: bodies.more.mass, min: 0, max: 250 g}\n  m2: {")
     tally = found_of(tmp_path, automatic((second[0], "\n".join(second)), more), []).tally
-    assert tally is not None
     assert (tally.starts, tally.optima) == (7, 1)

@@ -82,7 +82,6 @@ def test_limits_are_said_to_contradict_where_they_do(seed: int) -> None:
     case = BuiltCase(parse(text.encode(), "case.yaml"))
     result = solve_case(case, Options(use_cache=False, study="none"))
     row, y = result.results.assignment, np.array(list(result.design.values()))
-    assert row is not None
     gap, amounts = limits.gap(list(range(len(limits.names)))), limits.C @ y
     said = {one.name: one for one in row.limits}
     own = {name: ARM if name == "design.mass" else 0.0 for name in limits.names}

@@ -32,7 +32,6 @@ def peak(drawn: dict[str, Any], mass: float) -> float:
 def answer(drawn: dict[str, Any]) -> tuple[str, float]:
     """The verdict, and the mass in kg."""
     result = ea.assign(ea.Case(parse(CASE.format(**drawn).encode(), "case.yaml")))
-    assert result.results.assignment is not None
     (row,) = result.results.drives
     mass = result.design["tool"]
     np.testing.assert_allclose(row.optimal.peak, peak(drawn, mass), rtol=1e-3)

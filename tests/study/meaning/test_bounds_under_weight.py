@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from chains import case_of
 from scipy.spatial.transform import Rotation
+from spatial_examples import straight
 
 import eigassign as ea
 from eigassign.errors import MechanismError
@@ -15,10 +16,6 @@ from eigassign.pipeline import Stages, prepare
 from eigassign.study import Scene, proved_ranges
 
 MATERIAL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}
-
-
-def beam(length: float) -> dict[str, Any]:
-    return {"length": length, "elements": 2, "section": "s", "material": "m"}
 
 
 def arm(seed: int, design: dict[str, Any]) -> ea.Case:
@@ -37,7 +34,7 @@ def arm(seed: int, design: dict[str, Any]) -> ea.Case:
             "gravity": [0.0, -9.81 * 10.0 ** rng.uniform(-1.0, 1.0)],
             "materials": {"m": MATERIAL},
             "sections": {"s": {"shape": "circle", "diameter": rng.uniform(0.01, 0.03)}},
-            "links": {name: beam(rng.uniform(0.3, 1.0)) for name in "abc"},
+            "links": {name: straight(rng.uniform(0.3, 1.0), 2) for name in "abc"},
             "joints": joints,
             "bodies": {
                 name: {"at": f"{link}.end", "mass": 10.0 ** rng.uniform(-1.0, 1.5),
@@ -97,7 +94,7 @@ def slewing(inertia: float) -> ea.Case:
             "gravity": [0.0, 0.0, -9.81],
             "materials": {"m": MATERIAL},
             "sections": {"s": {"shape": "circle", "diameter": 0.03}},
-            "links": {"p": beam(1.0), "b": beam(0.6), "a": beam(0.7)},
+            "links": {"p": straight(1.0, 2), "b": straight(0.6, 2), "a": straight(0.7, 2)},
             "joints": {
                 "f": {"type": "fixed", "base": "ground", "follower": "p.start",
                       "orientation": post},

@@ -105,7 +105,6 @@ def test_a_missed_target_is_told_what_would_help() -> None:
     assert "coordinates.q1.drive.stiffness" not in paths  # a parameter has its sensitivity
     assert "What would help" in {table.title for table in run_tables(result.results)}
     card = verdict_of(result.results)
-    assert card is not None
     assert card.helps[0].startswith("1 % more of what is no parameter changes mode 1: ")
     assert "length of forearm −" in card.helps[0]
     rows = json.loads(to_json(result.results))["levers"]
