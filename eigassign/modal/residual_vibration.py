@@ -346,12 +346,12 @@ class ReducedMove:
         highest = np.abs(free.s[free.seen()]).max(initial=0.0)
         parts = 1 + int(PER_PERIOD * h.max() * T.max() * highest / (2.0 * np.pi))
         shares, found = np.arange(parts) / parts, []
-        w, rate, push, end = np.moveaxis(self.still, 1, 0)
+        w, rate, push, _ = np.moveaxis(self.still, 1, 0)
         for share in shares:
             sigma = h * share
             P, offset = self._stepped(T, sigma)
             eta = (P[:, :, 0] * states[:-1]).sum(axis=2) + offset[:, :, 0]
-            still = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
+            still = w + (rate + 0.5 * push * sigma) * sigma
             x = eta @ np.swapaxes(self.phi[:-1], 1, 2) - still[:, None] / T[:, None] ** 2
             tip = self.tip[:-1] + share * np.diff(self.tip, axis=0)
             found.append(x @ np.swapaxes(tip, 1, 2))  # (n, n_T, m)
