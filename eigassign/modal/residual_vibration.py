@@ -242,7 +242,7 @@ class Move:
 
 
 def _slow_modes(K: Floats, M: Floats, sizes: Sizes) -> tuple[Floats, Floats, Floats, Floats]:
-    """ω (n, p), Φ (n, r, p) and ΦᵀM of the slow modes, and from each pose to the next exp(hA_ss)."""
+    """ω (n, p), Φ (n, r, p), ΦᵀM of the slow modes; exp(hA_ss) from each pose to the next."""
     mu, z = ritz_pairs(K, M)
     omega = 1.0 / np.sqrt(mu)
     phi = z * omega[:, None]
