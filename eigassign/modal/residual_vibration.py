@@ -18,7 +18,8 @@ serves all durations T of the same path and law. What f does at rest is apart,
 w by splines between the breaks of the motion. z is in the p slowest modes of each pose, others
 follow at rest: in steps that are long beside their periods, each step would ring them. Over a step
 of τ the pose rests, as it is in its middle, the modes z = Φ η part, and each is solved exactly. The
-next step takes over η ← Φ₊ᵀ M₊ Φ η and η̇ likewise, which errs by the square of the step.
+next step takes over η and η̇: of all modes by R = Φ₊ᵀ M₊ Φ = exp(hA), of slow ones s beside fast
+ones f by exp(hA_ss) = R_ss − R_sf R_fs/2. That errs by the square of the step.
 
 After the stop the pose rests, so that each mode vibrates freely, for good, with Z_i from η and η̇:
 
@@ -64,11 +65,12 @@ class Sizes(NamedTuple):
     """How finely a move is solved.
 
     Against integrations of the whole, undamped: a planar arm and a palletiser err by 1e-4 of their
-    largest residual with 2 to 4 modes from 128 steps on, with 12 modes by 5e-3. A spatial arm errs
-    by 7e-3 with 2 modes, and 6e-4 with 3 or 4.
+    largest residual with 2 to 4 modes, by up to 5e-3 with 12, which take longer steps than they
+    bear. A spatial arm errs by 7e-3 with 2 modes, and by 6e-4 with those within thrice the lowest.
     """
 
-    modes: int = 4  # that are followed, and of each pose in the basis
+    modes: int = 4  # of each pose in the basis, and at most of those that are followed
+    span: float = 10.0  # times the lowest frequency: modes beyond it follow at rest
     poses: int = 3
     loads: int = 9  # instants of f at rest
     steps: int = 128
@@ -82,7 +84,7 @@ class Accuracy(NamedTuple):
     """By how much residuals change, of the largest one of each node."""
 
     by_steps: float  # with half of the steps
-    by_modes: float  # with two modes more
+    by_modes: float  # with two modes more, twice the span and twice the steps
     by_basis: float  # with twice the poses and loads
 
 
@@ -109,10 +111,7 @@ class Move:
         middle = np.append(0.5 * (edges[:-1] + edges[1:]), 1.0)
         x = self._x(own, np.concatenate([middle, edges]))
         K, M = self._projected(V, x)
-        mu, z = ritz_pairs(K[:n], M[:n])
-        omega = 1.0 / np.sqrt(mu[:, : sizes.modes])
-        phi = z[..., : sizes.modes] * omega[:, None]
-        inverse = np.swapaxes(phi, 1, 2) @ M[:n]  # ΦᵀM
+        omega, phi, inverse, turn = _slow_modes(K[:n], M[:n], sizes)
         push = -self._blows(own, edges[blown]) @ V
         blows = np.zeros((n, V.shape[1]))
         blows[blown] = np.linalg.solve(M[n:][blown], push[..., None])[..., 0]
@@ -123,7 +122,7 @@ class Move:
             omega=omega,
             zeta=self._ratios(x[:n], V, phi, omega),
             phi=phi,
-            turn=inverse[1:] @ phi[:-1],
+            turn=turn,
             still=still,
             force=np.einsum("nrs,nks->nkr", inverse[:-1], still[:, 1:]),
             steps=np.einsum("nrs,nks->nkr", inverse, steps),
@@ -231,13 +230,28 @@ class Move:
 
     def accuracy(self, y: ArrayLike, durations: ArrayLike, sizes: Sizes = SIZES) -> Accuracy:
         """What other sizes would change of the residuals of a design."""
-        modes, poses, loads, steps = sizes
-        half, more = Sizes(modes, poses, loads, steps // 2), Sizes(modes + 2, poses, loads, steps)
-        others = half, more, Sizes(modes, 2 * poses, 2 * loads, steps)
+        m, span, poses, loads, n = sizes
+        others = (
+            Sizes(m, span, poses, loads, n // 2),
+            Sizes(m + 2, 2.0 * span, poses, loads, 2 * n),
+            Sizes(m, span, 2 * poses, 2 * loads, n),
+        )
         found = self.at(y, sizes).residuals(durations)
         largest = np.maximum(found.max(axis=0), np.finfo(float).tiny)
         changes = (self.at(y, one).residuals(durations) - found for one in others)
         return Accuracy(*(float((np.abs(each) / largest).max()) for each in changes))
+
+
+def _slow_modes(K: Floats, M: Floats, sizes: Sizes) -> tuple[Floats, Floats, Floats, Floats]:
+    """ω (n, p), Φ (n, r, p), ΦᵀM of the slow modes; exp(hA_ss) from each pose to the next."""
+    mu, z = ritz_pairs(K, M)
+    omega = 1.0 / np.sqrt(mu)
+    phi = z * omega[:, None]
+    inverse = np.swapaxes(phi, 1, 2) @ M  # Φ⁻¹
+    p = min(int((omega <= sizes.span * omega[:, :1]).any(axis=0).sum()), sizes.modes)
+    R = inverse[1:] @ phi[:-1]
+    turn = R[:, :p, :p] - 0.5 * R[:, :p, p:] @ R[:, p:, :p]
+    return omega[:, :p], phi[..., :p], inverse[:, :p], turn
 
 
 def move(
@@ -347,12 +361,12 @@ class ReducedMove:
         highest = np.abs(free.s[free.seen()]).max(initial=0.0)
         parts = 1 + int(PER_PERIOD * h.max() * T.max() * highest / (2.0 * np.pi))
         shares, found = np.arange(parts) / parts, []
-        w, rate, push, end = np.moveaxis(self.still, 1, 0)
+        w, rate, push, _ = np.moveaxis(self.still, 1, 0)
         for share in shares:
             sigma = h * share
             P, offset = self._stepped(T, sigma)
             eta = (P[:, :, 0] * states[:-1]).sum(axis=2) + offset[:, :, 0]
-            still = w + (rate + (0.5 * push + share * (end - push) / 6.0) * sigma) * sigma
+            still = w + (rate + 0.5 * push * sigma) * sigma
             x = eta @ np.swapaxes(self.phi[:-1], 1, 2) - still[:, None] / T[:, None] ** 2
             tip = self.tip[:-1] + share * np.diff(self.tip, axis=0)
             found.append(x @ np.swapaxes(tip, 1, 2))  # (n, n_T, m)
