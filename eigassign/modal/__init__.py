@@ -36,10 +36,10 @@ __all__, __getattr__, __dir__ = face(
         "response": "Damping ModalResponse Shaken dampings modal_response unit_forces",
         "shapers": (
             "SHAPERS Design ModeOnPath Shaper best_design best_designs convolved "
-            "csv_rows excited_modes klipper_lines reprap_line residual_share shaped shaped_along "
+            "excited_modes klipper_lines reprap_line residual_share shaped shaped_along "
             "shaper worst_share"
         ),
-        "residual_vibration": "Accuracy Move ReducedMove Sizes move",
+        "residual_vibration": "FINER Move ReducedMove Sizes move",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "under_load": (
             "Flexibility WeightChanges buckling compliances sag_changes sag_of_nodes "

@@ -80,14 +80,6 @@ SIZES = Sizes()
 FINER = Sizes(poses=5, loads=17, steps=256)  # that answers are looked at with
 
 
-class Accuracy(NamedTuple):
-    """By how much residuals change, of the largest one of each node."""
-
-    by_steps: float  # with half of the steps
-    by_modes: float  # with two modes more, twice the span and twice the steps
-    by_basis: float  # with twice the poses and loads
-
-
 @dataclass(frozen=True, eq=False)
 class Move:
     """A motion of a mechanism, with nodes that are watched; built once, solved for designs."""
@@ -227,19 +219,6 @@ class Move:
         for k, (places, (values, _)) in enumerate(known):
             b[:, k, places] = values
         return b
-
-    def accuracy(self, y: ArrayLike, durations: ArrayLike, sizes: Sizes = SIZES) -> Accuracy:
-        """What other sizes would change of the residuals of a design."""
-        m, span, poses, loads, n = sizes
-        others = (
-            Sizes(m, span, poses, loads, n // 2),
-            Sizes(m + 2, 2.0 * span, poses, loads, 2 * n),
-            Sizes(m, span, 2 * poses, 2 * loads, n),
-        )
-        found = self.at(y, sizes).residuals(durations)
-        largest = np.maximum(found.max(axis=0), np.finfo(float).tiny)
-        changes = (self.at(y, one).residuals(durations) - found for one in others)
-        return Accuracy(*(float((np.abs(each) / largest).max()) for each in changes))
 
 
 def _slow_modes(K: Floats, M: Floats, sizes: Sizes) -> tuple[Floats, Floats, Floats, Floats]:

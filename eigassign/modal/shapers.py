@@ -102,11 +102,6 @@ class Shaper:
         """By how many seconds a command becomes longer."""
         return float(self.times_s[-1])
 
-    @property
-    def mean_delay(self) -> float:
-        """Σ A_i t_i: by how many seconds a command at constant speed is late."""
-        return float(self.amplitudes @ self.times_s)
-
 
 def shaper(name: str, hz: float, zeta: float = 0.0) -> Shaper:
     """The shaper ``name`` of `SHAPERS` for f in Hz (undamped) and ζ.
@@ -310,9 +305,3 @@ def reprap_line(shaper: Shaper) -> str:
     if not REPRAP_HZ[0] <= f <= REPRAP_HZ[1]:
         raise UsageError(f"RepRapFirmware takes {REPRAP_HZ[0]} to {REPRAP_HZ[1]} Hz, not {f:.4g}")
     return f'M593 P"{REPRAP[shaper.name]}" F{f:.4f} S{zeta:.6f}'
-
-
-def csv_rows(shapers: Iterable[Shaper]) -> list[tuple[str, float, float]]:
-    """Rows (name, amplitude, time in s), one per impulse."""
-    rows = ((own.name, zip(own.amplitudes, own.times_s, strict=True)) for own in shapers)
-    return [(name, float(A), float(t)) for name, impulses in rows for A, t in impulses]
