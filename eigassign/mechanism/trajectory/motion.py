@@ -99,6 +99,12 @@ class Motion:
         """q (n, n_q) alone."""
         return self.moving(time_s, y).q
 
+    def lasting(self, share: float) -> Motion | TipMotion:
+        """The same path in ``share`` times its time."""
+        c = self.curve.coefficients
+        c = c / share ** np.arange(len(c))[:, None, None]
+        return Motion(Curve(share * self.curve.knots, c), share * self.breaks_s)
+
     def joined(self, loads: Floats) -> Motion | TipMotion:
         """With ``loads`` (n_loads,), which neither time nor design change, behind q."""
         c = np.pad(self.curve.coefficients, [(0, 0), (0, 0), (0, len(loads))])
@@ -198,6 +204,10 @@ class TipMotion:
     def of_design(self, time_s: Floats) -> PathOfDesign | None:
         """How q at times (n,) follows the design, where that moves the tip."""
         return self._path(self.course_at(time_s)) if self.follows_design else None
+
+    def lasting(self, share: float) -> TipMotion:
+        """The same path in ``share`` times its time."""
+        return replace(self, course=self.course._replace(time_s=share * self.course.time_s))
 
     def joined(self, loads: Floats) -> TipMotion:
         """With ``loads`` (n_loads,) behind q."""

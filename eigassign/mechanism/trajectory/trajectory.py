@@ -109,6 +109,16 @@ class Trajectory(Brief):
         known = self.known and self.known.joined(loads)
         return replace(self, q=behind(self.q, loads), known=known)
 
+    def lasting(self, y: Floats) -> Trajectory:
+        """The same path in the time that a design y (n_y,) has for it."""
+        if self.stretch is None:
+            return self
+        k, duration = self.stretch
+        share, given = float(y[k]) / duration, self.sampled and self.sampled.lasting(y)
+        known, stretch = self.motion.lasting(share), (k, float(y[k]))
+        time_s = share * self.time_s
+        return replace(self, time_s=time_s, known=known, sampled=given, stretch=stretch)
+
     def chosen(self, samples: Ints) -> Trajectory:
         """Some of the samples only, given by ascending numbers."""
         some = self.time_s[samples], self.q[samples]
@@ -333,6 +343,11 @@ class Trajectories(Brief):
                 message = f"trajectory {part.name!r}: {error.message}"
                 raise TrajectoryError(error.path, message, error.sample) from None
         return _stacked([q for q, _ in found]), _stacked([slopes for _, slopes in found])
+
+    def lasting(self, y: Floats) -> Trajectories:
+        """Each in the time that a design y (n_y,) has for it."""
+        parts = (p._replace(trajectory=p.trajectory.lasting(y)) for p in self.parts)
+        return Trajectories(tuple(parts), self.origin and self.origin.lasting(y))
 
     def pose(self, time_s: float, name: str | None, y: Floats | None = None) -> Floats:
         """q (n_q,) at any time of one trajectory, the first if None, at design y or the initial."""

@@ -99,6 +99,7 @@ def find_answer(scene: Scene, progress: Progress) -> Answer:
     if found.lost:
         notes.append(f"{len(found.lost)} designs were left out, the last because {found.lost[-1]}")
     predicted, y = tuple(_predicted(found)), found.best.y
+    finer = replace(finer, trajectory=finer.path.lasting(y))
     return Answer(finer, y, predicted, one_shot, found, tuple(notes), contradiction, robust)
 
 
