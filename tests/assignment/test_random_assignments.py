@@ -8,17 +8,13 @@ from random_assignments import load_text, random_case
 import eigassign as ea
 
 
-def problem_of(seed):
-    return of_case(load_text(random_case(seed)))
-
-
 @pytest.mark.parametrize(
     "seed",
     [0, 8, pytest.param(1, marks=pytest.mark.slow), pytest.param(14, marks=pytest.mark.slow)],
 )
 def test_the_reference_has_the_slopes_of_its_objective(seed):
     """Differences of J err by about (1e-5)² of the third derivative, and by round-off."""
-    problem = problem_of(seed)
+    problem = of_case(load_text(random_case(seed)))
     middle = 0.5 * (problem.lower + problem.upper)
     y = problem.initial + 0.1 * (middle - problem.initial)
     gradient, found = problem.gradient(y), []

@@ -298,9 +298,10 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     Path("slow.py").write_text(SLOW)
     how = LITTLE if command == "optimize" else ("--reports", "none", "--jobs", "2")
     args = [sys.executable, "slow.py", command, "good.yaml", *how]
-    with subprocess.Popen(
-        args, env=environment(), stderr=subprocess.PIPE, text=True, preexec_fn=_heed_signals
-    ) as process:
+    # where the tests run in the background of a shell, children would ignore Ctrl-C
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    pipes = {"env": environment(), "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(args, **pipes, preexec_fn=heed) as process:
         _wait_for(Path("ready"), process)
         process.send_signal(number)
         _, err = process.communicate(timeout=SECONDS)
@@ -310,11 +311,6 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     left = {path.name for path in folder.iterdir()} if folder.exists() else set()
     summaries = {"summary.csv", "summary.json", "junit.xml", "index.html"}
     assert left == (summaries if command == "batch" else set())
-
-
-def _heed_signals() -> None:
-    """Where the tests run in the background of a shell, children would ignore Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_nohup_is_respected() -> None:

@@ -165,11 +165,6 @@ def joint_of(space: str, kind: str, rng: Random) -> Tree:
     return joint
 
 
-def ridden(tree: Tree) -> set[str]:
-    joints = tree["mechanism"]["joints"].values()
-    return {j["base"] for j in joints if j["type"] in ("carriage", "nut")}
-
-
 def add_joint(
     tree: Tree,
     rng: Random,
@@ -189,7 +184,8 @@ def add_joint(
     kind = str(rng.choice(PLANAR if space == "planar" else SPATIAL))
     rides = kind in ("carriage", "nut")
     beam = m["links"].get(base, {}).get("type", "beam") == "beam" and base != "ground"
-    if rides and (not beam or base in ridden(tree)):
+    ridden = {j["base"] for j in m["joints"].values() if j["type"] in ("carriage", "nut")}
+    if rides and (not beam or base in ridden):
         kind, rides = "revolute", False
     name = f"j{len(m['joints'])}"
     joint = joint_of(space, kind, rng)
@@ -343,14 +339,12 @@ def _close(
     backward = onto != "ground" and rng.random() < 0.5
     joint["base"], joint["follower"] = (here, onto) if backward else (onto, here)
     pose = posed(tree, values)
-    fit(tree, joint, pose, rng, list(drive_values(kind, rng)))
+    share = 0.2 if kind == "prismatic" else 1.0
+    fit(tree, joint, pose, rng, list(rng.uniform(-0.8, 0.8, FREEDOMS[kind]) * share))
     m["joints"][name] = joint
-    values |= dict(zip(*_closing(tree, rng, name, joint), strict=True))
+    c = joint.pop("c")
+    values |= dict(zip(drive(tree, rng, name, ("free", "locked", "held")), c, strict=True))
     return _release(tree, rng, values, size)
-
-
-def drive_values(kind: str, rng: Random) -> np.ndarray:
-    return rng.uniform(-0.8, 0.8, FREEDOMS[kind]) * (0.2 if kind in ("prismatic",) else 1.0)
 
 
 def posed(tree: Tree, values: dict[str, float]) -> Pose:
@@ -378,12 +372,6 @@ def fit(tree: Tree, joint: Tree, pose: Pose, rng: Random, c: list[float]) -> Non
         joint["position"] = position.tolist()
     assert np.abs(mount(joint) - M).max() < 1e-9
     assert np.abs(point(joint["position"]) - position).max() < 1e-9
-
-
-def _closing(tree: Tree, rng: Random, name: str, joint: Tree) -> tuple[list[str], list[float]]:
-    c = joint.pop("c")
-    names = list(drive(tree, rng, name, ("free", "locked", "held")))
-    return names, c
 
 
 def _release(tree: Tree, rng: Random, values: dict[str, float], size: int) -> bool:

@@ -89,10 +89,7 @@ def test_a_two_link_arm_needs_the_torques_of_the_textbook_whatever_its_angles(
     l1, l2, m1, m2 = 0.6, 0.45, 2.0, 0.7
     light: Tree = {"type": "rigid", "mass": 0.0}
     tree: Tree = linkage(
-        {
-            "upper": {**light, "length": l1},
-            "fore": {**light, "length": l2},
-        },
+        {"upper": {**light, "length": l1}, "fore": {**light, "length": l2}},
         {
             "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
             "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
@@ -101,10 +98,7 @@ def test_a_two_link_arm_needs_the_torques_of_the_textbook_whatever_its_angles(
             "q1": {"joint": "shoulder"},
             "q2": {"joint": "elbow", "angle": "absolute" if absolute else "relative"},
         },
-        bodies={
-            "b1": {"at": "upper.end", "mass": m1},
-            "b2": {"at": "fore.end", "mass": m2},
-        },
+        bodies={"b1": {"at": "upper.end", "mass": m1}, "b2": {"at": "fore.end", "mass": m2}},
     )
     (a, b), (da, db), (dda, ddb) = (0.4, 0.9), (1.3, -2.1), (-4.0, 7.0)  # joints
     c, s = np.cos(b), np.sin(b)

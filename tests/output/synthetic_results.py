@@ -150,12 +150,8 @@ def _chain(angles: Floats, scale: float, spatial: bool) -> tuple[Floats, ...]:
     return tuple(links)
 
 
-def _frequency(shift: Floats, scale: float) -> Floats:
-    return scale * (200.0 - 9.0 * shift + 4.0 * shift**2)
-
-
 def _compare(shift: Floats, other: Floats, scale: float, varies: bool) -> Comparison:
-    exact = _frequency(shift, scale) * (1.0 + 0.02 * other)
+    exact = scale * (200.0 - 9.0 * shift + 4.0 * shift**2) * (1.0 + 0.02 * other)
     if not varies:
         exact = np.full(shift.shape, 190.0 * scale)
         return Comparison(exact, exact, exact)

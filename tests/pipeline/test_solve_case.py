@@ -161,14 +161,9 @@ def test_a_prediction_over_the_tolerance_is_said_with_advice_that_helps(tmp_path
     (warning,) = results.warnings
     assert "0.32 % off" in warning
     assert "try expansion.y: [0.2287, 0]" in warning
-    again = solved(tmp_path, changed_point(text, "[0.2287, 0]")).results
+    again = solved(tmp_path, text.replace("y: [0.125, 0.125]", "y: [0.2287, 0]")).results
     off = (each.targets[0].approximation_error for each in (again, results))
     assert next(off) < next(off)
-
-
-def changed_point(text: str, y: str) -> str:
-    assert "y: [0.125, 0.125]" in text
-    return text.replace("y: [0.125, 0.125]", f"y: {y}")
 
 
 MISLEADING = automatic(

@@ -11,6 +11,7 @@ import pytest
 from two_elastic_links import ALLOY, TWO_LINKS
 
 import eigassign as ea
+from eigassign.facts import priced
 from eigassign.pipeline import Result, solve_case
 from eigassign.study import BuiltCase
 
@@ -198,9 +199,9 @@ def test_a_band_that_is_clear_but_for_what_the_mesh_leaves_open_says_both_shares
 
 
 def test_a_price_that_lowers_what_is_to_be_high_is_named() -> None:
-    priced = {**K1, "price": 1e-4}
+    cheaper = {**K1, "price": 1e-4}
     aim = {"objective": {"highest": 1}, "starts": 1}
-    result = solve_case(case_of({"k1": priced, "k2": K2}, [], assignment=aim))
+    result = solve_case(case_of({"k1": cheaper, "k2": K2}, [], assignment=aim))
     _, reason = said(result)
     assert f"; its price, {priced(result.results.price)}, counts against it, 1 as 1 Hz" in reason
 

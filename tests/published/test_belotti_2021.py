@@ -16,6 +16,7 @@ from eigassign import Case, expand
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
+BOX = np.array(list(itertools.product(np.linspace(0.0, 0.25, 21), repeat=2)))
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +27,6 @@ def case() -> Case:
 def worst(found: np.ndarray, exact: np.ndarray) -> float:
     """Largest relative error in Hz, in per cent."""
     return 100.0 * float(np.abs(found[:, 0] / exact[:, 0] - 1.0).max())
-
-
-def design_box(n: int = 21) -> np.ndarray:
-    return np.array(list(itertools.product(np.linspace(0.0, 0.25, n), repeat=2)))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +50,7 @@ def test_approximation_error_over_the_design_box_and_along_the_trajectory(
     model, q = case.model(), case.trajectory.q
     e = expand(model, Q0, Y0, order=4, linear_in_y=linear)
     assert e.coefficients.shape == (1, count)
-    for at, expected in (((Q0, design_box()), over_the_box), ((q, [0.0, 0.0]), moving)):
+    for at, expected in (((Q0, BOX), over_the_box), ((q, [0.0, 0.0]), moving)):
         error = worst(e.frequencies(*at), model.frequencies(*at, 1))
         assert error == pytest.approx(expected, rel=1e-3)
 

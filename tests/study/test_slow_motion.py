@@ -18,13 +18,6 @@ from eigassign.study import gap_along
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 
 
-def slowed(tmp_path: Path, duration: str) -> Path:
-    text = CASE.read_text(encoding="utf-8").replace("duration: 1 s", f"duration: {duration}")
-    path = tmp_path / "timed.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_the_papers_motion_is_slow_and_that_is_noted() -> None:
     results = solve_case(load_case(CASE)).results
     assert any(note.startswith("speed of the motion") for note in results.notes)
@@ -35,7 +28,9 @@ def test_the_papers_motion_is_slow_and_that_is_noted() -> None:
 def test_a_motion_in_milliseconds_is_warned_of(
     tmp_path: Path, duration: str, expected: bool
 ) -> None:
-    results = solve_case(load_case(slowed(tmp_path, duration))).results
+    text = CASE.read_text(encoding="utf-8").replace("duration: 1 s", f"duration: {duration}")
+    (tmp_path / "timed.yaml").write_text(text, encoding="utf-8")
+    results = solve_case(load_case(tmp_path / "timed.yaml")).results
     assert any("not slow" in warning for warning in results.warnings) is expected
 
 

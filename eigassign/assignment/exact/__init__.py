@@ -8,4 +8,5 @@ Reading order:
     sequential      the steps in a row, the local optimum they lead to; which ends are one
     requirements    a set of requirements as such a problem, also at designs that deviate
     identification  parameters from measured frequencies, their covariance and intervals
+    ranges          all parameters that explain frequencies known to lie between two each
 """

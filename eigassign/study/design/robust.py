@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from time import monotonic
@@ -40,6 +39,7 @@ from eigassign.study.results import RobustRow, RobustTarget
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 FEW = 5  # optima from which the next round is searched
 ROUNDS = 12  # of scenarios: known cases took at most 4
 STEPS = 20  # to the worst deviation: from the best corner mostly none
@@ -175,6 +175,13 @@ class _Deviations:
         k = int(missed.argmax())
         return float(missed[k]), rows.of.rows.start + k, unit[k] * slopes[k]
 
+    def _most(self, rows: EdgeRows, y: Floats) -> float:
+        """What is missed most at a design; infinite where it has no answer."""
+        try:
+            return self.worst_at(rows, y)[0]
+        except EigassignError:
+            return np.inf
+
     @cached_property
     def corners(self) -> Floats:
         """The corners (n, n_y) of the box."""
@@ -233,10 +240,9 @@ class _Deviations:
             way = ball.radius * g[k] / (size[k] or 1.0) - z
             for share in SHARES:
                 tried, turned = ball.placed(best + share * aside[k], z + share * way, e)
-                with suppress(EigassignError):  # one without an answer is none
-                    if (worse := self.worst_at(rows, tried)[0]) > most + GAINED:
-                        best, dp, z, most = tried, turned, z + share * way, worse
-                        break
+                if most + GAINED < (worse := self._most(rows, tried)) < np.inf:
+                    best, dp, z, most = tried, turned, z + share * way, worse
+                    break
             else:
                 break
         return best
@@ -272,12 +278,12 @@ class _Deviations:
 
         Frequencies of small models are solved where they have least room, other limits are linear
         about the ``worst``: where these judge few designs at all samples otherwise than exact
-        solves, those are all. Raises EigassignError where one has no answer.
+        solves, those are all. Where one has no answer, all is missed.
         """
         rng, first = np.random.default_rng(0), len(self.asked.residuals)
         limits = [*enumerate(worst)][first:]
         designs, inside = self.draw(rng, DRAWS)
-        missed = np.array([[self.worst_at(rows, y)[0] for rows in self.edges] for y in designs])
+        missed = np.array([[self._most(rows, y) for rows in self.edges] for y in designs])
         found = [*zip(self.edges, missed[inside].max(axis=0, initial=0.0), strict=True)]
         holds = missed[:, first:].max(axis=1, initial=-np.inf) <= CUT
         about = [self._about(one, designs) for _, one in limits]
@@ -304,20 +310,29 @@ class _Deviations:
 
         By exact solves at the samples where the ``worst`` have least room.
         """
-        model, path = self.scene.model, self.scene.path
         least = sorted((-one.missed, one.sample) for one in worst if one.rows.of.mode_terms)
         at = np.array([*dict.fromkeys(sample for _, sample in least)][:AT], dtype=np.intp)
-        hz = np.full((len(designs), len(path.q), self.asked.modes), np.nan)
-        for start in range(0, len(designs), AT_ONCE):
-            some = designs[start : start + AT_ONCE]
-            q = np.concatenate([path.at(y)[0][at] for y in some])
-            solved = model.frequencies(q, np.repeat(some, len(at), axis=0), self.asked.modes)
-            hz[start : start + len(some), at] = solved.reshape(len(some), len(at), -1)
+        parts = np.split(designs, range(AT_ONCE, len(designs), AT_ONCE))
+        hz = np.concatenate([self._hz(part, at) for part in parts])
         for k, rows in enumerate(self.edges):
-            if terms := rows.of.mode_terms:
-                own = sum(c * hz[:, rows.of.rows, m - 1 if m > 0 else m] for m, c in terms)
-                missed, _ = self.missed(rows, rows.scale * (own - rows.edge))
-                yield k, np.nanmax(missed, axis=1, initial=-np.inf)
+            own = np.flatnonzero((at >= rows.of.rows.start) & (at < rows.of.rows.stop))
+            if (terms := rows.of.mode_terms) and len(own):
+                place = at[own] - rows.of.rows.start
+                curve = sum(c * hz[:, own, m - 1 if m > 0 else m] for m, c in terms)
+                missed, _ = self.missed(rows, rows.scale[place] * (curve - rows.edge[place]))
+                yield k, np.nan_to_num(missed.max(axis=1), nan=np.inf)
+
+    def _hz(self, designs: Floats, at: Ints) -> Floats:
+        """Frequencies (n, k, modes) of designs at some samples; NaN where one has no answer."""
+        try:
+            q = np.concatenate([self.scene.path.at(y)[0][at] for y in designs])
+            y = np.repeat(designs, len(at), axis=0)
+            hz = self.scene.model.frequencies(q, y, self.asked.modes)
+        except EigassignError:
+            if len(designs) == 1:
+                return np.full((1, len(at), self.asked.modes), np.nan)
+            return np.concatenate([self._hz(half, at) for half in np.array_split(designs, 2)])
+        return hz.reshape(len(designs), len(at), -1)
 
     def rows(
         self,

@@ -11,7 +11,7 @@ from spatial_random import random_closed
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.mechanism import shapes, with_reduction
+from eigassign.mechanism import section_values, shapes, with_reduction
 from eigassign.study import with_middle_loads
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -23,11 +23,6 @@ def posed(name: str) -> tuple[ea.Case, Any, Any]:
     """A shipped case, and q, y at its expansion point with its initial design."""
     case = ea.load_case(CASES / f"{name}.yaml")
     return case, with_middle_loads(case.file, case.file.expansion.q), case.initial_design
-
-
-def every_shape(case: ea.Case, q: Any, y: Any, vectors: Any) -> Any:
-    model = case.model()
-    return shapes(model.poses, model.x(q, y), vectors[None])[0]
 
 
 PLANAR = ["two_link", "four_bar", "five_bar", "six_bar", "luffing_boom", "gantry", "slider_crank"]
@@ -93,8 +88,6 @@ def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
 
 
 def _line_density(mechanism: Any, beam: Any) -> float:
-    from eigassign.mechanism import section_values
-
     section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
     return float(mechanism.materials[beam.material].density * section.area)
 
@@ -127,7 +120,8 @@ def test_a_mass_on_a_node_sees_the_node_move_as_drawn(
     more = y + np.eye(len(y))[parameter]
     difference = model.matrices(q, more)[0] - model.matrices(q, y)[0]
     vectors = np.random.default_rng(3).standard_normal((model.n_dof, 5))
-    motion = every_shape(case, q, y, vectors).nodes[node].motion[:, :3]
+    (found,) = shapes(model.poses, model.x(q, y), vectors[None])
+    motion = found.nodes[node].motion[:, :3]
     np.testing.assert_allclose(motion @ motion.T, vectors.T @ difference @ vectors, atol=1e-10)
 
 

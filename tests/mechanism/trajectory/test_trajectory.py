@@ -103,13 +103,14 @@ TURN_AND_SLIDE = ("q1", "q2")
 POINTS = ((0.0, 0.2), (1.0, 0.2), (0.5, 0.6), (0.5, 0.7))
 
 
-def motion(**changes: object) -> object:
-    def no_chain(node: str, oriented: bool) -> object:
-        raise AssertionError("points in the joints need no kinematics")
+def no_arm(node: str, oriented: bool) -> TipChain:
+    raise AssertionError("points and samples in the joints need no kinematics")
 
+
+def motion(**changes: object) -> object:
     keys = {"points": POINTS, "duration": 4.0, "samples": 401}
     spec = PointTrajectory.model_construct(**(keys | changes))
-    return build_trajectory(spec, TURN_AND_SLIDE, no_chain, q_units=("rad", "m"))  # type: ignore[arg-type]
+    return build_trajectory(spec, TURN_AND_SLIDE, no_arm, q_units=("rad", "m"))  # type: ignore[arg-type]
 
 
 def test_every_point_is_reached_at_its_time():
@@ -154,10 +155,7 @@ def test_time_is_shared_by_the_largest_move_relative_to_its_range():
     np.testing.assert_allclose(path.q[[0, 200, 360, 400]], POINTS, atol=1e-12)
     metres = [(a, 1000 * b) for a, b in POINTS]  # the measure of a coordinate changes nothing
     assert motion(points=metres, timing="linear").notes == path.notes
-
-
-def test_two_points_leave_nothing_to_tell():
-    assert motion(points=POINTS[:2]).notes == ()
+    assert motion(points=POINTS[:2]).notes == ()  # two points leave nothing to tell
 
 
 def test_it_waits_where_two_points_are_the_same_and_times_are_given():
@@ -175,10 +173,6 @@ PAPER = ((0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.
 def arm(node: str, oriented: bool) -> TipChain:
     assert node == "forearm.end"
     return serial_arm(0.6, 0.45, oriented=oriented)
-
-
-def no_arm(node: str, oriented: bool) -> TipChain:
-    raise AssertionError("joint samples need no kinematics")
 
 
 def tip_path(**changes: object) -> TipTrajectory:
@@ -230,9 +224,6 @@ def test_samples_that_jump_by_a_turn_are_noted():
     assert notes[0].startswith("q2 jumps by 6.2 rad from sample 0 to 1")
 
 
-OK = ((0.1, 0.2), (0.3, 0.4), (0.5, 0.6))
-
-
 def test_a_file_gives_its_samples(tmp_path):
     (tmp_path / "arm.csv").write_text("time,q2,q1\n0,10,1\n2,11,2\n")
     trajectory = build_trajectory(FileTrajectory(file=str(tmp_path / "arm.csv")), Q, no_arm)
@@ -255,7 +246,9 @@ def test_notes_of_a_file_are_those_of_its_columns_and_its_jumps(tmp_path):
     assert "q1 jumps by 6.25 rad" in notes[1]
 
 
-@pytest.mark.parametrize("spec", [tip_path(), samples(q=OK, duration=1.0)], ids=["tip", "samples"])
+@pytest.mark.parametrize(
+    "spec", [tip_path(), samples(q=POINTS, duration=1.0)], ids=["tip", "samples"]
+)
 def test_arrays_are_frozen(spec):
     trajectory = build_trajectory(spec, Q, arm)
     for array in (trajectory.time_s, trajectory.q, trajectory.tip):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chains import Tree, case_of
+from chains import case_of
 from rail_and_mast import LAMP, OUT, alone, case, tree
 from redesigned_arms import extrapolated
 from scipy.optimize import brentq
@@ -26,14 +26,6 @@ DESIGNS = ((0.03, 0.9), (0.038, 2.09), (0.05, 3.0), (0.02, 0.2), (0.05, 0.2))
 
 def scene_of(given: Case) -> Scene:
     return prepare(given, Stages(lambda line: None), None)
-
-
-def named_at(height: float, lamp: float, targets: list[Tree], **more: object) -> Case:
-    """The case whose file has this design."""
-    found = tree(targets, **more)
-    found["mechanism"]["sections"]["rail"]["height"] = height
-    found["mechanism"]["bodies"]["lamp"]["mass"] = lamp
-    return case_of(found)
 
 
 def solved(scene: Scene, y: tuple[float, ...] | np.ndarray) -> Solved:
@@ -63,13 +55,15 @@ def test_it_does_not_matter_on_how_many_samples_or_trajectories_or_from_where() 
         {"mode": {"like": 2, "at": {"time": 0.31, "trajectory": "back"}}, "frequency": 25.0},
         {"mode": {"like": 1, "at": {"q": [0.4]}}, "frequency": 25.0},
     ]
-    # the mast is the lower one there
-    scene = scene_of(named_at(0.045, 2.5, targets, trajectory=two))
+    found = tree(targets, trajectory=two)
+    found["mechanism"]["sections"]["rail"]["height"] = 0.045  # the mast is the lower one there
+    found["mechanism"]["bodies"]["lamp"]["mass"] = 2.5
+    scene = scene_of(case_of(found))
     some = replace(scene, trajectory=scene.path.chosen([0, 30, 33, 61]))
     for each in (scene, some):
-        found = solved(each, (0.036, 1.9))
-        np.testing.assert_allclose(found.followed, halves(each.path.q, (0.036, 1.9)), rtol=1e-9)
-        assert len(np.unique(found.numbers[:, 0])) == 2
+        there = solved(each, (0.036, 1.9))
+        np.testing.assert_allclose(there.followed, halves(each.path.q, (0.036, 1.9)), rtol=1e-9)
+        assert len(np.unique(there.numbers[:, 0])) == 2
 
 
 def test_a_mode_is_found_however_high_its_number_becomes() -> None:
