@@ -8,7 +8,7 @@ Inner ranges are the least and the largest of each parameter among designs found
 there are such. Outer ranges leave no design out that does. They need frequencies of which those of
 all designs between two lie between those of two: boxes that can have none of them fall away, and
 what is left beyond the inner ranges is halved, and searched from, until little is left. No design
-is better than another here (Richiedei, Tamellin, Trevisani, 2021, update by such intervals).
+is better than another here (Richiedei, Tamellin, Trevisani, 2021: so with intervals of shapes).
 """
 
 from __future__ import annotations

@@ -110,18 +110,18 @@ def _measurements(results: UpdateResults) -> Graph:
         graph.segments(at, -bars, bars, _INTERVAL, "measured"),
         Curve(after, _AFTER, "model after", names=names),
     )
-    residual = np.array([row.residual for row in rows])
+    residual, far = np.array([row.residual for row in rows]), OUTLIER if results.fit else 1.0
     below: tuple[Mark, ...] = (
         Rule(0.0, LEVEL),
-        *(Rule(limit, _OUTLIER) for limit in (-OUTLIER, OUTLIER)),
+        *(Rule(limit, _OUTLIER) for limit in (-far, far)),
         graph.segments(at, np.zeros(at.size), residual, _STEM),
         Curve(residual, _AFTER, names=names),
     )
-    room = np.array([-OUTLIER - 0.5, OUTLIER + 0.5])
+    room = np.array([-far - 0.5, far + 0.5])
     panels = (
         Panel("before, off [%]", initial, 1.2, holds=(np.zeros(1),)),
         Panel("after, off [%]", above, 2.2),
-        Panel("residual [σ]" if results.fit else "off [range]", below, 1.6, holds=(room,)),
+        Panel("residual [σ]" if results.fit else "off [half range]", below, 1.6, holds=(room,)),
     )
     ends = 0.4, at.size + 0.6
     title = "Measured frequencies and the model"
@@ -170,7 +170,7 @@ def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table,
 def _found(results: UpdateResults) -> Iterator[Table]:
     """Parameters before and after, with intervals; what cannot be told; of several minima all."""
     caption = (
-        "Deviation: standard deviation of the linear model. Interval: 95 % by the profile "
+        "Deviation: standard deviation of the linear model. From, to: 95 % by the profile "
         "likelihood, with the other parameters fitted again at each value."
     )
     if results.fit is None:
@@ -204,7 +204,8 @@ def _fit(results: UpdateResults, most: int | None) -> Iterator[Table]:
     )
     yield facts_table("Fit", [results.fit] if results.fit else (), names, caption)
     shown = list(results.measurements)
-    caption = "Residuals after updating, in standard deviations of the measurement."
+    unit = "standard deviations of the measurement" if results.fit else "half widths of the range"
+    caption = f"Residuals after updating, in {unit}."
     if most is not None and len(shown) > most:
         worst = sorted(shown, key=lambda row: -abs(row.residual))[:most]
         caption += f" The {most} worst of {len(shown)}."

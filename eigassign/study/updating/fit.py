@@ -66,7 +66,7 @@ class UpdatedParameter(InOneUnit):
     initial: Annotated[InUnit, Fact("as the case file says", "before")]
     value: Annotated[InUnit, Fact("the one found", "after")]
     deviation: Annotated[InUnit | None, Fact("standard, while bounds hold", digits=".3g")]
-    low: Annotated[InUnit, Fact("where its interval begins", "95 % from")]
+    low: Annotated[InUnit, Fact("where its interval begins", "from")]
     high: Annotated[InUnit, Fact("where its interval ends", "to")]
     low_is_bound: Annotated[bool, Fact("it begins at a bound that measurements do not exclude")]
     high_is_bound: bool
