@@ -29,7 +29,7 @@ After the stop the pose rests, so that each mode vibrates freely, for good, with
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -297,6 +297,9 @@ class Free(NamedTuple):
         return np.asarray(np.sqrt(b + more))
 
 
+_BY_STEPS = "edges", "omega", "zeta", "phi", "still", "force", "tip"
+
+
 @dataclass(frozen=True, eq=False)
 class ReducedMove:
     """The move of one design over n steps, in p modes of each; last those of the end pose.
@@ -325,7 +328,7 @@ class ReducedMove:
         free, near = self.free(T), np.asarray(last, dtype=np.float64)
         found = [free._replace(tip=free.tip[own]).largest() for own in self.groups]
         if near.any():
-            tau, error = self.errors(T)
+            tau, error = self.errors(T, float(near.max()))
             ways = [np.linalg.norm(error[..., own], axis=2) for own in self.groups]
             there = tau >= 1.0 - np.broadcast_to(near, T.shape)[:, None]
             found = [
@@ -333,10 +336,18 @@ class ReducedMove:
             ]
         return np.stack(found, axis=1)
 
-    def errors(self, durations: ArrayLike) -> tuple[Floats, Floats]:
-        """τ (n_t,), and the error of the tips while they move, (n_T, n_t, m) in m by directions."""
-        T, h = np.atleast_1d(np.asarray(durations, dtype=np.float64)), np.diff(self.edges)[:, None]
-        free, states = self.free(T), self._states(T)
+    def errors(self, durations: ArrayLike, last: float = 1.0) -> tuple[Floats, Floats]:
+        """τ (n_t,), and the error of the tips while they move, (n_T, n_t, m) in m by directions.
+
+        In the steps of the ``last`` share of the move.
+        """
+        T, first = np.atleast_1d(np.asarray(durations, dtype=np.float64)), 1.0 - last
+        free, k = self.free(T), max(int(np.searchsorted(self.edges, first, "right")) - 1, 0)
+        some = {name: getattr(self, name)[k:] for name in _BY_STEPS}
+        return replace(self, **some)._errors(T, free, self._states(T)[k:])
+
+    def _errors(self, T: Floats, free: Free, states: Floats) -> tuple[Floats, Floats]:
+        h = np.diff(self.edges)[:, None]
         highest = np.abs(free.s[free.seen()]).max(initial=0.0)
         parts = 1 + int(PER_PERIOD * h.max() * T.max() * highest / (2.0 * np.pi))
         shares, found = np.arange(parts) / parts, []

@@ -24,7 +24,7 @@ from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.clearance import finer_path
 from eigassign.study.design.conclusions import Conflict, conflict, least_changed
 from eigassign.study.design.robust import robust_optimum
-from eigassign.study.design.search.lobes import fastest
+from eigassign.study.design.search.lobes import basins, fastest
 from eigassign.study.design.search.optimum import Found, deadline_of, find_optimum
 from eigassign.study.results import RobustRow, SolverRow
 from eigassign.study.scene import Scene
@@ -170,6 +170,8 @@ def _optimum(
 ) -> tuple[Found, RobustRow | None]:
     """The optimum at the samples, and what it costs to keep what is asked within tolerances."""
     if scene.file.assignment.robust:
+        if scene.file.assignment.objective == "fastest":
+            starts = [*basins(scene, starts, progress), *starts]
         return robust_optimum(scene, starts, progress, deadline)
     if scene.file.assignment.objective == "fastest":
         return fastest(scene, starts, progress, deadline), None

@@ -47,10 +47,8 @@ def duration_column(scene: Scene) -> int:
     return [own.parameter for own in scene.file.design.parameters.values()].index(DURATION_PATH)
 
 
-def fastest(
-    scene: Scene, starts: Sequence[Floats], progress: Callable[[str], None], deadline: float
-) -> Found:
-    """The design with the least motion time that keeps all limits, from many basins."""
+def basins(scene: Scene, starts: Sequence[Floats], progress: Callable[[str], None]) -> list[Floats]:
+    """The designs with motion times (n_y,) to search the fastest motion from, the best first."""
     column, (lower, upper) = duration_column(scene), scene.bounds
     times = np.geomspace(lower[column], upper[column], TIMES)
     width = np.delete(upper - lower, column)
@@ -58,16 +56,23 @@ def fastest(
     designs = [scene.initial, *starts, *spread_designs(scene.bounds, max(count, 1), 0)]
     designs += [lower + side * (upper - lower) for side in box_corners(len(lower))]
     progress(f"fastest: {len(designs)} designs at {TIMES} motion times")
-    basins = [basin for y in designs for basin in _basins(scene, y, column, times)]
-    near: list[Floats] = [basin.y for basin in _best(basins)]
-    keys = scene.file.assignment
+    return [b.y for b in _best([b for y in designs for b in _basins(scene, y, column, times)])]
+
+
+def fastest(
+    scene: Scene, starts: Sequence[Floats], progress: Callable[[str], None], deadline: float
+) -> Found:
+    """The design with the least motion time that keeps all limits, from many basins."""
+    column, (lower, upper) = duration_column(scene), scene.bounds
+    times, keys = np.geomspace(lower[column], upper[column], TIMES), scene.file.assignment
     short = keys.model_copy(update={"steps": min(keys.steps, STEPS)})
     scene = replace(scene, file=replace(scene.file, assignment=short))
+    near = basins(scene, starts, progress)
     found = find_optimum(scene, starts, progress, near, deadline=deadline)
-    for _ in range(AGAIN):
-        y, kept = found.best.y, found.best.seen.violation <= ON
-        faster = [b for b in _basins(scene, y, column, times[times < y[column] * (1.0 - FASTER)])
-                  if b.missed <= 1.0 or not kept]  # fmt: skip
+    for _ in range(AGAIN if found.best.seen.violation <= ON else 0):
+        y = found.best.y
+        own = _basins(scene, y, column, times[times < y[column] * (1.0 - FASTER)])
+        faster = [basin for basin in own if basin.missed <= 1.0]
         if not faster:
             break
         again = [basin.y for basin in sorted(faster)[:LOBES]]

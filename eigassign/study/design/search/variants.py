@@ -256,7 +256,7 @@ def lacking(task: Task, y: Floats) -> list[Floats]:
 
 
 STARTS = 100  # with `starts: auto`, at most
-LOBES = 8  # of residuals, over the motion time, that the fastest motion is sought in
+LOBES, FEW_LOBES = 8, 3  # of residuals, over the motion time, that the fastest motion is sought in
 # Of each of several choices: those that cannot meet the limits have many optima. Of 150 random
 # problems with lists beside continuous parameters none was worse than with ten each.
 OF_SEVERAL = 20
@@ -299,7 +299,7 @@ def most_starts(file: CaseFile, alone: bool = True) -> int:
     """The number of designs to start from, of a choice that is ``alone`` or of each of several."""
     asked = file.assignment.starts
     if asked == "auto" and file.assignment.objective == "fastest":
-        return LOBES
+        return FEW_LOBES if file.assignment.robust else LOBES
     return asked if not isinstance(asked, str) else STARTS if alone else OF_SEVERAL
 
 
