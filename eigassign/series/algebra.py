@@ -18,7 +18,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,31 +219,6 @@ def _projection(indices: NDArray[np.int64]) -> tuple[LowerSet, Ints]:
 Weights = sparse.csr_array | NDArray[np.float64]
 
 
-class Algebra(Protocol):
-    """Operations that a program needs to run, on rows of numbers standing for values."""
-
-    def constant(self, values: Floats) -> Floats:
-        """Numbers (n,) as rows (n, …)."""
-
-    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
-        """Linear forms of rows: constants (k,) + weights (k, n) × values."""
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Row by row product."""
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Row by row power with one exponent a row."""
-
-    def wave(self, a: Floats, quarters: Ints) -> Floats:
-        """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
-
-    def exponential(self, a: Floats) -> Floats:
-        """Row by row eᵃ."""
-
-    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
-
-
 class Function(Protocol):
     """A vector function that is no formula, such as the solution of equations, in any algebra."""
 
@@ -413,3 +388,6 @@ class Truncated(NamedTuple):
             product = matrix_product(self.space, A.reshape(n, n, size), X.reshape(n, m, size))
             X = X + inverse @ (right - product.reshape(n, -1))
         return np.asarray(X.reshape(n * m, size))
+
+
+Algebra: TypeAlias = Samples | Tangents | Truncated  # what a program runs on: rows of numbers
