@@ -12,15 +12,14 @@ from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import MOST_TERMS, shown_numbers, solve_blocks
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.expansion import NearestExpansion, expand
 
-Floats = NDArray[np.float64]
 ORDERS = (2, 4, 8, 16)
 MAX_POINTS = 32
 # On the worst error measured, where an accuracy is stated: of 540 answers at other poses and

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import Brief, counted, cut, of_modes
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -39,7 +40,6 @@ from eigassign.process import one_thread
 from eigassign.series.algebra import Polynomials, monomials, polynomials
 from eigassign.series.multi_index import LowerSet, frozen
 
-Floats = NDArray[np.float64]
 MAX_ORDER = 20
 
 
@@ -265,7 +265,7 @@ class NearestExpansion:
         """The modes expanded, in the order of the columns."""
         return self.parts[0].modes
 
-    def owner(self, q: ArrayLike) -> NDArray[np.intp]:
+    def owner(self, q: ArrayLike) -> Ints:
         """Index of the part nearest to each of q (n_samples, n_q) or (n_q,), (n_samples,)."""
         rows = np.atleast_2d(np.asarray(q, dtype=np.float64))
         V = self.parts[0].directions[:, : len(self.parts[0].q0)]

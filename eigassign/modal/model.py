@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
@@ -35,9 +36,6 @@ from eigassign.modal.mesh_error import (
     standing_frequencies,
 )
 from eigassign.process import one_thread
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.brief import counted, of_modes
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil, theta_at, theta_slopes
@@ -41,8 +42,6 @@ from eigassign.modal.taylor.recursion import vectors_to_order
 from eigassign.process import one_thread
 from eigassign.series.compiler import Program
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 PROBES = 6  # modes above the guard that may join as they are at the expansion point
 DISTANT = 10.0  # λ beyond this multiple of the highest wanted one needs no probe
 DEPENDENT = 1e-9  # remainder, relative to the vector, below which it is taken as dependent
@@ -161,7 +160,7 @@ class SymmetricTerms:
         """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
         return np.asarray(theta[self.terms].T @ self.triangles)
 
-    def chosen(self, terms: NDArray[np.bool_]) -> SymmetricTerms:
+    def chosen(self, terms: Bools) -> SymmetricTerms:
         """The marked terms alone."""
         return SymmetricTerms(self.terms[terms], self.triangles[terms], self.place)
 

@@ -24,12 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import SingularityError
 from eigassign.series.multi_index import LowerSet, first_of_each, lower_set
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Used = NDArray[np.bool_]
 CHUNK = 4_000_000  # numbers gathered at once in a product: 32 MB
 SMALL_TABLE = 1_000  # pairs up to which looking for zeros costs more than it saves
 MOST = 0.5  # part of all pairs of coefficients from which leaving the others out saves nothing
@@ -45,7 +43,9 @@ def multiply(space: LowerSet, a: Floats, b: Floats) -> Floats:
     return _sums(a, b, table.left, table.right, table.starts)
 
 
-def _multiply_present(space: LowerSet, a: Floats, b: Floats, used_a: Used, used_b: Used) -> Floats:
+def _multiply_present(
+    space: LowerSet, a: Floats, b: Floats, used_a: Bools, used_b: Bools
+) -> Floats:
     """The product over coefficients that are there: of six_bar, order 8, in half the time."""
     table = space.table
     keep = np.flatnonzero(used_a[table.left] & used_b[table.right])
@@ -216,7 +216,7 @@ def _projection(indices: NDArray[np.int64]) -> tuple[LowerSet, Ints]:
     return space, space.find(indices)
 
 
-Weights = sparse.csr_array | NDArray[np.float64]
+Weights = sparse.csr_array | Floats
 
 
 class Function(Protocol):

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.brief import Brief
 from eigassign.mechanism.kinematics.joints import Objects, some
 from eigassign.series.algebra import Samples, Tangents, Truncated
@@ -31,8 +32,6 @@ if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and 
     from eigassign.mechanism.kinematics.parameters import PropertyLimits, Rails
 
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Row = Sequence[tuple[int, Scalar]]  # one row of a matrix: unknown and coefficient
 Entries = tuple[Ints, Ints, Ints, Floats]  # row, column, atom (−1: the number 1) and value of each
 # Rows, columns or the column of all, values; atom and factor of all.
@@ -244,7 +243,7 @@ class Pencil(Brief):
         return int(self.stiffness.shape[1])
 
     @cached_property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Bools:
         """Mask of the variables z that anything depends on: expansions drop the others."""
         return np.asarray(self.program.dependence.any(axis=0))
 
@@ -328,7 +327,7 @@ class Pencil(Brief):
         return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
 
     @cached_property
-    def has_term(self) -> NDArray[np.bool_]:
+    def has_term(self) -> Bools:
         """(2, n_theta): which θ_j have a stiffness term, and which a mass term."""
         return np.array([np.diff(terms.indptr) > 0 for terms in self.by_term])
 

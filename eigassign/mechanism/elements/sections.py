@@ -17,8 +17,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import ModelParameters
@@ -205,7 +205,6 @@ def _bare(section: Any, number: Lookup, kappa: float) -> SectionValues:
     )
 
 
-Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
 STATIONS, SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is evaluated
 # by what values at the stations give P_0 … P_4, (l, g)

@@ -12,8 +12,8 @@ from math import prod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Ints
 from eigassign.assignment.program import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.study.planning import nearest_rows
@@ -21,7 +21,6 @@ from eigassign.study.results import DesignRow
 from eigassign.study.scene import Scene
 
 Rows = tuple[int, ...]  # one row of every list: a combination
-Ints = NDArray[np.intp]
 KEEP = 5  # the combinations that are told of
 
 
