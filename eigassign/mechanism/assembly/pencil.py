@@ -165,21 +165,6 @@ def theta_at(program: Program, z: Floats) -> Floats:
     return np.vstack([np.ones((1, z.shape[1])), program.run(Samples(), z)])
 
 
-def theta_slopes(
-    program: Program, to_program: Floats, shift: Floats, x: Floats, along: Ints
-) -> Floats:
-    """∂θ/∂x_i (len(along), 1 + n_outputs, n) of θ = (1, program(to_program x + shift)), exactly."""
-    z = Tangents(len(x), len(along)).constant(shift)
-    z[:, : len(x)] += to_program @ x.T
-    z[:, len(x) :] = np.repeat(to_program[:, along], len(x), axis=1)
-    size = len(x), len(along)
-    kept = len(program.outputs) * z.shape[1] <= KEPT
-    rows = (_run if kept else _run.__wrapped__)(program, *size, z.tobytes())[:, len(x) :]
-    slopes = np.zeros((len(along), 1 + len(rows), len(x)))
-    slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
-    return slopes
-
-
 @lru_cache(maxsize=2)  # frequencies and statics of a design want the same, one after the other
 def _run(program: Program, samples: int, directions: int, z: bytes) -> Floats:
     variables = np.frombuffer(z).reshape(-1, (1 + directions) * samples)
@@ -301,7 +286,15 @@ class Pencil(Brief):
 
     def theta_slopes(self, x: Floats, along: Ints) -> Floats:
         """∂θ/∂x_i (len(along), n_theta, n_samples) in the variables ``along`` of x (n, n_x)."""
-        return theta_slopes(self.program, self.to_program, self.shift, x, along)
+        z = Tangents(len(x), len(along)).constant(self.shift)
+        z[:, : len(x)] += self.to_program @ x.T
+        z[:, len(x) :] = np.repeat(self.to_program[:, along], len(x), axis=1)
+        size = len(x), len(along)
+        kept = len(self.program.outputs) * z.shape[1] <= KEPT
+        rows = (_run if kept else _run.__wrapped__)(self.program, *size, z.tobytes())[:, len(x) :]
+        slopes = np.zeros((len(along), 1 + len(rows), len(x)))
+        slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
+        return slopes
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
