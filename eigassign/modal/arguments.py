@@ -93,11 +93,6 @@ def relative_gap(value: object) -> float:
     raise UsageError(f"cluster_gap must be a number of at least 0, not {value!r}")
 
 
-def shown_numbers(x: Floats) -> str:
-    """Numbers for a message: "(1.817, 5.312)"."""
-    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
-
-
 # --- Chunks of samples, and few of many
 
 NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache

@@ -94,11 +94,6 @@ class Model:
         return any(mesh.reduction for mesh in self.meshes.values())
 
     @property
-    def is_exact(self) -> bool:
-        """True where links are rigid or superelements as they are: neither mesh nor reduction."""
-        return not (self.is_meshed or self.is_reduced or self.solids)
-
-    @property
     def n_dof(self) -> int:
         """Order of K and M of eq. (1)."""
         return self.pencil.n_dof

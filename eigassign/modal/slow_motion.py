@@ -73,11 +73,6 @@ class MotionEffect(NamedTuple):
     samples: Ints
     change: Floats
 
-    @property
-    def worst(self) -> float:
-        """Largest magnitude over instants and modes."""
-        return float(np.abs(self.change).max(initial=0.0))
-
 
 def motion_effect(
     pencil: Pencil,

@@ -115,11 +115,6 @@ def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
     return np.asarray(values / _factorials(order))
 
 
-def exponential_taylor(at: Floats, order: int) -> Floats:
-    """eᵃ over k!, k = 0…p: shape (p + 1, n)."""
-    return np.asarray(np.exp(at) / _factorials(order))
-
-
 @lru_cache(maxsize=64)
 def _factorials(order: int) -> Floats:
     """k! for k = 0…p as a column."""
@@ -376,7 +371,7 @@ class Truncated(NamedTuple):
 
     def exponential(self, a: Floats) -> Floats:
         """Exponential of each series."""
-        return compose(self.space, exponential_taylor(a[:, 0], self.space.order), a)
+        return compose(self.space, np.exp(a[:, 0]) / _factorials(self.space.order), a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """Chord steps X ← X + A_0⁻¹ (B − A X), each of which gains one degree."""

@@ -95,7 +95,7 @@ def _raised(
     y: Floats,
 ) -> float:
     """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
-    if above == 0 or model.is_exact:
+    if above == 0 or not (model.is_meshed or model.is_reduced or model.solids):
         return 0.0
     if above is None:
         return float(np.inf)

@@ -8,7 +8,6 @@ continuous.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -56,13 +55,6 @@ def with_rows(listed: Sequence[ListedValues], rows: Ints, y: Floats) -> Floats:
     for own, at in zip(listed, rows.T, strict=True):
         designs[:, own.columns] = own.rows[at]
     return designs
-
-
-def every_combination(allowed: Sequence[Ints]) -> Ints:
-    """All combinations (n, n_lists); the last list varies first. There is one of no lists."""
-    each = np.meshgrid(*allowed, indexing="ij")
-    shape = prod(map(len, allowed)), len(allowed)
-    return np.stack(each, axis=-1).reshape(shape) if allowed else np.zeros(shape, dtype=np.intp)
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:

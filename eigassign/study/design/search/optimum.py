@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import prod
 from time import monotonic
 
@@ -33,7 +34,7 @@ from eigassign.assignment.requirements.kinds import Margin
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import check_band, wanting
-from eigassign.study.design.lists import KEEP, catalogues, every_combination, with_rows
+from eigassign.study.design.lists import KEEP, catalogues, with_rows
 from eigassign.study.design.search.response import Designs
 from eigassign.study.design.search.variants import (
     SOLVES,
@@ -136,7 +137,7 @@ class Choices:
                 "are gone through at most: shorten the lists"
             )
             raise CaseError((task.scene.file.problem("design", message),))
-        rows = every_combination(allowed)
+        rows = np.array([*product(*allowed)], dtype=np.intp)
         self.bases: dict[int, PosedProblem] = {}
         self.rows = np.tile(rows, (len(belows), 1))
         self.of = np.repeat(range(len(belows)), len(rows))
