@@ -148,7 +148,7 @@ def vector_set(space: LowerSet, n_linear: int, vector_order: int | None) -> tupl
         members = vector_members(space, linear)
     else:
         members = np.asarray(space.degrees <= vector_order)
-    half = space.restrict(members)
+    half = lower_set(space.indices[members])
     return half, space.find(half.indices)
 
 
