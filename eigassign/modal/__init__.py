@@ -30,7 +30,7 @@ __all__, __getattr__, __dir__ = face(
         "expansion": "Expansion NearestExpansion expand expansion_arrays tree_arrays",
         "model": "Model",
         "taylor.rayleigh": "project project_at project_terms",
-        "reduced": "ReducedModel reduce ritz_pairs",
+        "reduced": "ReducedModel reduce",
         "response": "Damping ModalResponse Shaken dampings modal_response unit_forces",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "under_load": (
