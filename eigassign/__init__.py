@@ -14,6 +14,7 @@ one function, `eigassign.pipeline.run.solve_case`.
     _version       the version
     errors         every error raised on purpose, and its exit code
     files          reading files that anybody may have put there, within limits
+    arrays         the types of NumPy's arrays
     brief          short reprs of objects that hold arrays
     facts          what is said of a fact once: words, unit, digits; numbers as people read them
     faces          what a package shows to those outside, loaded at first use

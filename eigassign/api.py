@@ -117,8 +117,8 @@ def expand(
     ``linear_in_y`` keeps the terms of at most first order in y, eq. (9); ``space`` chooses the set
     of γ itself; ``vector_order`` is how far the eigenvectors are expanded (what λ needs if None).
     ``.frequencies(q, y)`` (n, n_modes) are in Hz, ``.indices``, ``.coefficients`` are γ and λ_γ in
-    rad²/s², ``.last_degree_share(q, y)`` is a guide to the error; ``model.frequencies`` at a few
-    places measures it. Raises UsageError for wrong shapes, orders and modes.
+    rad²/s²; ``model.frequencies`` at a few places measures the error. Raises UsageError for wrong
+    shapes, orders and modes.
     """
     return modal_expansion.expand(
         as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order

@@ -18,10 +18,10 @@ from itertools import chain, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from eigassign._version import __version__
+from eigassign.arrays import Floats
 from eigassign.case.units import shown_point
 from eigassign.chart.methods import NO_KRIGING, Built, list_meshes, list_methods
 from eigassign.chart.question import Effort, Points, Subject, asked, build_subject, errors
@@ -44,7 +44,6 @@ from eigassign.modal.exact.solver import rounding_error
 from eigassign.modal.exact.tracking import links
 from eigassign.study.built_case import BuiltCase
 
-Floats = NDArray[np.float64]
 LEAST_S = 1e-3  # a timed run takes at least so long: a thousand times what the clock resolves
 ONCE_S, OFTEN_S = 1.0, 0.1  # a run that takes over so long is not repeated, or three times only
 

@@ -17,10 +17,10 @@ from importlib.util import find_spec
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.linalg import eigh, lstsq
 
+from eigassign.arrays import Floats
 from eigassign.chart.question import Effort, Points, Subject
 from eigassign.chart.results import Kind
 from eigassign.errors import AccuracyError, UsageError
@@ -32,7 +32,6 @@ from eigassign.series.multi_index import total_degree
 from eigassign.study.built_case import build_model
 from eigassign.study.pictures import spread_samples
 
-Floats = NDArray[np.float64]
 Answer = Callable[[Points], Floats]  # Hz (n, n_modes)
 Fit = Callable[[Floats, Floats], Callable[[Floats], Floats]]  # of inputs (n, n_u), Hz (n, n_modes)
 NO_KRIGING = "Kriging needs scikit-learn: pip install 'eigassign[chart]'"

@@ -12,8 +12,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError, SingularityError, TrajectoryError
 from eigassign.mechanism.kinematics.loop_closure import kronecker
@@ -23,8 +23,6 @@ from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.planning import corners, design_bounds, plan_expansion, poses_at
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 LEARNT = 1000  # the row of the sequence from which designs are learnt; tests begin with row 1
 LARGE = 1000  # degrees of freedom above which fits learn from few points
 EDGE = 0.05  # of a step between samples: test points keep so far from both
@@ -69,7 +67,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.x)
 
-    def __getitem__(self, rows: slice | Ints | NDArray[np.bool_]) -> Points:
+    def __getitem__(self, rows: slice | Ints | Bools) -> Points:
         return Points(self.x[rows], self.place[rows], self.design[rows])
 
 

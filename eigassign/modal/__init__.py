@@ -32,7 +32,7 @@ __all__, __getattr__, __dir__ = face(
         "expansion": "Expansion NearestExpansion expand expansion_arrays tree_arrays",
         "model": "Model",
         "taylor.rayleigh": "project project_at project_terms",
-        "reduced": "ReducedModel reduce ritz_pairs",
+        "reduced": "ReducedModel reduce",
         "response": "Damping ModalResponse Shaken dampings modal_response unit_forces",
         "shapers": (
             "SHAPERS Design ModeOnPath Shaper best_design best_designs convolved "

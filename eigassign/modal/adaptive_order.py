@@ -12,15 +12,14 @@ from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import MOST_TERMS, shown_numbers, solve_blocks
+from eigassign.modal.arguments import MOST_TERMS, solve_blocks
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.expansion import NearestExpansion, expand
 
-Floats = NDArray[np.float64]
 ORDERS = (2, 4, 8, 16)
 MAX_POINTS = 32
 # On the worst error measured, where an accuracy is stated: of 540 answers at other poses and
@@ -106,7 +105,8 @@ def raise_order(
             tried = "tried"
             break
     best = min(each, key=lambda one: one.stated)
-    where = f"at (q, y) = {shown_numbers(x[best.error.max(axis=1).argmax()])}"
+    worst = ", ".join(f"{value:.6g}" for value in x[best.error.max(axis=1).argmax()])
+    where = f"at (q, y) = ({worst})"
     off_by = f"the best is about {best.stated:.1e} off" if np.isfinite(best.stated) else "λ < 0"
     raise AccuracyError(
         f"no expansion {tried} reaches {accuracy:.1e}: {off_by} {where}. Ask for less, narrow the "

@@ -13,14 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import MechanismError, MissingMassError
 from eigassign.modal.exact.solver import eigenvalues, exact_slopes
 from eigassign.modal.model import Model
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 SAME = 1e-8  # relative distance in λ of a pole and a zero that are one: a hundred times round-off
 EXTRA = 2  # solved beyond those asked for, at first
 
@@ -70,7 +69,7 @@ class Antiresonances:
         return lam[:, -1], steep[np.arange(len(x)), own]
 
 
-def _same(a: Floats, b: Floats) -> NDArray[np.bool_]:
+def _same(a: Floats, b: Floats) -> Bools:
     """(n, j, k): whether a_j and b_k are one."""
     return np.asarray(np.abs(a[:, :, None] / b[:, None] - 1.0) <= SAME)
 

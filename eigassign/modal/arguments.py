@@ -12,11 +12,10 @@ from operator import index
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats, Ints
 from eigassign.errors import UsageError
-
-Floats = NDArray[np.float64]
 
 
 def samples(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
@@ -94,15 +93,10 @@ def relative_gap(value: object) -> float:
     raise UsageError(f"cluster_gap must be a number of at least 0, not {value!r}")
 
 
-def shown_numbers(x: Floats) -> str:
-    """Numbers for a message: "(1.817, 5.312)"."""
-    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
-
-
 # --- Chunks of samples, and few of many
 
 NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache
-Array = TypeVar("Array", NDArray[np.float64], NDArray[np.intp])
+Array = TypeVar("Array", Floats, Ints)
 
 
 def chunks(rows: Array, numbers: int) -> Iterator[Array]:

@@ -4,7 +4,7 @@ The expansion is carried out in local variables w: the relative joint coordinate
 parameters on which anything depends, with w = V (x − x0). A coordinate that nothing depends on is
 dropped by construction; coefficients over (q, y) follow by substituting V (x − x0).
 
-How far off it is only exact solves say; `last_degree_share` is a guide.
+How far off it is only exact solves say.
 
 Of an expansion that is what takes long to compute: coefficients and vectors. What a key is made of
 becomes a tree in JSON, whose leaves are the next so many values of two arrays.
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import Brief, counted, cut, of_modes
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -39,7 +40,6 @@ from eigassign.process import one_thread
 from eigassign.series.algebra import Polynomials, monomials, polynomials
 from eigassign.series.multi_index import LowerSet, frozen
 
-Floats = NDArray[np.float64]
 MAX_ORDER = 20
 
 
@@ -60,8 +60,8 @@ class Expansion:
 
     ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s², with ∂λ/∂x
     ``slopes(q, y)``, at y0 the l_0 and l of eq. (9); ``indices`` γ (N, n_q + n_y),
-    ``coefficients`` λ_γ (n_modes, N); ``last_degree_share(q, y)`` is a guide to the error.
-    Neighbouring modes are expanded together, as the matrices of ``clusters``.
+    ``coefficients`` λ_γ (n_modes, N). Neighbouring modes are expanded together, as the matrices of
+    ``clusters``.
     """
 
     modes: tuple[int, ...]
@@ -106,21 +106,6 @@ class Expansion:
         """f = √λ/2π in Hz, (n_samples, n_modes); NaN where the polynomial is negative."""
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(self.eigenvalues(q, y)) / (2.0 * np.pi))
-
-    def last_degree_share(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """‖terms of the last degree‖ / 2λ (n_samples, n_modes): a guide to the error in frequency.
-
-        It costs as much as the frequencies. Beyond the radius of convergence, beside a mode that
-        crosses, and in a symmetric pose, where every other degree vanishes, it says too little.
-        """
-        w, last = self.local(q, y), slice(self.space.degree_starts[self.order], None)
-        powers = monomials(self.space, w)[:, last]
-        sizes = []
-        for c in self.clusters:  # ‖Σ Λ_γ w^γ‖
-            term = np.tensordot(powers, c.coefficients[:, :, last], axes=(1, 2))
-            count = len(set(c.modes) & set(self.modes))
-            sizes.append(np.repeat(np.linalg.norm(term, axis=(1, 2))[:, None], count, axis=1))
-        return np.hstack(sizes) / (2.0 * np.abs(self.eigenvalues(q, y)))
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) over units of x."""
@@ -280,7 +265,7 @@ class NearestExpansion:
         """The modes expanded, in the order of the columns."""
         return self.parts[0].modes
 
-    def owner(self, q: ArrayLike) -> NDArray[np.intp]:
+    def owner(self, q: ArrayLike) -> Ints:
         """Index of the part nearest to each of q (n_samples, n_q) or (n_q,), (n_samples,)."""
         rows = np.atleast_2d(np.asarray(q, dtype=np.float64))
         V = self.parts[0].directions[:, : len(self.parts[0].q0)]

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -30,7 +30,6 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes
 from eigassign.series.compiler import CompiledArrays
 
-Floats = NDArray[np.float64]
 FACTORS = (2.0, 4.0, 8.0, 16.0)  # times the elements
 # Of every beam, from which on half the elements tell the error, d_0 / (r − 1): what twice as many
 # change of 400 elements a link, 4e-5, is round-off, and their true error below 3e-10
@@ -125,7 +124,7 @@ class SolidLinks:
     parameters: ModelParameters
     pencil: Pencil
 
-    def shares(self, x: Floats, z: Floats, lam: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def shares(self, x: Floats, z: Floats, lam: Floats) -> tuple[Floats, Bools]:
         """What their meshes add to λ of modes z (n_dof, count) at x (n_x,), about, relative.
 
         (n_links, count), where zᵀ K z = 1; and of which links nothing is known, (n_links,).

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import cut, named
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
@@ -35,9 +36,6 @@ from eigassign.modal.mesh_error import (
     standing_frequencies,
 )
 from eigassign.process import one_thread
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -94,11 +92,6 @@ class Model:
     def is_reduced(self) -> bool:
         """True where Craig-Bampton made a link smaller."""
         return any(mesh.reduction for mesh in self.meshes.values())
-
-    @property
-    def is_exact(self) -> bool:
-        """True where links are rigid or superelements as they are: neither mesh nor reduction."""
-        return not (self.is_meshed or self.is_reduced or self.solids)
 
     @property
     def n_dof(self) -> int:

@@ -27,12 +27,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import counted, of_modes
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.mechanism.assembly.pencil import Pencil, theta_at, theta_slopes
+from eigassign.mechanism.assembly.pencil import Pencil, theta_at
 from eigassign.modal.arguments import chunks, mode_numbers, samples, whole_within
 from eigassign.modal.exact.dense import condense_blocks, inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
@@ -41,8 +42,6 @@ from eigassign.modal.taylor.recursion import vectors_to_order
 from eigassign.process import one_thread
 from eigassign.series.compiler import Program
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 PROBES = 6  # modes above the guard that may join as they are at the expansion point
 DISTANT = 10.0  # λ beyond this multiple of the highest wanted one needs no probe
 DEPENDENT = 1e-9  # remainder, relative to the vector, below which it is taken as dependent
@@ -55,8 +54,8 @@ class ReducedModel:
 
         K̂(q, y) = Vᵀ K(q, y) V = Σ_j θ_j(q, y) Vᵀ K_j V,  M̂ likewise, V of Taylor vectors
 
-    ``frequencies(q, y)`` (n, n_modes) in Hz, ``slopes(q, y)`` λ and ∂λ/∂x; k is ``size``,
-    ``points`` (n_points, n_q + n_y) are what V was expanded about.
+    ``frequencies(q, y)`` (n, n_modes) in Hz; k is ``size``, ``points`` (n_points, n_q + n_y) are
+    what V was expanded about.
     """
 
     modes: tuple[int, ...]
@@ -67,8 +66,9 @@ class ReducedModel:
     program: Program
     to_program: Floats
     shift: Floats
-    stiffness: SymmetricTerms  # of (k, k)
-    mass: SymmetricTerms  # of (k + f, k + f)
+    terms: tuple[Ints, Ints]  # the j that K and M have
+    stiffness: Floats  # VᵀK_jV, (n_terms, k, k)
+    mass: Floats  # M_j on [V 0; 0 I], (n_terms, k + f, k + f)
 
     def __repr__(self) -> str:
         return (
@@ -80,7 +80,7 @@ class ReducedModel:
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
-        return len(self.stiffness.place)
+        return int(self.stiffness.shape[1])
 
     @one_thread
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -92,41 +92,12 @@ class ReducedModel:
         wanted = np.array(self.modes) - 1
         x = samples(q, y, self.n_q, self.n_y)
         parts = [
-            np.linalg.eigvalsh(_standard(*self._at(theta[:, part])[:2])[0])[:, ::-1]
+            np.linalg.eigvalsh(self._standard(theta[:, part]))[:, ::-1]
             for theta in map(self._theta, chunks(x, 1))
-            for part in chunks(np.arange(theta.shape[1]), self.mass.place.size)
+            for part in chunks(np.arange(theta.shape[1]), self.mass[0].size)
         ]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
-
-    @one_thread
-    def slopes(
-        self, q: ArrayLike, y: ArrayLike, wanted: ArrayLike | None = None
-    ) -> tuple[Floats, Floats]:
-        """λ (n_samples, n_modes) in rad²/s² and ∂λ/∂x (n_samples, n_modes, n_x), x = (q, y).
-
-        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i, where ``wanted`` (n_x,) is not 0, everywhere
-        without it; else they are 0. Raises what `frequencies` raises.
-        """
-        x, columns = samples(q, y, self.n_q, self.n_y), np.array(self.modes) - 1
-        along = np.flatnonzero(np.ones(x.shape[1]) if wanted is None else wanted)
-        rates = theta_slopes(self.program, self.to_program, self.shift, x, along)
-        moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
-        stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in (self.stiffness, self.mass))
-        theta = self._theta(x)
-        lam, slopes = [], []
-        for part in chunks(np.arange(len(x)), self.mass.place.size):
-            K, M_c, coupling = self._at(theta[:, part])
-            mu, z = (a[..., columns] for a in ritz_pairs(K, M_c))
-            phi = z / np.sqrt(mu)[:, None, :]
-            whole = np.concatenate([phi, -coupling @ phi], axis=1)
-            forms = stiff.forms(phi, rates[:, :, part])
-            forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
-            lam.append(1.0 / mu)
-            whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
-            whole_slopes[..., along] = forms
-            slopes.append(whole_slopes)
-        return np.concatenate(lam), np.concatenate(slopes)
 
     def _theta(self, x: Floats) -> Floats:
         """θ (n_theta, n) at samples x (n, n_x)."""
@@ -135,73 +106,14 @@ class ReducedModel:
             raise UsageError("q or y is outside the domain of a section or length")
         return theta
 
-    def _at(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k) at θ (n_theta, n)."""
-        stiff, heavy = self.stiffness, self.mass
-        E, F = slice(0, self.size), slice(self.size, None)
-        K, M = stiff(theta), heavy(theta)
-        blocks = [heavy.block(M, rows, columns) for rows, columns in ((E, E), (F, E), (F, F))]
-        coupling, M_c = condense_blocks(*blocks)
-        return stiff.block(K, E, E), M_c, coupling
-
-
-@dataclass(frozen=True, eq=False)
-class SymmetricTerms:
-    """Sums Σ θ_j A_j of small symmetric matrices from their lower triangles: half the work.
-
-    ``triangles`` (n_terms, k(k + 1)/2) are those of A_j; ``place`` (k, k) is where in them each
-    entry is.
-    """
-
-    terms: Ints  # indices j of θ
-    triangles: Floats
-    place: Ints
-
-    def __call__(self, theta: Floats) -> Floats:
-        """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
-        return np.asarray(theta[self.terms].T @ self.triangles)
-
-    def chosen(self, terms: NDArray[np.bool_]) -> SymmetricTerms:
-        """The marked terms alone."""
-        return SymmetricTerms(self.terms[terms], self.triangles[terms], self.place)
-
-    def forms(self, phi: Floats, rates: Floats) -> Floats:
-        """Σ_j (φᵀA_jφ) r_ij (n, m, n_x) of modes φ (n, k, m) with ``rates`` r (n_x, n_theta, n)."""
-        i, j = np.tril_indices(len(self.place))
-        twice = np.where(i == j, 1.0, 2.0)[None, :, None]
-        products = phi[:, i] * phi[:, j] * twice
-        each = np.einsum("npm,tp->nmt", products, self.triangles, optimize=True)
-        return np.asarray(np.einsum("nmt,xtn->nmx", each, rates[:, self.terms], optimize=True))
-
-    def block(self, triangles: Floats, rows: slice, columns: slice) -> Floats:
-        """Rows and columns of whole matrices, (n, …, …), from their triangles."""
-        place = self.place[rows, columns]
-        return triangles.take(place.ravel(), axis=1).reshape(len(triangles), *place.shape)
-
-
-def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
-    """Terms from whole matrices (n_terms, k, k), of which the lower triangle is read."""
-    k = matrices.shape[1]
-    i, j = np.tril_indices(k)
-    place = np.empty((k, k), dtype=np.intp)
-    place[i, j] = place[j, i] = np.arange(len(i))
-    return SymmetricTerms(terms, np.ascontiguousarray(matrices[:, i, j]), place)
-
-
-# --- Ritz values and pairs
-
-
-def ritz_pairs(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
-    """μ descending (n, k) and z (n, k, k) with zᵀKz = 1."""
-    A, inverse = _standard(K, M_c)
-    mu, v = np.linalg.eigh(A)
-    return mu[:, ::-1], (np.swapaxes(inverse, 1, 2) @ v)[:, :, ::-1]
-
-
-def _standard(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
-    """L⁻¹ M_c L⁻ᵀ, L⁻¹ of K (n, k, k), lower triangle; raises MechanismError if K is indefinite."""
-    inverse = inverse_factor(K)
-    return inverse @ M_c @ np.swapaxes(inverse, 1, 2), inverse
+    def _standard(self, theta: Floats) -> Floats:
+        """L⁻¹ M̂_c L⁻ᵀ (n, k, k) at θ (n_theta, n), its lower triangle."""
+        k = self.size
+        each = zip(self.terms, (self.stiffness, self.mass), strict=True)
+        K, M = (np.tensordot(theta[j], A, (0, 0)) for j, A in each)
+        M_c = condense_blocks(M[:, :k, :k], M[:, k:, :k], M[:, k:, k:])[1]
+        inverse = inverse_factor(K)
+        return np.asarray(inverse @ M_c @ np.swapaxes(inverse, 1, 2))
 
 
 # --- The basis, and the pencil on it
@@ -239,8 +151,9 @@ def reduce(
         program=pencil.program,
         to_program=pencil.to_program,
         shift=pencil.shift,
-        stiffness=symmetric_terms(k_terms, stiffness[k_terms, :k, :k]),
-        mass=symmetric_terms(m_terms, mass[m_terms]),
+        terms=(k_terms, m_terms),
+        stiffness=stiffness[k_terms, :k, :k],
+        mass=mass[m_terms],
     )
 
 

@@ -39,9 +39,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.mechanism.assembly.dynamics.under_load import StiffnessUnderLoad
 from eigassign.mechanism.assembly.dynamics.velocity_terms import VelocityTerms
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -60,7 +60,6 @@ from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.algebra import matrix_product
 from eigassign.series.multi_index import lower_set, total_degree
 
-Floats = NDArray[np.float64]
 # Relative distance in λ below which modes are followed together. Where two veered seven periods
 # apart, the change was 35 % above the phase by integration from 0.3 on if each is followed alone,
 # and 10 % from 0.5 on.
@@ -71,13 +70,8 @@ ABOVE = 4  # modes above the wanted ones among which near ones are sought
 class MotionEffect(NamedTuple):
     """Relative change of each mode's frequency (n_instants, n_modes) at ``samples`` of the path."""
 
-    samples: NDArray[np.intp]
+    samples: Ints
     change: Floats
-
-    @property
-    def worst(self) -> float:
-        """Largest magnitude over instants and modes."""
-        return float(np.abs(self.change).max(initial=0.0))
 
 
 def motion_effect(

@@ -36,9 +36,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.case.schema.mechanism import RIDING, Assembly
 from eigassign.case.schema.parts import FrozenDict
 from eigassign.errors import LIMP, MechanismError
@@ -66,7 +67,6 @@ from eigassign.modal.exact.solver import lowest_modes, works_changed
 from eigassign.modal.mesh_error import standing_frequencies
 from eigassign.modal.model import Model
 
-Floats = NDArray[np.float64]
 STANDARD_GRAVITY = 9.81  # m/s²
 NEIGHBOURS = 3  # modes above those asked for that weight may mix with them
 # of λ: stress mixes all modes, which is of second order where they are far from each other; of sag,
@@ -221,7 +221,6 @@ def strut_error(model: Model, q: ArrayLike, y: ArrayLike, modes: Sequence[int]) 
     return float(min(off, 1.0)) if np.isfinite(off) else 1.0
 
 
-Ints = NDArray[np.intp]
 # Of the largest entry of a force: what is less is round-off of a motion that no free joint makes
 STILL = 1e-9
 
@@ -236,7 +235,7 @@ class Flexibility:
     right: Ints
     held: bool = False  # brakes hold what is rigid in the pencil
 
-    def at(self, x: Floats, wanted: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    def at(self, x: Floats, wanted: Bools) -> tuple[Floats, Floats]:
         """The values (n, m) at samples x (n, n_x), and slopes (n, m, n_x) in those ``wanted``.
 
         Infinite where a free joint gives way. Raises MechanismError where K is not definite.
@@ -245,7 +244,7 @@ class Flexibility:
         values, slopes = map(np.concatenate, zip(*parts, strict=True))
         return values, slopes
 
-    def _at(self, x: Floats, wanted: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    def _at(self, x: Floats, wanted: Bools) -> tuple[Floats, Floats]:
         pencil, theta = self.pencil, self.pencil.theta(x)
         along = np.flatnonzero(wanted & ~np.bool_(self.forces.is_fixed(wanted)))
         given = self.forces.at(x, along)

@@ -18,18 +18,16 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import SingularityError
 from eigassign.series.multi_index import LowerSet, first_of_each, lower_set
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Used = NDArray[np.bool_]
 CHUNK = 4_000_000  # numbers gathered at once in a product: 32 MB
 SMALL_TABLE = 1_000  # pairs up to which looking for zeros costs more than it saves
 MOST = 0.5  # part of all pairs of coefficients from which leaving the others out saves nothing
@@ -45,7 +43,9 @@ def multiply(space: LowerSet, a: Floats, b: Floats) -> Floats:
     return _sums(a, b, table.left, table.right, table.starts)
 
 
-def _multiply_present(space: LowerSet, a: Floats, b: Floats, used_a: Used, used_b: Used) -> Floats:
+def _multiply_present(
+    space: LowerSet, a: Floats, b: Floats, used_a: Bools, used_b: Bools
+) -> Floats:
     """The product over coefficients that are there: of six_bar, order 8, in half the time."""
     table = space.table
     keep = np.flatnonzero(used_a[table.left] & used_b[table.right])
@@ -113,11 +113,6 @@ def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
     turns = np.arange(order + 1)[:, None] + quarters
     values = np.array([s, c, -s, -c])[turns % 4, np.arange(len(at))]
     return np.asarray(values / _factorials(order))
-
-
-def exponential_taylor(at: Floats, order: int) -> Floats:
-    """eᵃ over k!, k = 0…p: shape (p + 1, n)."""
-    return np.asarray(np.exp(at) / _factorials(order))
 
 
 @lru_cache(maxsize=64)
@@ -216,32 +211,7 @@ def _projection(indices: NDArray[np.int64]) -> tuple[LowerSet, Ints]:
     return space, space.find(indices)
 
 
-Weights = sparse.csr_array | NDArray[np.float64]
-
-
-class Algebra(Protocol):
-    """Operations that a program needs to run, on rows of numbers standing for values."""
-
-    def constant(self, values: Floats) -> Floats:
-        """Numbers (n,) as rows (n, …)."""
-
-    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
-        """Linear forms of rows: constants (k,) + weights (k, n) × values."""
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Row by row product."""
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Row by row power with one exponent a row."""
-
-    def wave(self, a: Floats, quarters: Ints) -> Floats:
-        """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
-
-    def exponential(self, a: Floats) -> Floats:
-        """Row by row eᵃ."""
-
-    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
+Weights = sparse.csr_array | Floats
 
 
 class Function(Protocol):
@@ -401,7 +371,7 @@ class Truncated(NamedTuple):
 
     def exponential(self, a: Floats) -> Floats:
         """Exponential of each series."""
-        return compose(self.space, exponential_taylor(a[:, 0], self.space.order), a)
+        return compose(self.space, np.exp(a[:, 0]) / _factorials(self.space.order), a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """Chord steps X ← X + A_0⁻¹ (B − A X), each of which gains one degree."""
@@ -413,3 +383,6 @@ class Truncated(NamedTuple):
             product = matrix_product(self.space, A.reshape(n, n, size), X.reshape(n, m, size))
             X = X + inverse @ (right - product.reshape(n, -1))
         return np.asarray(X.reshape(n * m, size))
+
+
+Algebra: TypeAlias = Samples | Tangents | Truncated  # what a program runs on: rows of numbers

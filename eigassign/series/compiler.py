@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Algebra, Function, Samples
 from eigassign.series.expression import Expression, Node, Recorder, Scalar
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 WAVES: dict[object, str] = {"sine": "wave", "cosine": "wave"}
 # Entries up to which the matrix of a linear step is kept dense: at one sample that saves the 3 µs
 # that the call of a sparse product takes; of more entries the products with zeros take as long.
@@ -68,7 +67,7 @@ class Program:
     input_variables: Ints  # which variable it is
     steps: tuple[Instruction, ...]
     outputs: Ints  # atom of each output
-    dependence: NDArray[np.bool_]  # (n_outputs, n_variables): structural
+    dependence: Bools  # (n_outputs, n_variables): structural
 
     @cached_property
     def is_implicit(self) -> bool:
@@ -76,11 +75,11 @@ class Program:
         return any(step.function is not None for step in self.steps)
 
     @cached_property
-    def faces(self) -> NDArray[np.bool_]:
+    def faces(self) -> Bools:
         """(n_faces, n_variables): every atom is a sum of functions of one face's variables each."""
         return faces(self)
 
-    def is_affine(self, variables: NDArray[np.bool_]) -> bool:
+    def is_affine(self, variables: Bools) -> bool:
         """True where no output is of a degree above 1 in these ``variables`` (n_variables,)."""
         degree = np.zeros(self.n_atoms)
         degree[self.inputs] = variables[self.input_variables]
@@ -169,7 +168,7 @@ def _arguments(node: Node) -> tuple[int, ...]:
     raise UsageError(f"unknown expression {node!r}")
 
 
-def _dependence(nodes: Mapping[int, Node], n_variables: int) -> NDArray[np.bool_]:
+def _dependence(nodes: Mapping[int, Node], n_variables: int) -> Bools:
     """Variables that each atom is made of: sets of few members, each a bit of one number."""
     depends: dict[int, int] = {}
     for atom, node in nodes.items():
@@ -180,7 +179,7 @@ def _dependence(nodes: Mapping[int, Node], n_variables: int) -> NDArray[np.bool_
     return _bits(list(depends.values()), n_variables)
 
 
-def _bits(sets: Sequence[int], n: int) -> NDArray[np.bool_]:
+def _bits(sets: Sequence[int], n: int) -> Bools:
     """(n_sets, n): the members of sets whose bit k stands for variable k."""
     size = (n + 7) // 8
     packed = np.frombuffer(b"".join(s.to_bytes(size, "little") for s in sets), dtype=np.uint8)
@@ -311,7 +310,7 @@ MOST = 16  # faces of an atom, since a product compares all pairs of them; more 
 Faces = frozenset[int]  # bit k of a face is variable k
 
 
-def faces(program: Program) -> NDArray[np.bool_]:
+def faces(program: Program) -> Bools:
     """(n_faces, n_variables), those within another left out."""
     found: list[Faces] = [frozenset({0})] * program.n_atoms
     for atom, variable in zip(program.inputs, program.input_variables, strict=True):

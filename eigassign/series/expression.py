@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias, overload
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -170,10 +170,6 @@ class Expression:
         return Expression(self.recorder, constant, terms) if terms else constant
 
 
-@overload
-def sin(x: float) -> float: ...
-@overload
-def sin(x: Expression) -> Expression: ...
 def sin(x: Scalar) -> Scalar:
     """Sine of an angle in rad."""
     if not isinstance(x, Expression):
@@ -181,10 +177,6 @@ def sin(x: Scalar) -> Scalar:
     return x.recorder._atom(("sine", x.recorder.atom(x)))
 
 
-@overload
-def cos(x: float) -> float: ...
-@overload
-def cos(x: Expression) -> Expression: ...
 def cos(x: Scalar) -> Scalar:
     """Cosine of an angle in rad."""
     if not isinstance(x, Expression):

@@ -12,13 +12,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats
 from eigassign.errors import SingularityError
 from eigassign.series.algebra import Algebra, Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 
-Floats = NDArray[np.float64]
 STEP = 0.15  # rad or m: a continuation step; where it is too long, REFINEMENTS divide it
 FARTHEST = 500.0  # rad or m from the known solution: 80 turns
 REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
@@ -37,7 +36,7 @@ class _Reached(NamedTuple):
     """p (size, n), whether it is regular, ∂F/∂p (n, n_equations, size) and its least σ (n,)."""
 
     p: Floats
-    regular: NDArray[np.bool_]
+    regular: Bools
     J: Floats
     smallest: Floats
 
@@ -97,7 +96,7 @@ class ImplicitFunction:
             message += f" on the way to {self._named(asked)}"
         raise SingularityError(message)
 
-    def _continue(self, a: Floats, steps: int) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    def _continue(self, a: Floats, steps: int) -> tuple[Floats, Bools, Floats]:
         """p after ``steps`` equal steps from a_0, where no step could have changed the branch, and
         how far each sample got.
 
@@ -122,7 +121,7 @@ class ImplicitFunction:
         missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
         return p, ok & (missed < ACCEPT), reached
 
-    def newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def newton(self, a: Floats, p: Floats) -> tuple[Floats, Bools]:
         """Newton from any p at fixed a; whether each sample is regular there."""
         made = self._newton(a, p, TOLERANCE, _least)
         return made.p, made.regular

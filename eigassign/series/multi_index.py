@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Ints
 from eigassign.brief import Brief
 from eigassign.errors import UsageError
 from eigassign.files import how_to_raise, raised
 
-Ints = NDArray[np.intp]
 MAX_SIZE = 200_000  # members: 1.6 MB for each variable and each series over them
 MOST_PAIRS = 10_000_000  # of coefficients that meet in a product
 PAIR_BYTES = 90  # measured for 5 to 9 variables
@@ -139,10 +139,6 @@ class LowerSet(Brief):
         _, ordered, order = self._keys
         at = np.minimum(np.searchsorted(ordered, keys), len(self) - 1)
         return np.where(ordered[at] == keys, order[at], 0)
-
-    def restrict(self, keep: NDArray[np.bool_]) -> LowerSet:
-        """The members where ``keep`` is true; they must form a lower set themselves."""
-        return lower_set(self.indices[keep])
 
 
 def first_of_each(sorted_values: Ints) -> Ints:

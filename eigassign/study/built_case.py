@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile, from_mapping, load
 from eigassign.case.schema.trajectory import DURATION_PATH, TrajectoryForm
@@ -68,8 +68,6 @@ from eigassign.study.planning import (
     standing,
     with_middle_loads,
 )
-
-Floats = NDArray[np.float64]
 
 
 @contextmanager

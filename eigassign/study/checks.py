@@ -22,8 +22,8 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.errors import EigassignError
@@ -46,7 +46,6 @@ from eigassign.study.planning import poses_at
 from eigassign.study.results import MeshError, SagRow, WeightRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 MOVED = 0.005  # of a frequency, from which on it is warned of where max_error is larger
 INSTANTS, INSTANTS_LARGE = 9, 3
 SLOW_INSTANT = 2_000  # degrees of freedom, from which on an instant takes 0.1 s and more

@@ -8,8 +8,8 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import SI, handy_unit
@@ -41,7 +41,6 @@ from eigassign.study.results import (
 )
 from eigassign.study.scene import ModeStudies, Scene, reach_warnings
 
-Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13  # of the weight, or of the largest load: what a level direction leaves of it
 
 

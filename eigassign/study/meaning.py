@@ -26,8 +26,8 @@ from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
@@ -54,8 +54,6 @@ from eigassign.study.results import (
 )
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 FEW = 21  # samples of a trajectory at which levers are looked at
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
 STEPS, STARTS = 30, 3  # of a search at one sample

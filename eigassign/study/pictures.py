@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import RIDING, SLIDING
@@ -40,7 +41,6 @@ from eigassign.study.results import (
     MovingMode,
 )
 
-Floats = NDArray[np.float64]
 POSES = 7  # drawn, first and last sample included
 CROWDED = 12  # lines of a mechanism of which only three poses can be told apart
 AMPLITUDE = 0.1  # a mode's largest displacement, relative to the mechanism's extent
@@ -385,7 +385,7 @@ def _modes(
     model: Model,
     x: Floats,
     found: Sequence[ModeShapes],
-    which: Mapping[str, NDArray[np.intp]],
+    which: Mapping[str, Ints],
 ) -> Iterator[MovingMode]:
     for name, modes in which.items():
         hz = np.array([one.frequencies[m] for one, m in zip(found, modes, strict=True)])
@@ -394,7 +394,7 @@ def _modes(
         yield MovingMode(name, hz, displaced(file, model, x, found, factors, POINTS))
 
 
-def _scales(found: Sequence[ModeShapes], modes: NDArray[np.intp]) -> Floats:
+def _scales(found: Sequence[ModeShapes], modes: Ints) -> Floats:
     """The factor of each pose that makes the largest displacements alike, signs following on."""
     size = AMPLITUDE * max(extent_of(one) for one in found)
     scales = np.array(

@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import hadamard
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import shown_point
 from eigassign.errors import CaseError, EigassignError, MechanismError, TrajectoryError, UsageError
@@ -25,9 +26,6 @@ from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.recursion import local_space
 from eigassign.modal.under_load import buckling
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 # --- The expansion of a case: point, design, order and modes
 
@@ -271,7 +269,7 @@ def standing(x: Floats, model: Model) -> Floats:
     return x[kept] if kept.any() else x
 
 
-def far_from_buckling(model: Model, x: Floats) -> NDArray[np.bool_]:
+def far_from_buckling(model: Model, x: Floats) -> Bools:
     """Mask of samples x (n, n_x) with stated weight up to `STANDS` of what buckles or falls."""
     n_q, kept = len(model.q_names), np.ones(len(x), dtype=bool)
     for k, one in enumerate(x if model.pencil.weight is not None else ()):
@@ -393,7 +391,7 @@ def design_bounds(file: CaseFile) -> tuple[Floats, Floats]:
     return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
 
-def corners(n: int, most: int = 16) -> NDArray[np.bool_]:
+def corners(n: int, most: int = 16) -> Bools:
     """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
 
     All of up to ``most``, 16 or 64. Of more, columns 15, 14, … 1 of the Hadamard matrix of order

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.schema.targets import DrawnResponse, PushedNode
 from eigassign.case.units import SI, Given
 from eigassign.errors import MechanismError
@@ -27,7 +28,6 @@ from eigassign.modal.response import (
 from eigassign.study.results import FreeSpeeds, ResponseRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 UNIT = SI("N/m", Given(1e6, "1 N/um"))  # as machines are rated
 FEWEST, MOST = 200, 4000  # frequencies of a response
 
@@ -128,7 +128,7 @@ def _free(key: DrawnResponse, hz: Floats, ratios: Sequence[Floats]) -> Iterator[
         at = max(at, float(end))
 
 
-def _tracked(found: ModalResponse, path: Trajectories, count: int) -> NDArray[np.intp]:
+def _tracked(found: ModalResponse, path: Trajectories, count: int) -> Ints:
     """Modes by likeness to those of the sample before, (φᵀMφ')², numbered where a path begins."""
     from scipy.optimize import linear_sum_assignment
 

@@ -106,7 +106,6 @@ def test_samples_that_are_none_are_refused(model, wrong, words):
         model.matrices,
         series.frequencies,
         series.eigenvalues,
-        series.last_degree_share,
         series.slopes,
         reduced.frequencies,
         lambda q, y: expand(model, q, y),

@@ -8,7 +8,7 @@ import pytest
 from chains import bar, model_of, two_link
 from rungs import richardson
 
-from eigassign import expand, load_case
+from eigassign import expand
 from eigassign.errors import UsageError
 from eigassign.modal import Expansion, Model, eigenvalues
 from eigassign.modal import expand as expand_pencil
@@ -193,28 +193,3 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
     for array in (a.coefficients, a.q0, a.clusters[0].vectors, a.clusters[0].coefficients):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
-
-
-# --- What the coefficients say of a polynomial's error: a guide, and where the series ends
-
-
-def test_the_share_of_the_last_degree_is_what_that_degree_adds():
-    """f² ∝ λ: it is the change of the frequency from one order to the next, in the first order."""
-    case = load_case("cases/two_link.yaml")
-    model, q = case.model(), case.trajectory.q
-    three, four = (expand_pencil(model.pencil, Q0, Y0, (1, 2), order=p) for p in (3, 4))
-    share, hz = four.last_degree_share(q, Y0), four.frequencies(q, Y0)
-    added = np.abs(three.eigenvalues(q, Y0) / four.eigenvalues(q, Y0) - 1.0)
-    np.testing.assert_allclose(2.0 * share, added, rtol=1e-9, atol=1e-14)
-    error = np.abs(hz / model.frequencies(q, Y0, 2) - 1.0)
-    assert 0.1 < share.max() / error.max() < 30.0
-
-
-def test_of_a_cluster_it_is_that_of_its_matrix():
-    model = model_of(two_link())
-    expansion = expand_pencil(model.pencil, Q0, Y0, (2, 3), order=4, cluster_gap=0.64)
-    assert [c.modes for c in expansion.clusters] == [(2, 3)]
-    q = Q0 + np.column_stack([np.zeros(5), np.linspace(-0.3, 0.3, 5)])
-    share = expansion.last_degree_share(q, Y0)
-    assert share.shape == (5, 2)
-    assert share[2].max() == 0.0 < share[[0, 4]].min()

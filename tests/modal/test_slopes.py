@@ -19,7 +19,7 @@ from scenes import SHIPPED, scene_of
 from weighed_draws import weighed
 
 from eigassign import Case, load_case
-from eigassign.modal import NearestExpansion, eigenvalues, exact_slopes, expand, reduce
+from eigassign.modal import NearestExpansion, eigenvalues, exact_slopes, expand
 from eigassign.series import total_degree
 from eigassign.study import Scene
 
@@ -110,7 +110,7 @@ def test_slopes_where_coordinates_follow_the_design_are_those_of_extrapolated_di
     assert (missing.max() > 1e-2) == path.follows_design  # it would be wrong without the chain rule
 
 
-@pytest.mark.parametrize("kind", ["exact", "series", "linearised", "several", "reduced"])
+@pytest.mark.parametrize("kind", ["exact", "series", "linearised", "several"])
 def test_slopes_of_whatever_answers_frequencies_are_those_of_its_differences(
     arm: Scene, kind: str
 ) -> None:
@@ -121,7 +121,6 @@ def test_slopes_of_whatever_answers_frequencies_are_those_of_its_differences(
         "series": series,
         "linearised": expand(model.pencil, q0, y0, (1, 2), 4, linear_in_y=True),
         "several": NearestExpansion((expand(model.pencil, q0 - 1.0, y0, (1, 2)), series)),
-        "reduced": reduce(model.pencil, q0, y0, (1, 2)),
     }[kind]
     x = np.array([[1.85, 5.3, 0.12, 0.07], [1.7, 5.1, 0.05, 0.2]])
     lam, slopes = made.slopes(x[:, :2], x[:, 2:])

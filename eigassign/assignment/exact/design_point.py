@@ -16,24 +16,22 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Ints
 from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
 from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.requirement import MEET, NeighbourPairs
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
 class Rows:
     """One-sided rows: value + slopes·d ≤ v of excesses, ≤ t of residuals."""
 
-    owner: Indices  # (q,) which row of the design each stands for
+    owner: Ints  # (q,) which row of the design each stands for
     sign: Floats  # (q,) with which it does
     value: Floats  # (q,)
     slopes: Floats  # (q, n)
-    of_excess: NDArray[np.bool_]  # (q,)
+    of_excess: Bools  # (q,)
 
     def __len__(self) -> int:
         return len(self.owner)
@@ -54,7 +52,7 @@ class Expected(NamedTuple):
     """The rows expected of a step, which of them lie behind a kink, and those as one-sided rows."""
 
     values: Floats  # (m + k,)
-    behind: Indices  # (p,)
+    behind: Ints  # (p,)
     rows: Rows
 
 
@@ -125,7 +123,7 @@ class DesignPoint(NamedTuple):
         values[behind] = found[worse[first]]
         return Expected(values, behind, self._rows_behind(d, behind, values, slopes[worse[first]]))
 
-    def _rows_behind(self, d: Floats, behind: Indices, values: Floats, slopes: Floats) -> Rows:
+    def _rows_behind(self, d: Floats, behind: Ints, values: Floats, slopes: Floats) -> Rows:
         """The rows expected behind kinks, of slopes (p, n) at d; squares are one row together."""
         there, squares = values[behind], behind[: np.searchsorted(behind, self.m)]
         sign = np.where(self._either(behind), np.sign(there), 1.0)
@@ -137,7 +135,7 @@ class DesignPoint(NamedTuple):
             there, slopes = np.append(rise, there[p:]), np.vstack([steep, slopes[p:]])
         return self._one_sided(behind, sign, there - slopes @ d, slopes)
 
-    def _either(self, rows: Indices) -> NDArray[np.bool_]:
+    def _either(self, rows: Ints) -> Bools:
         """Whether rows are the worse the farther they are from 0, on either side."""
         return (rows < self.m) & (not self.one_sided)
 
@@ -146,19 +144,19 @@ class DesignPoint(NamedTuple):
         """The sign (m + k,) of a change that makes each row worse."""
         return np.where(self._either(np.arange(len(self.values))), np.sign(self.values), 1.0)
 
-    def _one_sided(self, owner: Indices, sign: Floats, value: Floats, slopes: Floats) -> Rows:
+    def _one_sided(self, owner: Ints, sign: Floats, value: Floats, slopes: Floats) -> Rows:
         return Rows(owner, sign, sign * value, sign[:, None] * slopes, owner >= self.m)
 
     # --- Slopes at kinks
 
-    def smooth_slopes(self, behind: Indices) -> Floats:
+    def smooth_slopes(self, behind: Ints) -> Floats:
         """The slopes, but of rows ``behind`` kinks the mean of both branches."""
         on = np.isin(self.pairs.row, behind)
         slopes, rows = self.slopes.copy(), self.pairs.row[on]
         slopes[rows] = 0.5 * (slopes[rows] + self.pairs.others[on])
         return slopes
 
-    def branches(self, on: Indices) -> tuple[Indices, Floats]:
+    def branches(self, on: Ints) -> tuple[Ints, Floats]:
         """Slopes (b, n) of other branches of the rows ``on``, and whose they are (b,).
 
         Those at kinks that the design may lie in: behind others the row is better than its own
@@ -260,14 +258,14 @@ def _unbalanced_violation(held: Sequence[_Held], place: DesignPoint) -> float:
     return left / max(float(np.abs(steepest).max()), 1.0)
 
 
-def _with_branches(place: DesignPoint, on: Indices) -> tuple[Indices, Floats]:
+def _with_branches(place: DesignPoint, on: Ints) -> tuple[Ints, Floats]:
     """The rows ``on`` and their slopes, then those of their other branches at kinks."""
     rows, slopes = place.branches(on)
     return np.append(on, rows), np.vstack([place.slopes[on], slopes])
 
 
 def _left_over(
-    slope: Floats, held: Sequence[_Held], branches: Floats, kink: Indices, unit: float
+    slope: Floats, held: Sequence[_Held], branches: Floats, kink: Ints, unit: float
 ) -> tuple[float, Floats]:
     """The largest entry that is left of a slope, and the multipliers ≥ 0 that balance the rest.
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from scipy import sparse
 
+from eigassign.arrays import Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import MechanismError
@@ -20,7 +21,6 @@ from eigassign.mechanism.assembly.node_motion import NodeMotions, add_springs, c
 from eigassign.mechanism.assembly.pencil import (
     AffineEntries,
     Entries,
-    Ints,
     Pencil,
     Weight,
     joined,

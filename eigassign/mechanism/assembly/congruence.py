@@ -27,13 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.mechanism.assembly.pencil import AffineEntries, Row
 from eigassign.mechanism.elements.links import Reduction, Term, total
 from eigassign.mechanism.kinematics.joints import multiply, scaled, some
 from eigassign.series.expression import Scalar
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]
 
 

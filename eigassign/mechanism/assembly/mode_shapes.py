@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import local_links
@@ -31,8 +31,6 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters, written_l
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +71,6 @@ def total_mass(
     at = reference(case, parameters)
     table = compile_table(parameters.recorder, [mass], len(at))
     return TotalMass(table, at, len(parameters.design), written_loads(case))
-
-
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, repr=False)

@@ -27,9 +27,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.pencil import AffineEntries
@@ -49,7 +49,6 @@ from eigassign.mechanism.kinematics.parameters import STILL, ModelParameters, no
 from eigassign.mechanism.kinematics.topology import GROUND, Freedom, JointEdge, NodeName, split
 from eigassign.series.expression import Scalar
 
-Ints = NDArray[np.intp]
 MotionRow = dict[int, Scalar]
 MotionRows = list[MotionRow]  # six components (v, ω)
 
@@ -159,9 +158,6 @@ def apply(X: Objects, rows: MotionRows) -> MotionRows:
                     total[unknown] = total.get(unknown, 0.0) + carry * factor
         out.append({unknown: value for unknown, value in total.items() if some(value)})
     return out
-
-
-Floats = NDArray[np.float64]
 
 
 def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference: Floats) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.brief import Brief
 from eigassign.mechanism.kinematics.joints import Objects, some
 from eigassign.series.algebra import Samples, Tangents, Truncated
@@ -31,8 +32,6 @@ if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and 
     from eigassign.mechanism.kinematics.parameters import PropertyLimits, Rails
 
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Row = Sequence[tuple[int, Scalar]]  # one row of a matrix: unknown and coefficient
 Entries = tuple[Ints, Ints, Ints, Floats]  # row, column, atom (−1: the number 1) and value of each
 # Rows, columns or the column of all, values; atom and factor of all.
@@ -166,21 +165,6 @@ def theta_at(program: Program, z: Floats) -> Floats:
     return np.vstack([np.ones((1, z.shape[1])), program.run(Samples(), z)])
 
 
-def theta_slopes(
-    program: Program, to_program: Floats, shift: Floats, x: Floats, along: Ints
-) -> Floats:
-    """∂θ/∂x_i (len(along), 1 + n_outputs, n) of θ = (1, program(to_program x + shift)), exactly."""
-    z = Tangents(len(x), len(along)).constant(shift)
-    z[:, : len(x)] += to_program @ x.T
-    z[:, len(x) :] = np.repeat(to_program[:, along], len(x), axis=1)
-    size = len(x), len(along)
-    kept = len(program.outputs) * z.shape[1] <= KEPT
-    rows = (_run if kept else _run.__wrapped__)(program, *size, z.tobytes())[:, len(x) :]
-    slopes = np.zeros((len(along), 1 + len(rows), len(x)))
-    slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
-    return slopes
-
-
 @lru_cache(maxsize=2)  # frequencies and statics of a design want the same, one after the other
 def _run(program: Program, samples: int, directions: int, z: bytes) -> Floats:
     variables = np.frombuffer(z).reshape(-1, (1 + directions) * samples)
@@ -244,7 +228,7 @@ class Pencil(Brief):
         return int(self.stiffness.shape[1])
 
     @cached_property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Bools:
         """Mask of the variables z that anything depends on: expansions drop the others."""
         return np.asarray(self.program.dependence.any(axis=0))
 
@@ -302,7 +286,15 @@ class Pencil(Brief):
 
     def theta_slopes(self, x: Floats, along: Ints) -> Floats:
         """∂θ/∂x_i (len(along), n_theta, n_samples) in the variables ``along`` of x (n, n_x)."""
-        return theta_slopes(self.program, self.to_program, self.shift, x, along)
+        z = Tangents(len(x), len(along)).constant(self.shift)
+        z[:, : len(x)] += self.to_program @ x.T
+        z[:, len(x) :] = np.repeat(self.to_program[:, along], len(x), axis=1)
+        size = len(x), len(along)
+        kept = len(self.program.outputs) * z.shape[1] <= KEPT
+        rows = (_run if kept else _run.__wrapped__)(self.program, *size, z.tobytes())[:, len(x) :]
+        slopes = np.zeros((len(along), 1 + len(rows), len(x)))
+        slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
+        return slopes
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
@@ -328,7 +320,7 @@ class Pencil(Brief):
         return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
 
     @cached_property
-    def has_term(self) -> NDArray[np.bool_]:
+    def has_term(self) -> Bools:
         """(2, n_theta): which θ_j have a stiffness term, and which a mass term."""
         return np.array([np.diff(terms.indptr) > 0 for terms in self.by_term])
 

@@ -16,9 +16,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
@@ -32,8 +32,6 @@ from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays
 from eigassign.series.expression import one_atom
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
 RESISTED = 1e-9  # relative motion of a spring's ends, scaled to 1, that is not round-off
 ROUND_OFF = 1e-12  # of an entry of W, whose largest is about 1, and of m or rad per rad or m

@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.mechanism.elements.sections import Profile
 from eigassign.series.expression import Scalar, is_constant
 
-Floats = NDArray[np.float64]
 RealOrComplex = NDArray[Any]  # real or complex: polynomials do not mind
 QUADRATIC = 2  # degree of an area along a taper, and of products of linear shapes
 PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx

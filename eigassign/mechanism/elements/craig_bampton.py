@@ -25,18 +25,17 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse import linalg
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import StaticTarget
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.elements.links import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported, link_type
 
-Floats = NDArray[np.float64]
 Product = Callable[[Floats], Floats]
 
 
@@ -197,7 +196,6 @@ def _lanczos(
     return np.asarray(mu[order]), np.asarray(z[:, order])
 
 
-Ints = NDArray[np.intp]
 EXACT = 1e-10  # part of a rigid motion, relative, that may be lost to round-off
 NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof of its own
 

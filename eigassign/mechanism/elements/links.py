@@ -12,9 +12,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.parts import tensor
 from eigassign.mechanism.elements.beam import (
@@ -44,9 +44,6 @@ from eigassign.mechanism.kinematics.parameters import (
 )
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Expression, Scalar, atom_of, is_constant, parts
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 class Term(NamedTuple):

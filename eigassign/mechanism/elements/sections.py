@@ -17,8 +17,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.parameters import ModelParameters
@@ -62,9 +62,6 @@ def section_values(section: Any, number: Lookup) -> SectionValues:
         **{"circle": _circle, "tube": _tube, "rectangle": _rectangle},
         **{"box": _box, "i_profile": _i_profile, "bare": _bare},
     }
-    if section.shape not in kinds:
-        what = f"sections of shape {section.shape!r}"
-        raise NotImplementedError(f"no properties are defined for {what}")
     return kinds[section.shape](section, number, SHEAR.get(section.shape, 0.0))
 
 
@@ -205,7 +202,6 @@ def _bare(section: Any, number: Lookup, kappa: float) -> SectionValues:
     )
 
 
-Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
 STATIONS, SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is evaluated
 # by what values at the stations give P_0 … P_4, (l, g)
@@ -315,7 +311,9 @@ def beam_profiles(
         share = start + (end - start) * (0.5 * (1.0 + place))
         return _tapered_values(case, parameters, beam, share)
 
-    weights = _legendre_weights(n)
+    # (n, 5, 5): by what a polynomial's values at `STATIONS` give its P_0 … P_4 over n elements
+    to_each = legendre.legvander(_stations(n), TERMS - 1)
+    weights = _PROJECTION @ (to_each @ np.linalg.inv(legendre.legvander(STATIONS, TERMS - 1)))
     table = [_combined(v, weights) for v in zip(*map(at, STATIONS.tolist()), strict=True)]
     for key in NO_POLYNOMIALS.get(case.mechanism.sections[beam.section.start].shape, ()):
         k = BeamValues._fields.index(key)
@@ -334,12 +332,6 @@ def beam_profiles(
 def _stations(n: int) -> Floats:
     """The stations of each of n elements, (n, 5), from −1 to 1 over all of them."""
     return np.asarray((2.0 * np.arange(n)[:, None] + 1.0 + STATIONS) / n - 1.0)
-
-
-def _legendre_weights(n: int) -> Floats:
-    """(n, 5, 5): by what a polynomial's values at `STATIONS` give its P_0 … P_4 over n elements."""
-    vandermonde = legendre.legvander(STATIONS, TERMS - 1)
-    return _PROJECTION @ (legendre.legvander(_stations(n), TERMS - 1) @ np.linalg.inv(vandermonde))
 
 
 def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:

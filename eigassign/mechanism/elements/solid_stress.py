@@ -24,15 +24,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.mechanism.elements.craig_bampton import factorise
 from eigassign.mechanism.solids.elements import KINDS, dofs, gradients, lame, mass, slopes
 from eigassign.mechanism.solids.part import AT_ONCE, Coupling, SolidPart, crossed, moments
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # entries of S
 
 

@@ -255,7 +255,8 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
         raise MechanismError(f"{path}.nodes", message)
     for own in rows.values():
         scale[own[: 2 if space == "planar" else 3]] = 1.0 / unit.length
-    null = _null_rows(K, M)
+    # rotations of nodes of solid elements, as programs leave them
+    null = np.flatnonzero((abs(K).sum(axis=1) == 0.0) & (abs(M).sum(axis=1) == 0.0))
     for name, own in rows.items():
         if (nothing := np.intersect1d(own, null).tolist()) != []:
             message = f"its rows {listed(map(str, nothing))} are zero in stiffness and in mass"
@@ -272,11 +273,6 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
             str(k) if labels is None else f"{labels[k] // LABEL}.{labels[k] % LABEL}" for k in null
         ),
     )
-
-
-def _null_rows(K: sparse.csr_array, M: sparse.csr_array) -> NDArray[np.intp]:
-    """Rows that are zero in both: rotations of nodes of solid elements, as programs leave them."""
-    return np.flatnonzero((abs(K).sum(axis=1) == 0.0) & (abs(M).sum(axis=1) == 0.0))
 
 
 # --- Files

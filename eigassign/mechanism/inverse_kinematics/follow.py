@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -300,24 +299,14 @@ def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
     if ik.chain.assembly is not None:
         said = "the solution nearest to mechanism.assembly is taken at the first sample"
         return (f"{said}: name a branch or a start for another",)
-    taken, *others = (_branch(ik, candidates, k) for k in range(len(candidates[:8])))
-    said = f"the first sample can be reached in {len(candidates)} ways; taken is branch: {taken}"
-    return (f"{said}, others are {' | '.join(others)}",)
-
-
-def _branch(ik: TipProblem, candidates: Sequence[Floats], k: int) -> str:
-    """The shortest `branch` that only one of the candidates is in: half turns of few joints."""
-    joints, own = ik.chain.joints, np.degrees(ik.joint_coordinates(np.array(candidates)))
-    turning = np.flatnonzero(ik.chain.of_kind("turn")[: ik.n_q])
-    halves = [(j, low) for j in turning for low in (0, -180, -90, 90)]
-    halves.sort(key=lambda half: (half[0] == 0, abs((own[k, half[0]] - half[1]) % 360.0 - 90.0)))
-    for few in (some for n in (1, 2, 3) for some in combinations(halves, n)):
-        inside = np.all([(own[:, j] - low) % 360.0 < 180.0 for j, low in few], axis=0)
-        if inside[k] and inside.sum() == 1 and len({j for j, _ in few}) == len(few):
-            named = (f"{joints[j]}: [{low} deg, {low + 180} deg]" for j, low in sorted(few))
-            return f"{{{', '.join(named)}}}"
-    q = zip(ik.coordinates(candidates[k][None])[0], ik.chain.units, strict=True)
-    return f"start: [{', '.join(handy(value, unit, 6) for value, unit in q)}]"
+    each = ik.coordinates(np.array(candidates[:8]))
+    each = np.where(ik.chain.of_kind("turn")[: ik.n_q], wrapped(each), each)
+    ways = [
+        ", ".join(handy(v, unit, 6) for v, unit in zip(q, ik.chain.units, strict=True))
+        for q in each
+    ]
+    said = f"the first sample can be reached in {len(candidates)} ways; taken is start: [{ways[0]}]"
+    return (f"{said}, others are {' | '.join(f'[{way}]' for way in ways[1:])}",)
 
 
 # --- the first sample

@@ -101,7 +101,7 @@ def _combined(
     return total
 
 
-def scaled(a: Objects, factor: Scalar) -> Objects:
+def scaled(a: Objects | Floats, factor: Scalar) -> Objects:
     """A vector times a scalar."""
     return np.array([value * factor for value in a.tolist()], dtype=object)
 
@@ -149,14 +149,14 @@ def joint_motion(joint: Any, values: Sequence[Scalar]) -> JointMotion:
             return JointMotion(rotation(a, values[0]), none, _columns((0 * a, a)))
         case "prismatic":
             a = sliding_axis(joint)
-            return JointMotion(_eye(), _scaled(a, values[0]), _columns((a, 0 * a)))
+            return JointMotion(_eye(), scaled(a, values[0]), _columns((a, 0 * a)))
         case "cylindrical":
             a = sliding_axis(joint)
             columns = _columns((a, 0 * a), (0 * a, a))
-            return JointMotion(rotation(a, values[1]), _scaled(a, values[0]), columns)
+            return JointMotion(rotation(a, values[1]), scaled(a, values[0]), columns)
         case "screw":
             a, pitch = sliding_axis(joint), joint.lead / (2.0 * math.pi)
-            travel = _scaled(a, values[0] * pitch)
+            travel = scaled(a, values[0] * pitch)
             return JointMotion(rotation(a, values[0]), travel, _columns((pitch * a, a)))
         case "carriage":
             return JointMotion(_eye(), none, _columns((X, 0 * X)))
@@ -217,10 +217,6 @@ def unit(axis: Sequence[float] | None, default: Floats | None) -> Floats:
 
 def _eye() -> Objects:
     return np.eye(3).astype(object)
-
-
-def _scaled(axis: Floats, value: Scalar) -> Objects:
-    return np.array([value * float(c) for c in axis], dtype=object)
 
 
 def _columns(*twists: tuple[Floats, Floats]) -> Objects:

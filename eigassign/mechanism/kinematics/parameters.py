@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import limits
 from eigassign.case.schema.links import IMPORTED
@@ -30,8 +31,6 @@ from eigassign.mechanism.kinematics.joints import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree, coordinates
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, Scalar
-
-Floats = NDArray[np.float64]
 
 
 class Moved(NamedTuple):
@@ -318,7 +317,7 @@ class PropertyLimits:
     rows: Floats  # (n_limits, n_x)
     offset: Floats  # (n_limits,)
     slack: Floats  # (n_limits,): round-off
-    strict: NDArray[np.bool_]  # (n_limits,): whether the limit itself is impossible
+    strict: Bools  # (n_limits,): whether the limit itself is impossible
     words: tuple[str, ...]  # what must be
     names: tuple[str, ...]  # of the entries of x
     units: tuple[str, ...]  # SI

@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import FREEDOMS, RIDING
 from eigassign.errors import MechanismError
@@ -228,7 +228,6 @@ def _round(edges: Sequence[JointEdge], closing: JointEdge) -> list[str]:
     return [j for j in (*sides[0], *sides[1]) if (j in sides[0]) != (j in sides[1])]
 
 
-Floats = NDArray[np.float64]
 Angles = dict[str, tuple[Floats, float] | None]  # per link: row over q and constant, or unknown
 
 

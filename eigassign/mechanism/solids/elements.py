@@ -15,12 +15,10 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.special import roots_jacobi
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from eigassign.arrays import Floats, Ints
 
 
 class Kind(NamedTuple):

@@ -17,16 +17,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.files import MESH, how_to_raise, raised, read_bytes
 from eigassign.mechanism.imports.entries import LARGEST, UnfitError
 from eigassign.mechanism.imports.parts import guarded
 from eigassign.mechanism.imports.programs import CARD, fields_of
 from eigassign.mechanism.solids.elements import KINDS
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 LONGEST = 10_000  # characters of a line: far more than a card or a name
 MOST = 100_000  # nodes: a factor of a cube of so many takes 9 GB
 

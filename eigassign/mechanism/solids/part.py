@@ -32,11 +32,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import qr
 from scipy.sparse.csgraph import connected_components
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.reader import listed, shown
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
@@ -55,8 +55,6 @@ from eigassign.mechanism.solids.elements import (
 )
 from eigassign.mechanism.solids.mesh_file import SolidMesh, read_mesh
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 ELEMENTS_AT_ONCE = 500  # elements, of up to 60 functions
 # λ loses so many times what the next degree takes off it. Surfaces that move as one have corners
 # where that is about half; see tests/mechanism/elements/test_solid_meshes.py

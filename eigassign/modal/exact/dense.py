@@ -20,14 +20,13 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack, svd
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import chunks
 
-Floats = NDArray[np.float64]
 NO_MASS = (
     "a free coordinate moves no mass: give the mechanism mass or lock it. Or two coordinates move "
     "alike, as in a spherical joint at ±90 deg about y (gimbal lock): turn it by its orientation"
@@ -50,9 +49,7 @@ def positive_at_top(phi: Floats) -> Floats:
     return np.asarray(phi * np.where(np.take_along_axis(phi, at, axis=-2) < 0.0, -1.0, 1.0))
 
 
-def condense(
-    M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
-) -> tuple[Floats, Floats]:
+def condense(M: Floats, elastic: Ints, rigid: Ints) -> tuple[Floats, Floats]:
     """M_FF⁻¹ M_FE and M_c = M_EE − M_EF M_FF⁻¹ M_FE for a batch of M (n_samples, n, n)."""
     M_FE, M_FF = block(M, rigid, elastic), block(M, rigid, rigid)
     return condense_blocks(block(M, elastic, elastic), M_FE, M_FF)
@@ -80,14 +77,13 @@ def rigid_coupling(M_FF: Floats, M_FE: Floats) -> Floats:
     return np.asarray(lapack.dpotrs(L, M_FE, lower=1)[0])
 
 
-def block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
+def block(A: Floats, rows: Ints, columns: Ints) -> Floats:
     """A[:, rows, columns] of a batch in C order, which fancy indexing would transpose in memory."""
     flat = (rows[:, None] * A.shape[2] + columns).ravel()
     taken = A.reshape(len(A), A.shape[1] * A.shape[2]).take(flat, axis=1)
     return np.asarray(taken.reshape(len(A), len(rows), len(columns)))
 
 
-Flags = NDArray[np.bool_]
 ROUND_OFF = 10.0 * float(np.finfo(np.float64).eps)  # c ε, times n
 STIFFEST = 1e-10  # √μ/√μ_1 down to which a singular value keeps five digits
 MARGIN = 1e3  # a μ above the eigensolver's round-off by this much keeps its digits
@@ -103,7 +99,7 @@ def mass_sizes(pencil: Pencil, theta: Floats, coupling: Floats) -> Floats:
     return np.asarray(size * size)
 
 
-def may_be_roundoff(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags:
+def may_be_roundoff(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Bools:
     """Which μ (…, count), descending, may be round-off; ``noise`` ≥ zᵀ T² z of K_E-unit z.
 
     The eigensolver's counts ``margin`` times, since singular values have less of it; that of M_c

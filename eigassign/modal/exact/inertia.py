@@ -33,11 +33,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.linalg import eigh, lapack
 from scipy.sparse import linalg
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.units import shown_point
 from eigassign.errors import LIMP, MechanismError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil, principal
@@ -49,8 +50,6 @@ from eigassign.mechanism.elements.craig_bampton import (
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.dense import NO_MASS
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 UNCERTAIN = -1  # in place of a count that round-off might change
 BAND = 1e-7  # relative in hz: where the pivots grow, the count is taken this far to either side
 ROUND_OFF = 10.0 * float(np.finfo(np.float64).eps)  # c ε; see tests/modal/exact/test_inertia.py

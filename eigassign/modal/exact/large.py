@@ -7,9 +7,9 @@ mechanism are for links that are reduced (`reduce_to`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import linalg
 
+from eigassign.arrays import Floats
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import (
@@ -27,7 +27,6 @@ from eigassign.modal.exact.dense import (
     rigid_coupling,
 )
 
-Floats = NDArray[np.float64]
 FINE = (
     "the exact modes were not found: so fine a mesh, or stiffnesses so far apart, leave only "
     "round-off. Give the links fewer elements"

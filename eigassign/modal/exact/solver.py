@@ -29,16 +29,15 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats
 from eigassign.errors import AccuracyError, MechanismError, MissingMassError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import chunks, solve_blocks, whole
 from eigassign.modal.exact.dense import Modes, solve_dense
 from eigassign.modal.exact.inertia import require_hanging, require_standing
 from eigassign.modal.exact.large import solve_large
-
-Floats = NDArray[np.float64]
 
 
 def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:

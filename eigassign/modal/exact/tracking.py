@@ -21,15 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats
 from eigassign.errors import Candidate, LostModeError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import chunks, solve_blocks
 from eigassign.modal.exact.dense import block
 from eigassign.modal.exact.solver import lowest_modes
 
-Floats = NDArray[np.float64]
 CLEAR = 0.75  # share of a shape above which a step needs no halving
 HALVINGS = 12
 COINCIDENT = 1e-9  # relative distance in λ below which shapes are arbitrary
@@ -112,7 +111,7 @@ class FollowedShape:
         return candidates(self.at, self.a**2)
 
     @property
-    def _same(self) -> NDArray[np.bool_]:
+    def _same(self) -> Bools:
         return np.asarray(np.abs(self.at.lam / self.lam - 1.0) <= COINCIDENT)
 
 
@@ -198,6 +197,6 @@ def _carried(
     return _carried(pencil, half, there, _link(pencil, middle, there), depth + 1)
 
 
-def _near(at: ModesAtPoint, best: int) -> NDArray[np.bool_]:
+def _near(at: ModesAtPoint, best: int) -> Bools:
     """Flags of the modes near one, in the logarithm of the frequency, which is symmetric."""
     return np.asarray(np.abs(np.log(at.lam / at.lam[best])) < 2.0 * NEAR)

@@ -29,18 +29,16 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import blas, lapack
 from scipy.sparse import linalg
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil, block, principal
 from eigassign.mechanism.elements.craig_bampton import factorise, lu
 from eigassign.series.multi_index import LowerSet, first_of_each
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Solve = Callable[[Floats], tuple[Floats, Floats]]
 Factorise = Callable[[sparse.csc_array], linalg.SuperLU]
 SINGULAR = "the bordered system is singular: a mode of the cluster is missing"
@@ -282,7 +280,7 @@ class DenseTerms:
             yield p.target, np.add.reduceat(chosen, p.first, axis=0)
 
 
-def _dense(space: LowerSet, stored: Ints, stack: Floats, varying: NDArray[np.bool_]) -> DenseTerms:
+def _dense(space: LowerSet, stored: Ints, stack: Floats, varying: Bools) -> DenseTerms:
     """One matrix without the coefficients that it has not: stiffness hardly varies with q."""
     if not varying.all():
         stack, stored = stack[varying], stored[varying]

@@ -15,18 +15,15 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.series.algebra import matrix_product, multiply, power_taylor, reciprocal
 from eigassign.series.multi_index import LowerSet, first_of_each
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
-
-def vector_members(space: LowerSet, linear: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def vector_members(space: LowerSet, linear: Bools) -> Bools:
     """Which γ ∈ Λ need an eigenvector coefficient; the smaller of two sufficient choices.
 
     Half the order always suffices. Where the set is at most linear in the ``linear`` variables, all

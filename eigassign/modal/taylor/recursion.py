@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.solver import CLUSTER_GAP, whole_clusters
@@ -32,7 +33,6 @@ from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.series.algebra import monomials_of, multiply
 from eigassign.series.multi_index import LowerSet, lower_set, partially_linear, total_degree
 
-Floats = NDArray[np.float64]
 BLOCK = 16  # right-hand sides solved at once: more fall out of the cache (dense_or_sparse.py)
 
 
@@ -141,16 +141,14 @@ def _over(space: LowerSet, kept: bytes) -> LowerSet:
 
 
 @lru_cache(maxsize=64)
-def vector_set(
-    space: LowerSet, n_linear: int, vector_order: int | None
-) -> tuple[LowerSet, NDArray[np.intp]]:
+def vector_set(space: LowerSet, n_linear: int, vector_order: int | None) -> tuple[LowerSet, Ints]:
     """The set of eigenvector coefficients and its positions in the set of eigenvalues."""
     linear = np.arange(space.n_variables) >= space.n_variables - n_linear
     if vector_order is None:
         members = vector_members(space, linear)
     else:
         members = np.asarray(space.degrees <= vector_order)
-    half = space.restrict(members)
+    half = lower_set(space.indices[members])
     return half, space.find(half.indices)
 
 

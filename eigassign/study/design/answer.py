@@ -11,9 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.one_shot import Assignment, LinearModel, hz_from_lam, solve_assignment
@@ -29,7 +27,6 @@ from eigassign.study.design.search.optimum import Found, deadline_of, find_optim
 from eigassign.study.results import RobustRow, SolverRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 SAID = 5  # choices of the numbers of modes below the bands whose outcome is told
 FINER = 6  # times that instants between samples are added: cases that could be met took up to 2

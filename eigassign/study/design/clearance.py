@@ -26,8 +26,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.kinds import ForbiddenBand, Margin
 from eigassign.assignment.requirements.quantity import RIGID, DriveLimit, StaticLimit
 from eigassign.assignment.requirements.requirement import Requirement, Solved
@@ -39,8 +39,6 @@ from eigassign.study.checks import judged_poses
 from eigassign.study.design.followed import Named, Rest, follow_all, unfollowed
 from eigassign.study.results import ClearanceRow
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 # Between two points, which are halved once at least: of a four-bar whose crank turns, mode 2 has a
 # dip of 0.24 % that points 15° apart have missed, and rises by 5 % within 10° beside it.
 TURN = np.radians(10.0)
@@ -97,7 +95,7 @@ def _raised(
     y: Floats,
 ) -> float:
     """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
-    if above == 0 or model.is_exact:
+    if above == 0 or not (model.is_meshed or model.is_reduced or model.solids):
         return 0.0
     if above is None:
         return float(np.inf)

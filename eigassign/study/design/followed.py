@@ -15,8 +15,8 @@ from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.assignment.program import frozen
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import followed_modes
@@ -41,10 +41,6 @@ from eigassign.modal.exact.tracking import (
 from eigassign.modal.model import Model
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-
-
 # Samples in the order in which a shape is carried to them, and the sample that it comes from; None:
 # from the pose that names the mode
 Route = tuple[tuple[int, ...], int | None]
@@ -59,7 +55,7 @@ class Follower:
     path: Trajectories
     named_y: Floats
     pose: Callable[[Floats], Floats]  # of a design: q where the mode is named
-    needed: NDArray[np.bool_]  # (n_t,)
+    needed: Bools  # (n_t,)
 
     def along(self, y: Floats, samples: Sequence[ModesAtPoint]) -> dict[int, FollowedShape]:
         """The shape at design y and the samples needed, by their numbers.
@@ -148,7 +144,7 @@ class Rest:
     mode: Antiresonance
     of: Antiresonances
     path: Trajectories
-    needed: NDArray[np.bool_]  # (n_t,)
+    needed: Bools  # (n_t,)
 
     def numbers(self, q: Floats, y: Floats) -> Ints:
         """Which modes (n,) of the held mechanism it is at poses (n, n_q) of a design, from 1."""
@@ -219,7 +215,7 @@ class Spectrum:
         hz, followed = (np.sqrt(own.lam) / (2.0 * np.pi) for own in (self.modes, self.followed))
         return Solved(hz, followed, self.numbers)
 
-    def slopes(self, pencil: Pencil, wanted: NDArray[np.bool_]) -> Floats:
+    def slopes(self, pencil: Pencil, wanted: Bools) -> Floats:
         """∂λ/∂x (n, n_followed, n_x) of those that are named; NaN where they are not needed."""
         slopes = mode_slopes(pencil, self.x, self.followed, wanted)[0]
         for k, each in enumerate(self.named):

@@ -20,8 +20,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.kinds import Margin
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.assignment.requirements.sampling import time_weights
@@ -39,8 +39,6 @@ from eigassign.study.results import (
     TargetAlong,
     TargetStudy,
 )
-
-Floats = NDArray[np.float64]
 
 
 class SolvedDesigns(NamedTuple):

@@ -8,12 +8,11 @@ continuous.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Ints
 from eigassign.assignment.program import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.study.planning import nearest_rows
@@ -21,7 +20,6 @@ from eigassign.study.results import DesignRow
 from eigassign.study.scene import Scene
 
 Rows = tuple[int, ...]  # one row of every list: a combination
-Ints = NDArray[np.intp]
 KEEP = 5  # the combinations that are told of
 
 
@@ -57,13 +55,6 @@ def with_rows(listed: Sequence[ListedValues], rows: Ints, y: Floats) -> Floats:
     for own, at in zip(listed, rows.T, strict=True):
         designs[:, own.columns] = own.rows[at]
     return designs
-
-
-def every_combination(allowed: Sequence[Ints]) -> Ints:
-    """All combinations (n, n_lists); the last list varies first. There is one of no lists."""
-    each = np.meshgrid(*allowed, indexing="ij")
-    shape = prod(map(len, allowed)), len(allowed)
-    return np.stack(each, axis=-1).reshape(shape) if allowed else np.zeros(shape, dtype=np.intp)
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:

@@ -24,9 +24,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import by_name, local_links
 from eigassign.mechanism.assembly.dynamics.velocity_terms import (
@@ -61,9 +61,6 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,12 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import prod
 from time import monotonic
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import STOPPED, End, minimise, worth
 from eigassign.assignment.program import can_be_kept
@@ -33,7 +34,7 @@ from eigassign.assignment.requirements.kinds import Margin
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import check_band, wanting
-from eigassign.study.design.lists import KEEP, catalogues, every_combination, with_rows
+from eigassign.study.design.lists import KEEP, catalogues, with_rows
 from eigassign.study.design.search.response import Designs
 from eigassign.study.design.search.variants import (
     SOLVES,
@@ -49,8 +50,6 @@ from eigassign.study.design.search.variants import (
 from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
 MOST = 200_000  # choices that are gone through: 81 000 take 3 s beside their solves
 TRIES = 100  # choices that are estimated before the best of them is searched
@@ -138,7 +137,7 @@ class Choices:
                 "are gone through at most: shorten the lists"
             )
             raise CaseError((task.scene.file.problem("design", message),))
-        rows = every_combination(allowed)
+        rows = np.array([*product(*allowed)], dtype=np.intp)
         self.bases: dict[int, PosedProblem] = {}
         self.rows = np.tile(rows, (len(belows), 1))
         self.of = np.repeat(range(len(belows)), len(rows))
@@ -167,11 +166,11 @@ class Choices:
         return variant_of(task, self.belows[self.of[k]], self.soft, held, self.names)
 
     @property
-    def bounds_left(self) -> NDArray[np.bool_]:
+    def bounds_left(self) -> Bools:
         """True of each of which more can be known before it is searched."""
         return np.asarray(self.level < self.levels)
 
-    def ahead(self, open_: NDArray[np.bool_], behind: NDArray[np.bool_] | None = None) -> Ints:
+    def ahead(self, open_: Bools, behind: Bools | None = None) -> Ints:
         """Those that are open, the best first by what is known of them; some ``behind`` others."""
         own = np.flatnonzero(open_)
         missed, value = self.missed[own], self.value[own]

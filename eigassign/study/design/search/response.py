@@ -23,8 +23,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.assignment.exact.design_problem import best_first
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.requirements.kinds import ForbiddenBand
@@ -38,8 +38,6 @@ from eigassign.modal.model import Model
 from eigassign.study.design.followed import Named, follow_all, followers, with_followed
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
-
 
 @dataclass
 class DesignResponse:
@@ -50,7 +48,7 @@ class DesignResponse:
 
     model: Model
     path: Trajectories
-    wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
+    wanted: Bools  # (n_x,): where slopes are wanted
     count: int
     followers: tuple[Named, ...] = ()
     exact_solves: int = 0  # so far
@@ -121,7 +119,7 @@ class Glances:
     exact_solves: int = 0  # so far
 
     @cached_property
-    def order(self) -> NDArray[np.intp]:
+    def order(self) -> Ints:
         """All samples, those first that are spread over the trajectories."""
         spread = [one for few in SPREAD for one in self.path.spread(few).tolist()]
         return np.array([*dict.fromkeys([*spread, *range(len(self.path.q))])])
