@@ -146,6 +146,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "what-would-help": levers,
     "at-the-tool": figure("response", "milling_arm", "response_1", "--report", "none"),
     "static-stiffness": figure("optimize", "drilling_arm", "statics", *LIGHT),
+    "fastest-move": figure("optimize", "scara", "lobes_1", *LIGHT),
     "keep-out-bands": figure("optimize", "milling_column", "frequencies", *LIGHT),
     "catalogue": combinations,
     "link-lengths": figure("optimize", "arm_lengths", "mechanism", *LIGHT),

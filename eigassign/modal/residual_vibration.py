@@ -40,9 +40,9 @@ from scipy.interpolate import CubicSpline
 from eigassign.mechanism.assembly.dynamics.inertia_forces import InertiaForces, inertia_forces
 from eigassign.mechanism.forces import Forces
 from eigassign.mechanism.trajectory.trajectory import Trajectory
+from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.model import Model
-from eigassign.modal.reduced import ritz_pairs
 from eigassign.modal.response import Damping, unit_forces
 from eigassign.modal.taylor.rayleigh import project
 from eigassign.modal.under_load import displaced
@@ -223,7 +223,9 @@ class Move:
 
 def _slow_modes(K: Floats, M: Floats, sizes: Sizes) -> tuple[Floats, Floats, Floats, Floats]:
     """ω (n, p), Φ (n, r, p), ΦᵀM of the slow modes; exp(hA_ss) from each pose to the next."""
-    mu, z = ritz_pairs(K, M)
+    inverse = inverse_factor(K)
+    mu, v = np.linalg.eigh(inverse @ M @ np.swapaxes(inverse, 1, 2))
+    z, mu = (np.swapaxes(inverse, 1, 2) @ v)[:, :, ::-1], mu[:, ::-1]  # zᵀKz = 1
     omega = 1.0 / np.sqrt(mu)
     phi = z * omega[:, None]
     inverse = np.swapaxes(phi, 1, 2) @ M  # Φ⁻¹

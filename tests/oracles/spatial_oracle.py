@@ -627,8 +627,9 @@ class Builder:
             held = isinstance(drive, dict) and "stiffness" in drive
             if held:
                 self.K.append((np.array([c]), np.array([[drive["stiffness"]]])))
-            if isinstance(drive, dict) and "inertia" in drive:
-                self.M.append((np.array([c]), np.array([[drive["inertia"]]])))
+            if isinstance(drive, dict):
+                motor = drive.get("motor_inertia", 0.0) * drive.get("ratio", 1.0) ** 2
+                self.M.append((np.array([c]), np.array([[drive.get("inertia", motor)]])))
             free += drive != "passive" and not held
         return free
 
