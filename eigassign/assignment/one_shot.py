@@ -46,10 +46,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats
 from eigassign.assignment.program import (
     RANK,
     SNAP,
-    Floats,
     LinearConstraint,
     Program,
     Solved,

@@ -17,9 +17,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.arrays import Floats
 from eigassign.errors import UsageError
 
-Floats = NDArray[np.float64]
 T = TypeVar("T")
 MISSED = 1e-7  # of a constraint's terms: what programs leave of it
 TOUCH = 1e-9  # of a constraint's terms: a tenth of the violation that the one shot accepts

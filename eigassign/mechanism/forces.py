@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import drive_value, gravity, local_links, rigid_links
 from eigassign.mechanism.assembly.congruence import inertia, pulled, scattered
@@ -40,9 +41,6 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories, Trajectory, 
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays
 from eigassign.series.expression import Scalar
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.schema.study import Damping as Ratios
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import loss_pencil
@@ -51,8 +52,6 @@ from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.model import Model
 from eigassign.modal.under_load import displaced
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Numbers = NDArray[Any]  # complex
 CHOSEN = 3  # ranges of damping of which every choice of ends is looked at
 NEAR = 1e-9  # relative: of λ that are as good as one, and of what is left at rest

@@ -14,14 +14,13 @@ from collections.abc import Iterator, Sequence
 from itertools import count, repeat, zip_longest
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.units import handy_unit
 from eigassign.mechanism.trajectory.trajectory import TIME, TIP_COLUMNS
 from eigassign.output.store.cache import hdf5
 from eigassign.study.results import RunResults, StaticRow, TargetStudy, TrajectoryRow
 
-Floats = NDArray[np.float64]
 Column = tuple[str, Sequence[object]]  # heading, one entry a sample
 
 

@@ -8,9 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from eigassign.case.units import handy, is_bare
 from eigassign.facts import (
     OF_ROW,
@@ -37,7 +34,6 @@ from eigassign.study.results import (
     violated,
 )
 
-Floats = NDArray[np.float64]
 MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import design_limits, requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
@@ -37,9 +37,6 @@ from eigassign.study.planning import expansion_needed, plan_expansion, reduced_t
 from eigassign.study.results import LeverRow, WeightRow
 from eigassign.study.scene import Scene
 from eigassign.study.updating.measured import read_measurements
-
-Floats = NDArray[np.float64]
-
 
 Where = Annotated[tuple[tuple[str, float], ...], Fact(unwritten=True)]
 Words = Annotated[tuple[str, ...], Fact(unwritten=True)]

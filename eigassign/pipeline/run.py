@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.one_shot import Assignment
 from eigassign.assignment.requirements.sampling import with_instants
 from eigassign.brief import counted
@@ -61,7 +62,6 @@ from eigassign.study.scene import (
 if TYPE_CHECKING:
     from eigassign.output.figures.graph import FigurePlan
 
-Floats = NDArray[np.float64]
 SHOWN = 6  # modes of which a page shows the shapes
 
 

@@ -15,16 +15,15 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from eigassign.arrays import Floats
 from eigassign.brief import LONGEST
 from eigassign.case.case_file import parse, to_yaml
 from eigassign.case.reader import listed, short
 from eigassign.errors import CaseError, StorageError, UsageError
 from eigassign.files import CASE, printable, read_bytes
 
-Floats = NDArray[np.float64]
 Number = float | str
 Inertial = tuple[float, Floats, Floats]  # mass, its centre, inertia about it, in the link's axes
 _MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.sequential import StepRecord
 from eigassign.assignment.one_shot import ActiveLimit
 from eigassign.assignment.requirements.requirement import Requirement
@@ -48,7 +49,6 @@ from eigassign.facts import (
 from eigassign.modal.adaptive_order import MARGIN
 
 _DOWN = Context(prec=4, rounding=ROUND_DOWN)
-Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 SCHEMA = 3  # of results.json: raised when a field goes or means something else
 Row = TypeVar("Row")
@@ -753,13 +753,17 @@ class RobustRow(Brief):
     @property
     def checked(self) -> str:
         """What deviations lie in, and the probability that all limits hold, in words."""
-        words = f"{self.within} that were checked"
+        return f"{self.within} that were checked" + (f"; {self.chance}" if self.chance else "")
+
+    @property
+    def chance(self) -> str:
+        """The probability that all limits hold, in words; empty where nothing is uncertain."""
         if self.probability is None or self.deviation is None or self.wanted is None:
-            return words
+            return ""
         alone = self.probability_nominal
         other = "" if alone is None else f", the optimum without deviations {100.0 * alone:.3g} %"
         return (
-            f"{words}; all limits hold together with {100.0 * self.probability:.4g} % (± "
+            f"all limits hold together with {100.0 * self.probability:.4g} % (± "
             f"{100.0 * self.deviation:.1g} %; {100.0 * self.wanted:g} % asked{other})"
         )
 

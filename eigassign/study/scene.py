@@ -30,8 +30,8 @@ from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.requirements import Ellipsoid, Tolerances
 from eigassign.assignment.program import LinearConstraint, frozen
 from eigassign.assignment.requirements.quantity import DriveLimit, LimitedQuantity, StaticLimit
@@ -58,7 +58,6 @@ from eigassign.study.planning import (
 )
 from eigassign.study.results import Comparison, ModeStudy, ValidationRow
 
-Floats = NDArray[np.float64]
 OTHERS = 3  # modes shown above the highest assigned one
 
 

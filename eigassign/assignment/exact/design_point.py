@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.arrays import Bools, Ints
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
-from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.requirement import MEET, NeighbourPairs
 
 

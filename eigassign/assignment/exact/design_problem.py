@@ -18,7 +18,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from eigassign.assignment.program import Floats, LinearConstraint, Program, solve_program
+from eigassign.arrays import Floats
+from eigassign.assignment.program import LinearConstraint, Program, solve_program
 from eigassign.assignment.requirements.requirement import NeighbourPairs
 
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off

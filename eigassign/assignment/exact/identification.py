@@ -36,9 +36,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.sequential import End, Optimum, has_way, minimise
-from eigassign.assignment.program import Floats, frozen
+from eigassign.assignment.program import frozen
 from eigassign.errors import EigassignError
 
 Bools = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import ON, Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.assignment.program import Floats
 from eigassign.errors import EigassignError
 
 Response = Callable[[Floats], tuple[Floats, Floats]]  # y → r (m,), ∂r/∂y (m, n_y)
@@ -29,6 +29,7 @@ Response = Callable[[Floats], tuple[Floats, Floats]]  # y → r (m,), ∂r/∂y 
 Between = Callable[[Floats, Floats], tuple[Floats, Floats]]
 MOST = 10_000  # boxes that are looked at
 NEAR = 1e-2  # of the inner range: boxes that are no further beyond are not halved
+SPREAD = 24  # designs all over the bounds that are searched from where boxes tell nothing
 LOOKS = 8  # searches from boxes that are left
 
 
@@ -55,13 +56,15 @@ def explain(
     between: Between | None = None,
 ) -> Explained:
     """The ranges of what explains the measurements; raises what ``response`` does at all starts."""
-    search = _Search(response, lower, upper)
-    centre = search.centre(starts)
+    search, every = _Search(response, lower, upper), [*starts]
+    centre = search.centre(every)
     worst = float(np.abs(response(centre)[0]).max())
     if worst <= 1.0 + ON:
         search.found = [centre]
         while search.widened(centre, *search.inner):
             pass
+    for start in every[:SPREAD] if between is None else ():  # another set may explain it, too
+        search.widened(start)
     outer = None if between is None else _outer(search, between)
     inner = search.inner if search.found else None
     empty = outer is not None and not np.isfinite(outer).all()

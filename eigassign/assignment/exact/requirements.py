@@ -28,8 +28,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import Appraisal, Objective
-from eigassign.assignment.program import Floats
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Frequencies,

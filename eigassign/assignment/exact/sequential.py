@@ -29,6 +29,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_point import BindingLimit, DesignPoint, first_order
 from eigassign.assignment.exact.design_problem import (
     MET,
@@ -40,7 +41,7 @@ from eigassign.assignment.exact.design_problem import (
     merit,
 )
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
-from eigassign.assignment.program import SNAP, Floats, frozen
+from eigassign.assignment.program import SNAP, frozen
 from eigassign.errors import EigassignError
 from eigassign.facts import Fact, Unwritten, Violation
 

@@ -19,9 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_point import DesignPoint, Expected, Rows
 from eigassign.assignment.exact.design_problem import MET, TINY, DesignProblem, UnitBox, merit
-from eigassign.assignment.program import Floats, Program, solve_program
+from eigassign.assignment.program import Program, solve_program
 
 SMALLEST = 1e-10  # trust region, of the bounds
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.assignment.program import Floats
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,

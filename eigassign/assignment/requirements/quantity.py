@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.assignment.program import Floats, LinearConstraint
+from eigassign.arrays import Floats
+from eigassign.assignment.program import LinearConstraint
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,

@@ -32,7 +32,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.program import Floats, LinearConstraint, frozen
+from eigassign.arrays import Floats
+from eigassign.assignment.program import LinearConstraint, frozen
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import AnyTarget, FollowedMode, NamedMode
 from eigassign.errors import UsageError

@@ -13,7 +13,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eigassign.assignment.program import Floats, frozen
+from eigassign.arrays import Floats
+from eigassign.assignment.program import frozen
 from eigassign.assignment.requirements.kinds import KINDS, asked_of, terms_of
 from eigassign.assignment.requirements.quantity import (
     LimitedQuantity,

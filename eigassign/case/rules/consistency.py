@@ -41,6 +41,7 @@ from eigassign.case.schema.trajectory import (
     TrajectoryForm,
     named_trajectories,
 )
+from eigassign.case.schema.uncertain import Uncertain
 from eigassign.case.units import written
 from eigassign.files import CASE, MATRIX, MESH, TABLE, UPDATED, objection, printable
 
@@ -118,7 +119,8 @@ def unreadable(named: Sequence[NamedFile]) -> Iterator[Finding]:
     """Files that are not there, no files, or too large."""
     for each in named:
         if (reason := objection(each.file, each.limit)) is not None:
-            yield each.path, f"no such file: {printable(each.file)} ({reason})"
+            of = ": give the folder of an update" * (each.path[0] == "uncertain")
+            yield each.path, f"no such file: {printable(each.file)} ({reason}){of}"
 
 
 Span = tuple[float, float]  # first and last time, s
@@ -357,6 +359,21 @@ def robust_designs_have_tolerances(document: Document) -> Iterator[Finding]:
         yield ("assignment", "robust"), message
 
 
+def uncertain_values_are_possible(document: Document) -> Iterator[Finding]:
+    """What is known by a deviation has a logarithm where nature forbids what is below 0."""
+    own = document.uncertain or Uncertain.model_construct()
+    for name, one in own.entries.items():
+        column = document.design.parameters[name]
+        kind = properties.known_property(document, column.parameter) or properties.ANY
+        values, message = [column.min, *(other.values.get(name, 1.0) for other in own.others)], ""
+        if one.min is not None and one.max is not None and not one.min <= column.min <= one.max:
+            message = f"its value, {column.min:.6g}, is not between min and max"
+        elif one.min is None and 0 in (kind.at_least, kind.above) and 0.0 in values:
+            message = "is 0, of which no standard deviation can be: give min and max instead"
+        if message:
+            yield ("uncertain", name), message
+
+
 # --- All rules
 
 Rule = Callable[[Document], Iterator[Finding]]
@@ -386,6 +403,7 @@ RULES: tuple[Rule, ...] = (
     objectives_have_what_they_take,
     damping_is_stated_once,
     robust_designs_have_tolerances,
+    uncertain_values_are_possible,
 )
 LAST: tuple[Rule, ...] = (  # of cases in which every name and unit is right
     bounds_go_upwards,

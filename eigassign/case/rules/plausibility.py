@@ -283,6 +283,12 @@ def starts_outside(document: Document) -> Iterator[Finding]:
         yield ("design", name), f"{message}{bounds}{why}"
 
 
+def uncertain_counts_where_it_is_asked(document: Document) -> Iterator[Finding]:
+    """What is not known exactly is for robust designs."""
+    if document.uncertain and document.targets and not document.assignment.robust:
+        yield ("uncertain",), "does not count: write assignment: {robust: true} where it is to"
+
+
 WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     numbers_have_the_size_of_machines,
     bare_lengths_are_of_machines,
@@ -290,4 +296,5 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
     starts_outside,
+    uncertain_counts_where_it_is_asked,
 )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from scipy import sparse
 
-from eigassign.arrays import Ints
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.links import IMPORTED
 from eigassign.errors import MechanismError
@@ -37,7 +37,7 @@ from eigassign.mechanism.elements.links import (
     rigid_link,
 )
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
-from eigassign.mechanism.kinematics.joints import DOFS, Floats
+from eigassign.mechanism.kinematics.joints import DOFS
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,

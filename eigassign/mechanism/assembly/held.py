@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.node_motion import (
@@ -30,7 +31,6 @@ from eigassign.mechanism.assembly.node_motion import (
 )
 from eigassign.mechanism.assembly.pencil import AffineEntries, Entries
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.joints import Floats
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.topology import split

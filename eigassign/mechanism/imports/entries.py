@@ -30,11 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats
 from eigassign.files import MATRIX, how_to_raise, raised
 from eigassign.mechanism.imports.matlab_child import TOO_MUCH
 from eigassign.process import ONE_THREAD
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Cells = NDArray[np.bytes_]
 MOST = 2_000_000  # dofs

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import listed, shown
 from eigassign.case.rules.consistency import split_variable
@@ -34,7 +35,6 @@ from eigassign.mechanism.imports.entries import (
     LARGEST,
     LEAST,
     Contents,
-    Floats,
     Ints,
     Matrix,
     UnfitError,

@@ -34,16 +34,9 @@ from typing import Any
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.mechanism.imports import entries
-from eigassign.mechanism.imports.entries import (
-    LABEL,
-    Cells,
-    Contents,
-    Floats,
-    Ints,
-    Matrix,
-    UnfitError,
-)
+from eigassign.mechanism.imports.entries import LABEL, Cells, Contents, Ints, Matrix, UnfitError
 
 # --- OUTPUT4 of Nastran
 

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag, solve_banded
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import ADVANCING, FREEDOMS
 from eigassign.case.units import SI
@@ -39,8 +40,6 @@ from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.algebra import Tangents
 from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder
-
-Floats = NDArray[np.float64]
 
 WAYPOINTS = "trajectory.waypoints"  # key path in the case file
 _SMOOTH = 1e-9  # of the slope: a change of direction nobody sees

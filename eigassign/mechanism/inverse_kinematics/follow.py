@@ -24,13 +24,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.case.units import handy, shown_point
 from eigassign.errors import MechanismError, SingularityError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import (
     WAYPOINTS,
     Bools,
     Course,
-    Floats,
     Reduced,
     TipChain,
     reduced,

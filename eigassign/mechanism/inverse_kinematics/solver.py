@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Bools,
     Course,
-    Floats,
     Reduced,
     TipChain,
     TipEvaluation,

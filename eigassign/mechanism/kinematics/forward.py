@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import RIDING
 from eigassign.mechanism.kinematics.joints import (
-    Floats,
     JointMotion,
     Objects,
     cross,

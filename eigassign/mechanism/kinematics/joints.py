@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.series.expression import Scalar, cos, is_constant, sin
 
 Objects = NDArray[np.object_]
-Floats = NDArray[np.float64]
 ROUND_OFF = 1e-15  # of an entry of a rotation: a few units in the last place of 1
 DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}  # of a motion (v, ω): x, y, z each
 # entries (i, j) of [a]×: which component of a, and its sign

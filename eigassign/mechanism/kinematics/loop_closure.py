@@ -15,12 +15,13 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.mechanism import FREEDOMS
 from eigassign.case.units import SI, handy, shown_point
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, multiply
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, multiply
 from eigassign.mechanism.kinematics.parameters import (
     ModelParameters,
     initial_design,

@@ -19,8 +19,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.mechanism.inverse_kinematics.chain import Course, Curve, through
 from eigassign.mechanism.inverse_kinematics.follow import (
     Followed,
@@ -29,8 +29,6 @@ from eigassign.mechanism.inverse_kinematics.follow import (
     behind,
 )
 from eigassign.mechanism.inverse_kinematics.solver import TipProblem
-
-Floats = NDArray[np.float64]
 
 # --- timing laws s(τ) on 0 ≤ τ ≤ 1
 

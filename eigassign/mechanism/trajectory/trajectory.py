@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.brief import Brief
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
@@ -52,8 +53,6 @@ from eigassign.mechanism.trajectory.motion import (
     timing_law,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 TIME = "time"
 TIP_COLUMNS = ("tip x", "tip y", "tip z")
 _KEY = "trajectory.file"

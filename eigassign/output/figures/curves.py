@@ -11,15 +11,13 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.units import handy_unit
 from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
 from eigassign.study.results import ModeRow, RunResults, StaticRow, TargetStudy
-
-Floats = NDArray[np.float64]
 
 TARGET = Look(graph.BLACK, 1.6, "dotted")
 LEVEL = Look(graph.BLACK, 0.8)

@@ -16,6 +16,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.output.figures import graph, scene
 from eigassign.output.figures.graph import (
     BLACK,
@@ -30,8 +31,6 @@ from eigassign.output.figures.graph import (
 )
 from eigassign.output.figures.scene import LARGEST, SYMBOL_IN, Part, Shape, parts, scale_words
 from eigassign.study.results import DrawnPoses, ModePictures
-
-Floats = NDArray[np.float64]
 
 # --- A parallel projection
 

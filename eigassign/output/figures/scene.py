@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.study.results import DrawnJoint, DrawnPoses
 
-Floats = NDArray[np.float64]
 Kind = Literal["line", "stamp", "spring", "rail", "solid"]
 LEAST_SHARE = 1.0 / 45.0  # of the extent: so thick is the thickest section at least
 MOST_SHARE = 0.25  # and at most

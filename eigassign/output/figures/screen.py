@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.output.figures import graph, mechanism, scene
 from eigassign.output.figures.graph import Curve, Graph, Heat, Look, Panel, Rule, Shade, short
 from eigassign.output.figures.scene import Part, Shape
 from eigassign.study.results import Motion
 
-Floats = NDArray[np.float64]
 Json = dict[str, Any]
 _LEGEND = 70  # letters of a legend in one line
 _ROOM = 118  # pixels for the legend, the abscissa and its label, by their fonts in Plotly

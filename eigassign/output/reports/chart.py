@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.chart.results import BoxRow, Cell, Chart, ChartPoint, Kind, Matrix
 from eigassign.facts import fact, percent
 from eigassign.output.documents import dumps, results_document
@@ -26,7 +26,6 @@ from eigassign.output.tables import Table, facts_table
 COLOURS: dict[str, str] = dict(zip(Kind, (
     *graph.SERIES[:6], "#882255", "#999933", graph.BLACK, graph.GREY, "#8a5a2b"
 ), strict=True))  # fmt: skip
-Floats = NDArray[np.float64]
 WANTED = Look(graph.BLACK, 1.0, "fine")
 SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to write",
             "reach": "How far each method goes", "scenes": "Scenes × methods"}  # fmt: skip

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.units import handy
 from eigassign.facts import about, capital, number, percent, positive_percent, priced
 from eigassign.files import printable
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from eigassign.output.reports.compare import Compared
     from eigassign.study.updating.fit import UpdateResults
 
-Floats = NDArray[np.float64]
 TEMPLATES = Path(__file__).parents[1] / "templates"
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.output.documents import to_json
 from eigassign.output.figures import graph
@@ -16,7 +15,6 @@ from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
 from eigassign.study.updating.fit import OUTLIER, UpdateResults
 
-Floats = NDArray[np.float64]
 _BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
 _AFTER = Look(graph.BLACK, 0.0, marker="o")
 _STEM = Look(graph.BLACK, 1.2)
@@ -174,9 +172,10 @@ def _found(results: UpdateResults) -> Iterator[Table]:
         "likelihood, with the other parameters fitted again at each value."
     )
     if results.fit is None:
-        caption = (
-            "From, to: of designs found that explain all ranges; none does outside the others."
-        )
+        caption = "From, to: of designs found that explain all ranges"
+        caption += "; none does outside the others." if results.parameters[0].outer_low else "."
+        if results.verdict == "poor_fit":
+            caption = "No design explains all ranges: these are of the nearest."
         names = "name handy initial low high outer_low outer_high lower upper parameter"
         yield facts_table("Parameters", results.parameters, names, caption)
         return

@@ -8,8 +8,8 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import OPTIMAL, PAYS, End
 from eigassign.assignment.one_shot import ActiveLimit
@@ -50,7 +50,6 @@ from eigassign.study.results import (
 )
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
 DEVIATED = 1e-3  # of a limit, by which deviations within the tolerances may miss it
 CROSSED = 0.9  # of a gap, missed where both modes go through each other
@@ -236,11 +235,14 @@ def _deviated(
     if robust is None:
         return
     met = {one.label for one in targets if one.satisfied} | {r.words for r in limits if r.satisfied}
-    for one in robust.targets:
-        if one.label in met and one.most > (largest if one.is_goal else DEVIATED):
-            yield f"{one.label}: missed by {_percent(one.most)} within {robust.within}"
-    if robust.is_rarer:
-        yield f"within {robust.checked}"
+    far = [
+        f"{one.label}: missed by {_percent(one.most)} within {robust.within}"
+        for one in robust.targets
+        if one.label in met and one.most > (largest if one.is_goal else DEVIATED)
+    ]
+    yield from far
+    if robust.chance and (far or robust.is_rarer):
+        yield robust.chance
 
 
 def _missed_between(

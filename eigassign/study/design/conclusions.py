@@ -19,8 +19,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_point import first_order
 from eigassign.assignment.exact.design_problem import MET, ON, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
@@ -42,7 +42,6 @@ from eigassign.study.design.search.variants import PosedProblem, lacking
 from eigassign.study.results import AimRow, OptimalityRow, ViolationRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 SHARE = 0.25  # of the search's exact solves: a count, so that the same case has the same words
 MOST_SOLVED = 7000  # designs solved along the whole trajectory, where all studies are asked for
 TOGETHER = 16  # boxes halved together: exact solves of many poses are quicker than one by one

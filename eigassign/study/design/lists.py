@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.arrays import Ints
-from eigassign.assignment.program import Floats
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.study.planning import nearest_rows
 from eigassign.study.results import DesignRow

@@ -18,11 +18,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from time import monotonic
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats, Ints
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Ellipsoid
 from eigassign.assignment.exact.sequential import End, minimise
@@ -38,8 +39,6 @@ from eigassign.study.design.search.variants import variant_of
 from eigassign.study.results import RobustRow, RobustTarget
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 FEW = 5  # optima from which the next round is searched
 ROUNDS = 12  # of scenarios: known cases took at most 4
 STEPS = 20  # to the worst deviation: from the best corner mostly none
@@ -53,6 +52,7 @@ MANY = 10_000  # more of them, of small models, at so many samples
 AT = 6
 AGREE = 0.98  # of few designs: what is linear judges them as exact solves do
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of the way to the worst of what is linear
+LOST_BY = 10.0  # of a limit: what stands for a deviation without modes
 GAINED = 1e-7  # relative: less worse is no worse
 AT_ONCE = 100  # of these, solved together
 
@@ -194,12 +194,20 @@ class _Deviations:
     def lost(self) -> list[tuple[Floats, EigassignError]]:
         """The scenarios of corners at which the mechanism has no modes, and why."""
         found = []
-        for corner in self.corners:
+        count = 0 if self.ellipsoid is None else len(self.ellipsoid.centres)
+        ends = [design for e in range(count) for _, design in self.ends(e)]
+        for design in (*self.corners, *ends):
             try:
-                self.response(corner)
+                self.response(design)
             except EigassignError as why:
-                found.append((self.scene.tolerances.scenario(self.y, corner), why))
+                found.append((self.scene.tolerances.scenario(self.y, design), why))
         return found
+
+    def ends(self, e: int) -> list[tuple[Floats, Floats]]:
+        """The ends z (n,) of the axes of an ellipsoid, with the designs (n_y,) there."""
+        ball: Any = self.ellipsoid
+        axes = ball.radius * np.eye(len(ball.columns))
+        return [(z, ball.placed(self.y, z, e)[0]) for z in (*axes, *-axes)]
 
     def worst(self) -> tuple[WorstDeviation, ...]:
         """The worst found of each edge: from the worst corner, and from the design itself."""
@@ -216,15 +224,18 @@ class _Deviations:
             starts = (corner, self.y) if (self.upper > self.lower).any() else ()
             ends = [minimise(problem, start, STEPS).y for start in starts] or [self.y]
             if (ball := self.ellipsoid) is not None:
-                every = itertools.product(ends, range(len(ball.centres)))
-                ends = [self._outwards(rows, start, ball, e) for start, e in every]
+                inner, ends = ends, []
+                for start, e in itertools.product(inner, range(len(ball.centres))):
+                    far = max(self.ends(e), key=lambda end: self.worst_at(rows, end[1])[0])[0]
+                    ends += [self._outwards(rows, start, ball, e, z) for z in (0.0 * far, far)]
             design = max(ends, key=lambda one: self.worst_at(rows, one)[0])
             found.append(WorstDeviation(rows, *self.worst_at(rows, design)[:2], design))
         return tuple(found)
 
-    def _outwards(self, rows: EdgeRows, start: Floats, ball: Ellipsoid, e: int) -> Floats:
-        """The worst design found on an ellipsoid, and at corners of the box, from a start."""
-        z = np.zeros(len(ball.columns))
+    def _outwards(
+        self, rows: EdgeRows, start: Floats, ball: Ellipsoid, e: int, z: Floats
+    ) -> Floats:
+        """The worst design found on an ellipsoid, and at corners of the box, from a start at z."""
         best, dp = ball.placed(start, z, e)
         most = self.worst_at(rows, best)[0]
         for _ in range(STEPS):
@@ -284,13 +295,16 @@ class _Deviations:
         limits = [*enumerate(worst)][first:]
         designs, inside = self.draw(rng, DRAWS)
         missed = np.array([[self._most(rows, y) for rows in self.edges] for y in designs])
-        found = [*zip(self.edges, missed[inside].max(axis=0, initial=0.0), strict=True)]
+        most = np.minimum(missed[inside].max(axis=0, initial=0.0), LOST_BY)
+        found = [*zip(self.edges, most, strict=True)]
         holds = missed[:, first:].max(axis=1, initial=-np.inf) <= CUT
         about = [self._about(one, designs) for _, one in limits]
         agree = np.mean((np.max(about, axis=0) <= CUT) == holds) if about else 0.0
         designs, inside = self.draw(rng, self.many)
         solved = dict(self._solved(worst, designs)) if self.small and self.many else {}
-        found += [(self.edges[k], own[inside].max(initial=0.0)) for k, own in solved.items()]
+        found += [
+            (self.edges[k], min(own[inside].max(initial=0.0), LOST_BY)) for k, own in solved.items()
+        ]
         if agree > AGREE or (limits and solved.keys() >= dict(limits).keys()):
             each = [solved[k] if k in solved else self._about(one, designs) for k, one in limits]
             holds = np.max(each, axis=0) <= CUT

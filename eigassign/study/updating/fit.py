@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.exact.identification import (
     POOR,
@@ -38,7 +39,6 @@ from eigassign.study.design.search.response import corners, effects, spread_desi
 from eigassign.study.results import CaseRow, InOneUnit, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
-Floats = NDArray[np.float64]
 STARTS = 100  # at most
 OUTLIER = 3.0  # standard deviations
 
@@ -194,13 +194,16 @@ class UpdateResults(Origin):
     @property
     def _of_ranges(self) -> str:
         """The verdict of ranges: what each parameter may be, or which measurement stands out."""
-        if self.verdict != "fitted":
-            worst = max(self.measurements, key=lambda row: abs(row.residual))
-            return (
-                f"NOT EXPLAINED: no design {self.unexplained} lies in all {len(self.measurements)} "
-                f"ranges; the nearest misses that of {worst.label}, mode {worst.mode}, by "
-                f"{(abs(worst.residual) - 1.0) * worst.deviation_hz:.3g} Hz."
+        if self.verdict == "poor_fit":
+            most = max(abs(row.residual) for row in self.measurements)
+            missed = [row for row in self.measurements if abs(row.residual) > 0.95 * most]
+            told = " and ".join(
+                f"{row.label}, mode {row.mode}, by "
+                f"{(abs(row.residual) - 1.0) * row.deviation_hz:.3g} Hz"
+                for row in missed[:3]
             )
+            ranges = f"all {len(self.measurements)} ranges; the nearest misses {told}"
+            return f"NOT EXPLAINED: no design {self.unexplained} lies in {ranges}."
         found = []
         for row in self.parameters:  # k1 from 50.2 to 54.3 kN m/rad (none below 50.1 or above 54.4)
             unit, size = row.handy
@@ -208,7 +211,11 @@ class UpdateResults(Origin):
             ends = (f"{end / size:.4g}" for end in row.ends)
             none = "" if row.outer_low is None else " (none below {} or above {})".format(*ends)
             found.append(f"{row.name} from {low} to {high} {unit}".rstrip() + none)
-        return f"Explained: designs lie in all {len(self.measurements)} ranges. {', '.join(found)}."
+        every = f"designs lie in all {len(self.measurements)} ranges. {', '.join(found)}."
+        loose = [row.name for row in self.parameters if row.low_is_bound and row.high_is_bound]
+        if not loose:
+            return f"Explained: {every}"
+        return f"NOT IDENTIFIED: {', '.join(loose)} may be anything within the bounds; {every}"
 
     @property
     def design(self) -> dict[str, float]:
@@ -367,11 +374,12 @@ def collect_update(
         "timing_s": dict(timing_s),
     }
     if isinstance(found, Explained):
-        n = len(found.y)
+        n, ranges = len(found.y), tuple(_ranges(problem, found))
+        loose = any(row.low_is_bound and row.high_is_bound for row in ranges)
         return UpdateResults(
             **common,
-            verdict="poor_fit" if found.inner is None else "fitted",
-            parameters=tuple(_ranges(problem, found)),
+            verdict="poor_fit" if found.inner is None else "not_identified" if loose else "fitted",
+            parameters=ranges,
             covariance=np.full((n, n), np.nan),
             unidentified=(),
             minima=(),

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from eigassign.arrays import Floats
 from eigassign.assignment.program import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import shown, unknown
@@ -24,7 +25,6 @@ from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.trajectory.trajectory import TIME, Trajectories, coordinate_columns
 from eigassign.study.built_case import BuiltCase
 
-Floats = NDArray[np.float64]
 _KEY = "measurements.file"
 MODES_AROUND = 4  # of the model, more than twice as many as there are frequencies at a pose
 

@@ -7,15 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.case.schema.design import Design, Tolerance
 from eigassign.case.schema.parts import FrozenDict
 from eigassign.case.schema.uncertain import Explanation, Uncertain, UncertainProperty
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.updating.fit import ExplainingMinimum, UpdateResults
-
-Floats = NDArray[np.float64]
 
 
 def updated_case(case: BuiltCase, results: UpdateResults) -> BuiltCase:

@@ -146,7 +146,7 @@ def test_the_redesign_holds_where_the_intervals_as_a_box_leave_no_design() -> No
     assert "within the ranges of what is uncertain" in box.reason
 
 
-@pytest.mark.slow  # a minute
+@pytest.mark.slow  # five minutes
 def test_the_shipped_redesign_holds_as_often_as_it_says() -> None:
     case = load_case(SHIPPED)
     results = solve_case(case).results

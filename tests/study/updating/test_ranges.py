@@ -94,7 +94,7 @@ def ranges_are_those_of_a_grid(name: str, seed: int, n: int) -> None:
     assert (inner[1] >= most - step).all()
 
 
-@pytest.mark.parametrize(("name", "seed"), [("two_link", 7), ("two_link", 14)])
+@pytest.mark.parametrize(("name", "seed"), [("two_link", 7), ("slider_crank", 17)])
 def test_no_explaining_design_lies_outside_the_outer_ranges(name: str, seed: int) -> None:
     ranges_are_those_of_a_grid(name, seed, 100)
 
@@ -126,7 +126,8 @@ def test_ranges_that_contradict_are_said_so_with_the_measurement_that_is_missed(
     found = update_case(ranged(TEXT, ranges))
     assert found.results.verdict == "poor_fit"
     said = "NOT EXPLAINED: no design within the bounds (proved) lies in all 6 ranges; the nearest"
-    assert f"{said} misses that of measurements[2], mode 1, by " in found.results.headline
+    assert found.results.headline.startswith(f"{said} misses ")
+    assert "measurements[2], mode 1, by " in found.results.headline  # one of those missed most
     assert found.case.file.uncertain is None
 
 
@@ -141,7 +142,7 @@ def test_what_does_not_raise_or_lower_every_frequency_has_no_outer_range(other: 
     line = "k2: {parameter: coordinates.q2.drive.stiffness, min: 14 kN m/rad, max: 22 kN m/rad}"
     text = TEXT.replace(line, other).replace("stiffness: 15 kN", "stiffness: 17.8 kN")
     found = update_case(ranged(text[: text.index("expansion:")], arm_ranges()))
-    assert found.results.verdict == "fitted"
+    assert found.results.headline.startswith("NOT IDENTIFIED: l may be anything within the bounds")
     for row in found.results.parameters:
         assert (row.outer_low, row.outer_high) == (None, None)
         assert row.low < row.value < row.high

@@ -31,9 +31,9 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import local_links
@@ -48,8 +48,6 @@ from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, is_imported
 from eigassign.series.compiler import CompiledArrays
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker
 Values = Sequence[Floats]  # the numbers of all matrices at one instant, see `StackedLinks`
 # Of differences in `StackedLinks.time_scale`: they err by its square, 1e-8, and by round-off over

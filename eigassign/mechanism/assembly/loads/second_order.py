@@ -49,6 +49,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy import sparse
 
+from eigassign.arrays import Floats
 from eigassign.case.schema.mechanism import RIDING
 from eigassign.mechanism.assembly.congruence import add_stressed
 from eigassign.mechanism.assembly.loads.statics import Loaded, Loads, Statics, handed, statics
@@ -67,7 +68,6 @@ from eigassign.mechanism.elements.links import LinkMesh, Term
 from eigassign.mechanism.kinematics.forward import walked
 from eigassign.mechanism.kinematics.joints import (
     DOFS,
-    Floats,
     Objects,
     carried,
     cross,

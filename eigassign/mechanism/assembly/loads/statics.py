@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.congruence import LocalLink, inertia
@@ -35,15 +36,7 @@ from eigassign.mechanism.assembly.node_motion import (
 )
 from eigassign.mechanism.elements.links import Entries, LinkMesh, add_bodies, summed
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.joints import (
-    DOFS,
-    Floats,
-    Objects,
-    cross,
-    multiply,
-    scaled,
-    some,
-)
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, cross, multiply, scaled, some
 from eigassign.mechanism.kinematics.loop_closure import passive_motion, reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split

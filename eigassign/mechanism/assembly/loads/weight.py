@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from eigassign.arrays import Floats
 from eigassign.mechanism.assembly.congruence import (
     add_links,
     add_stressed,
@@ -33,7 +34,7 @@ from eigassign.mechanism.assembly.node_motion import MotionRow, add_springs
 from eigassign.mechanism.assembly.pencil import AffineEntries
 from eigassign.mechanism.elements.beam import element_mass, element_stiffness
 from eigassign.mechanism.elements.links import Entries, LinkMesh, Strand, Term, summed
-from eigassign.mechanism.kinematics.joints import DOFS, Floats, Objects, cross, multiply, scaled
+from eigassign.mechanism.kinematics.joints import DOFS, Objects, cross, multiply, scaled
 from eigassign.mechanism.kinematics.loop_closure import passive_motion
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.topology import NodeName

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import (
     MET,
     Appraisal,
@@ -64,7 +65,6 @@ from eigassign.study.design.search.response import (
 from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
-Floats = NDArray[np.float64]
 Counts = tuple[int | None, ...]  # of modes below each band, None of one that is left out
 
 
