@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from calibration import Floats
 from numpy.polynomial import Polynomial
 from scipy.integrate import simpson, solve_ivp
@@ -19,6 +20,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism import Moving, inertia_forces, known_motion, shapes, timing_law
 from eigassign.modal import FINER, Damping, Move, Sizes, dampings, move
 
+CASES = Path(__file__).parents[2] / "cases"
 AXES = ((1.0, 0.0), (0.0, 1.0))
 
 
@@ -29,35 +31,25 @@ def first(case: ea.Case) -> Any:
 # --- one degree of freedom
 
 HZ, REACH, TURN = 7.0, 0.8, 0.6
+STIFFNESS = 3.0 * REACH**2 * (2.0 * np.pi * HZ) ** 2
+ARM = """\
+title: A rigid arm with a mass at its end, on a drive of 7 Hz
+mechanism:
+  space: planar
+  links: {a: {type: rigid, nodes: {hub: [0, 0], end: [0.8, 0]}}}
+  joints: {hub: {type: revolute, base: ground, follower: a.hub}}
+  bodies: {m: {at: a.end, mass: 3}}
+coordinates: {q: {joint: hub}}
+trajectory: {points: [[0.2], [0.8]], duration: 0.3 s, samples: 21}
+targets: [{mode: 1, at_least: 1 Hz}]
+"""
 
 
-def arm(law: str = "quintic", duration: float = 0.3, drive: Any = None) -> ea.Case:
-    """A rigid arm with a mass at its end, on a drive of 7 Hz."""
-    inertia = 3.0 * REACH**2
-    return ea.load_case(
-        {
-            "title": "one",
-            "mechanism": {
-                "space": "planar",
-                "links": {"a": {"type": "rigid", "nodes": {"hub": [0, 0], "end": [REACH, 0]}}},
-                "joints": {"hub": {"type": "revolute", "base": "ground", "follower": "a.hub"}},
-                "bodies": {"m": {"at": "a.end", "mass": 3.0}},
-            },
-            "coordinates": {
-                "q": {
-                    "joint": "hub",
-                    "drive": drive or {"stiffness": inertia * (2.0 * np.pi * HZ) ** 2},
-                }
-            },
-            "trajectory": {
-                "points": [[0.2], [0.2 + TURN]],
-                "duration": duration,
-                "samples": 21,
-                "timing": law,
-            },
-            "targets": [{"mode": 1, "at_least": 1.0}],
-        }
-    )
+def arm(law: str = "quintic", drive: Any = None) -> ea.Case:
+    tree = yaml.safe_load(ARM)
+    tree["coordinates"]["q"]["drive"] = drive or {"stiffness": STIFFNESS}
+    tree["trajectory"]["timing"] = law
+    return ea.load_case(tree)
 
 
 def of_arm(case: ea.Case, zeta: float = 0.0) -> Move:
@@ -107,7 +99,7 @@ def test_no_vibration_is_left_between_the_lobes(law: str, periods: tuple[float, 
 
 def test_a_command_in_two_halves_half_a_period_apart_leaves_nothing() -> None:
     """A motion that is known at times only, with its jumps of q̈ twice; whole it leaves 9 mm."""
-    case, delay = arm("trapezoidal", 0.3), 0.5 / HZ
+    case, delay = arm("trapezoidal"), 0.5 / HZ
     own = first(case)
     tau = np.array([0.0, 0.1, 0.2, 0.3])
     time_s = np.repeat(np.union1d(tau, tau + delay), 2)
@@ -136,8 +128,7 @@ def test_a_motion_that_is_known_at_times_is_the_quintic_through_them() -> None:
 
 
 def test_a_drive_that_loses_vibrates_by_half_of_its_loss_factor() -> None:
-    stiffness = 3.0 * REACH**2 * (2.0 * np.pi * HZ) ** 2
-    case = arm(drive={"stiffness": stiffness, "loss_factor": 0.1})
+    case = arm(drive={"stiffness": STIFFNESS, "loss_factor": 0.1})
     (damping,) = dampings(case.model())
     found = move(case.model(), first(case), {"a.end": AXES}, damping).at([]).residuals(0.2)[0, 0]
     assert found == pytest.approx(duhamel("quintic", 0.2, 0.05), rel=1e-6)
@@ -145,11 +136,8 @@ def test_a_drive_that_loses_vibrates_by_half_of_its_loss_factor() -> None:
 
 def test_a_slow_move_leaves_the_tip_where_the_forces_hold_it() -> None:
     """x = −K⁻¹f in 10 s, but for what vibrates, 9e-5 of the largest; with one mode of each pose."""
-    case, y, slow = scara(), np.array([25e3, 12e3, 0.06]), 0.25 / 10.0
-    own, model = (
-        move(case.model(), first(case), {"forearm.end": AXES}, Damping((ZETA,))),
-        case.model(),
-    )
+    case, slow = scara(), 0.25 / 10.0
+    own, model, y = of_scara(case), case.model(), case.initial_design
     tau, error = own.at(y, Sizes(modes=1)).errors(10.0)
     for k in np.searchsorted(tau, (0.2, 0.37, 0.8)):
         q, rate, push = first(case).motion.moving(0.25 * tau[k : k + 1])
@@ -161,7 +149,7 @@ def test_a_slow_move_leaves_the_tip_where_the_forces_hold_it() -> None:
 
 def test_a_blow_is_a_short_push() -> None:
     """Of 1e-4 of the move, ωδ/2 = 2e-3 of a turn late."""
-    case, y = scara(), np.array([25e3, 12e3, 0.06])
+    case = scara()
     (start, end), T = first(case).q[[0, -1]], 0.25
     found = []
     for d in (0.0, 1e-4 * T):
@@ -174,8 +162,8 @@ def test_a_blow_is_a_short_push() -> None:
         keep = slice(None) if d else slice(None, None, 5)
         known = Moving(np.array(q[keep]), np.array(rate), np.array(push[keep]))
         ran = replace(first(case), known=known_motion(time_s, known))
-        own = move(case.model(), ran, {"forearm.end": AXES}, Damping((ZETA,)))
-        found.append(own.at(y).residuals(DURATIONS)[:, 0])
+        own = of_scara(case, ran).at(case.initial_design)
+        found.append(own.residuals(DURATIONS)[:, 0])
     np.testing.assert_allclose(*found, rtol=0.0, atol=5e-3 * found[0].max())
 
 
@@ -192,10 +180,8 @@ def test_the_error_of_the_tip_is_that_of_an_integration() -> None:
     ways = np.linalg.norm(error[0], axis=1)
 
     def rates(t: float, x: Floats) -> list[float]:
-        return [
-            x[1],
-            -2.0 * zeta * w * x[1] - w**2 * x[0] - moving(np.array([t])).acceleration[0, 0],
-        ]
+        push = moving(np.array([t])).acceleration[0, 0]
+        return [x[1], -2.0 * zeta * w * x[1] - w**2 * x[0] - push]
 
     ran = solve_ivp(rates, (0.0, T), [0.0, 0.0], t_eval=tau * T, rtol=1e-11, atol=1e-14)
     # by differences over 1e-9 where it starts
@@ -209,10 +195,9 @@ def test_the_error_of_the_tip_is_that_of_an_integration() -> None:
 class Matter:
     """Points with masses along beams and of bodies; in a plane angles turn bodies."""
 
-    def __init__(
-        self, case: ea.Case, y: Floats, per_length: dict[str, float], driven: Floats | float = 0.0
-    ) -> None:
-        self.model, self.y, self.per_length, self.driven = case.model(), y, per_length, driven
+    def __init__(self, case: ea.Case, y: Floats, driven: Floats | float = 0.0) -> None:
+        self.model, self.y, self.driven = case.model(), y, driven
+        self.per_length = per_length(case)
         self.bodies = list(case.file.mechanism.bodies.values())
         self.planar = case.file.mechanism.space == "planar"
         self.moving, self.T = first(case).motion.moving, float(first(case).time_s[-1])
@@ -260,77 +245,56 @@ class Matter:
         return float(np.sqrt(size[0] / size[1]))
 
 
-def beams(space: str, links: dict[str, Any], joints: dict[str, Any], **more: Any) -> ea.Case:
-    """Steel tubes of 60 and 56 mm, 2.84 kg/m, point to point in 0.4 s, all drives held."""
-    names = [name for name, joint in joints.items() if joint.pop("driven", True)]
-    section = {"shape": "tube", "outer_diameter": 0.06, "thickness": 0.002}
-    tubes = {"material": "steel", "section": "tube", "elements": 6}
-    steel = {"youngs_modulus": 2.1e11, "density": 7800.0, "shear_modulus": 8e10}
-    points = {"points": more.pop("points"), "duration": 0.4, "samples": 21}
-    return ea.load_case(
-        {
-            "title": space,
-            "mechanism": {
-                "space": space,
-                "materials": {"steel": steel},
-                "sections": {"tube": section},
-                "links": {
-                    n: own if "type" in own else {**tubes, **own} for n, own in links.items()
-                },
-                "joints": joints,
-                **more,
-            },
-            "coordinates": {n: {"joint": n, "drive": {"stiffness": 8e4}} for n in names},
-            "trajectory": points,
-            "targets": [{"mode": 1, "at_least": 1.0}],
-        }
-    )
+def per_length(case: ea.Case) -> dict[str, float]:
+    """Of each beam, kg/m."""
+    own, found = case.file.mechanism, {}
+    for name, link in own.links.items():
+        if link.type == "beam":
+            at: Any = own.sections[link.section]
+            high, wide = (at.height, at.width) if at.shape != "tube" else 2 * [at.outer_diameter]
+            hollow = 2.0 * getattr(at, "thickness", 0.5 * high)
+            area = high * wide - (high - hollow) * (wide - hollow)
+            area *= np.pi / 4.0 if at.shape == "tube" else 1.0
+            found[name] = area * own.materials[link.material].density
+    return found
 
 
-TUBE = 7800.0 * np.pi / 4.0 * (0.06**2 - 0.056**2)
+def arm_6r() -> ea.Case:
+    """Of thin steel tubes, 1.37 kg/m, in fine meshes, with points for all that is rigid."""
+    tree = yaml.safe_load((CASES / "arm_6r.yaml").read_text())
+    own = tree["mechanism"]
+    own["sections"] = {"thin": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.002}}
+    for link in own["links"].values():
+        for key in ("mass", "inertia", "center"):
+            link.pop(key, None)
+        if "elements" in link:
+            link |= {"elements": 8, "section": "thin", "material": "steel", "shear": False}
+    ends = [[-0.6, 0.7, -1.2, 0.0, -0.8, 0.0], [0.6, 0.2, -0.5, 0.9, 0.4, 1.2]]
+    tree["trajectory"]["points"] = ends
+    points = {"hand.end": 5.0, "elbow_housing.start": 6.0, "wrist.end": 2.0}
+    own["bodies"] = {f"m{k}": {"at": at, "mass": m} for k, (at, m) in enumerate(points.items())}
+    return held(tree)
 
 
-def spatial_arm() -> ea.Case:
-    joints = {
-        "yaw": {"type": "revolute", "axis": [0, 0, 1], "base": "ground", "follower": "post.start"},
-        "lift": {"type": "revolute", "axis": [0, 1, 0], "base": "post.end", "follower": "a.start"},
-        "roll": {"type": "revolute", "axis": [0, 0, 1], "base": "a.end", "follower": "b.start"},
-    }
-    joints["wrist"] = {**joints["lift"], "base": "b.end", "follower": "hand.start"}
-    hand = {"type": "rigid", "nodes": {"start": [0, 0, 0], "tool": [0.2, 0.1, 0.05]}}
-    links = {"post": {"length": 0.5}, "a": {"length": 0.7}, "b": {"length": 0.5}, "hand": hand}
-    bodies = {"load": {"at": "hand.tool", "mass": 4.0}, "motor": {"at": "a.end", "mass": 2.0}}
-    points = [[0.0, 0.3, 0.2, 0.0], [1.4, -0.6, 1.5, 2.0]]
-    return beams("spatial", links, joints, bodies=bodies, points=points)
+def held(tree: dict[str, Any]) -> ea.Case:
+    """All drives by springs, and nothing designed."""
+    for own in tree["coordinates"].values():
+        own["drive"] = {"stiffness": 8e4}
+    return ea.load_case({k: tree[k] for k in tree if k not in ("design", "expansion")})
 
 
 def four_bar() -> ea.Case:
-    joints = {
-        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
-        "B": {"type": "revolute", "base": "crank.end", "follower": "rod.start", "driven": False},
-        "D": {
-            "type": "revolute",
-            "base": "ground",
-            "follower": "lever.start",
-            "position": [0.5, 0],
-            "driven": False,
-        },
-        "C": {"type": "revolute", "base": "rod.end", "follower": "lever.end", "driven": False},
-    }
-    links = {"crank": {"length": 0.12}, "rod": {"length": 0.45}, "lever": {"length": 0.4}}
-    bodies = {"load": {"at": "rod.end", "mass": 2.0, "inertia": 0.01}}
-    guess = {"A": 0.5, "B": 0.3, "D": 1.8, "C": 1.0}
-    assembly = {"at": {"A": 0.5}, "guess": {k: guess[k] for k in "BDC"}}
-    return beams("planar", links, joints, bodies=bodies, points=[[1.2], [2.8]], assembly=assembly)
+    tree = yaml.safe_load((CASES / "four_bar.yaml").read_text())
+    tree["mechanism"]["bodies"] = {"load": {"at": "coupler.end", "mass": 2.0, "inertia": 0.01}}
+    tree["trajectory"] = {"points": [[1.2], [2.8]], "duration": 0.4, "samples": 21}
+    return held(tree)
 
 
-@pytest.mark.parametrize("case", [spatial_arm, four_bar])
+@pytest.mark.parametrize("case", [arm_6r, four_bar])
 def test_forces_of_inertia_are_what_matter_in_motion_needs(case: Callable[[], ea.Case]) -> None:
-    """In space six elements of a beam err by 1/36 of a share of what they carry: 1.4e-4."""
-    own = case()
-    tubes = [n for n, link in own.file.mechanism.links.items() if link.type != "rigid"]
-    matter = Matter(own, np.zeros(0), dict.fromkeys(tubes, TUBE))
-    assert max(matter.off(tau) for tau in (0.2, 0.5, 0.7)) < 3e-4
+    """2.5e-5 in space, 5.6e-5 of four elements; turning sections do 1.5e-4 of tubes of 60 mm."""
+    matter = Matter(case(), np.zeros(0))
+    assert max(matter.off(tau) for tau in (0.2, 0.55, 0.7)) < 5e-5
 
 
 def test_what_slow_modes_do_is_theirs_in_however_many_steps() -> None:
@@ -338,7 +302,7 @@ def test_what_slow_modes_do_is_theirs_in_however_many_steps() -> None:
 
     64 steps err by 1e-3, and by 3e-3 where in each step slow ones lose what fast ones have of them.
     """
-    case = ea.load_case(Path(__file__).parents[2] / "cases" / "camera_arm.yaml")
+    case = ea.load_case(CASES / "camera_arm.yaml")
     y = np.array([0.5 * (p.min + p.max) for p in case.file.design.parameters.values()])
     own, durations = move(case.model(), first(case), {"forearm.end": AXES}), (1.0, 1.5, 2.0)
     few, many = (own.at(y, Sizes(steps=n)).residuals(durations) for n in (64, 1024))
@@ -356,14 +320,13 @@ def scara() -> ea.Case:
     return ea.load_case(Path(__file__).with_name("scara.yaml"))
 
 
-def box(width: float, height: float, t: float) -> float:
-    return 2700.0 * (width * height - (width - 2.0 * t) * (height - 2.0 * t))
+def of_scara(case: ea.Case, ran: Any = None) -> Move:
+    return move(case.model(), ran or first(case), {"forearm.end": AXES}, Damping((ZETA,)))
 
 
 def integrated(y: Floats, durations: Floats) -> Floats:
     """The largest way of the tip after the stop: M ẍ + Cẋ + Kx = −f by Newmark, all dofs."""
-    lines = {"upper_arm": box(0.08, y[2], 0.004), "forearm": box(0.06, 0.045, 0.003)}
-    matter = Matter(scara(), y, lines, REFLECTED)
+    matter = Matter(scara(), y, REFLECTED)
     model, tau, few = matter.model, np.linspace(0.0, 1.0, STEPS + 1), np.linspace(0.002, 0.998, 61)
     # beyond 0.002 the quintic runs out as it began: 2e-4 of f
     f = CubicSpline(few, [matter.force(each) * matter.T**2 for each in few])(tau)
@@ -397,8 +360,7 @@ OTHERS = [(35e3, 12e3), (25e3, 24e3), (35e3, 24e3), (45e3, 24e3)]
     ("k1", "k2"), SOME + [pytest.param(*each, marks=pytest.mark.slow) for each in OTHERS]
 )
 def test_a_scara_vibrates_as_the_whole_of_it_integrated(k1: float, k2: float) -> None:
-    case, y = scara(), np.array([k1, k2, 0.06])
-    own = move(case.model(), first(case), {"forearm.end": AXES}, Damping((ZETA,)))
+    own, y = of_scara(scara()), np.array([k1, k2, 0.06])
     found, exact = own.at(y).residuals(DURATIONS)[:, 0], integrated(y, DURATIONS)
     # 7e-4 of the largest at all six designs, the trapezoidal rule's own
     np.testing.assert_allclose(found, exact, rtol=0.0, atol=1.5e-3 * exact.max())
