@@ -75,11 +75,9 @@ def test_ei_shapers_hold_5_percent_in_the_band_of_the_literature(
 def test_an_oscillator_stands_still_after_a_shaped_move(zeta: float) -> None:
     own = em.shaper("zv", 5.0, zeta)
     command, end = em.shaped(own, quintic, 0.3)
-    left, bare = np.array(
-        [
-            [left_after(lambda t: command(t)[2], lambda _, f=f: f, zeta, end) for f in (5, 6)],
-            [left_after(lambda t: quintic(t)[2], lambda _, f=f: f, zeta, 0.3) for f in (5, 6)],
-        ]
+    left, bare = (
+        [left_after(lambda t, of=of: of(t)[2], lambda _, f=f: f, zeta, T) for f in (5, 6)]
+        for of, T in ((command, end), (quintic, 0.3))
     )
     assert left[0] < 1e-6 * bare[0]  # of the integration; a mistuned one leaves what V says
     assert left[1] / bare[1] == pytest.approx(float(em.residual_share(own, 6, zeta)), rel=1e-5)

@@ -34,10 +34,7 @@ class Rigid:
         for data in tree["mechanism"].get("bodies", {}).values():
             if data["at"].split(".")[0] == name:
                 b.add_body(data)
-        K, M = b.dense()
-        rows = np.zeros((len(b.rows), b.n))
-        for full, row in zip(rows, b.rows, strict=True):
-            full[list(row)] = list(row.values())
+        (K, M), rows = b.dense(), b.dense_rows()
         axes = [0, 1, 5] if planar else list(range(6))
         kept = np.array([6 * k + d for k in range(b.n // 6) for d in axes])
         T = null_space(rows[np.abs(rows[:, kept]).max(axis=1, initial=0.0) > 0.0][:, kept])

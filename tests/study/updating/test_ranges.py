@@ -9,7 +9,7 @@ import pytest
 from eigassign.case import from_mapping, parse, read_yaml
 from eigassign.errors import CaseError
 from eigassign.pipeline import update_case
-from eigassign.study import BuiltCase, read_measurements
+from eigassign.study import BuiltCase
 
 CASES = Path(__file__).parents[3] / "cases"
 NAMES = ("two_link", "palletiser", "four_bar", "slider_crank", "five_bar", "gantry", "arm_3r")
@@ -151,41 +151,6 @@ def test_what_does_not_raise_or_lower_every_frequency_has_no_outer_range(other: 
     assert any("no range is known that no value lies outside of" in n for n in found.results.notes)
 
 
-HEADER = "q1,q2,mode,lower,upper [Hz]"
-
-
-def test_ranges_stand_in_two_columns_of_a_file(tmp_path: Path) -> None:
-    case = from_file(tmp_path, f"{HEADER}\n0,1,1,10.1,10.4\n0,1,2,32,34\n")
-    rows, _ = read_measurements(case)
-    both = [(row.hz, row.deviation_hz, row.is_range) for row in rows]
-    np.testing.assert_allclose(both, [(10.25, 0.15, True), (33.0, 1.0, True)])
-
-
-def from_file(folder: Path, content: str, more: str = "") -> BuiltCase:
-    (folder / "m.csv").write_text(content)
-    text = TEXT.replace("{file: arm_update.csv}", f"{{file: m.csv{more}}}")
-    return BuiltCase(parse(text.encode(), folder / "case.yaml"))
-
-
-@pytest.mark.parametrize(
-    ("content", "more", "message"),
-    [
-        (f"{HEADER}\n0,1,1,10.4,10.1\n", "", "m.csv:2: lower 10.4 is not below upper 10.1"),
-        (f"{HEADER}\n0,1,1,-1,10\n", "", "m.csv:2: column lower: must be > 0 Hz, got -1"),
-        ("q1,q2,mode,lower\n0,1,1,10\n", "", "of ranges give lower and upper alone"),
-        (f"{HEADER},deviation\n0,1,1,9,10,1\n", "", "of ranges give lower and upper alone"),
-        (f"{HEADER},frequency\n0,1,1,9,10,9.5\n", "", "of ranges give lower and upper alone"),
-        (f"{HEADER}\n0,1,1,9,10\n", ", deviation: 1 %", "of ranges give lower and upper alone"),
-        ("q1,q2,mode,upper\n0,1,1,10\n", "", "m.csv:1: no column frequency"),
-    ],
-)
-def test_files_whose_ranges_are_none_are_refused(
-    tmp_path: Path, content: str, more: str, message: str
-) -> None:
-    with pytest.raises(CaseError, match=message):
-        read_measurements(from_file(tmp_path, content, more))
-
-
 @pytest.mark.parametrize(
     ("second", "message"),
     [
@@ -198,8 +163,7 @@ def test_files_whose_ranges_are_none_are_refused(
 )
 def test_ranges_in_the_case_that_are_none_are_refused(second: str, message: str) -> None:
     own = "[{q: [0, 1], mode: 1, frequency: [9.9 Hz, 10 Hz]}, {q: [0, 1], mode: 2, " + second + "}]"
+    text = TEXT.replace("{file: arm_update.csv}", own)
     with pytest.raises(CaseError, match=message) as error:
-        update_case(
-            BuiltCase(parse(TEXT.replace("{file: arm_update.csv}", own).encode(), "c.yaml"))
-        )
+        update_case(BuiltCase(parse(text.encode(), "c.yaml")))
     assert error.value.problems[0].path.startswith("measurements[1]")

@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 from two_elastic_links import TWO_LINKS
 
-from eigassign.case import Measurement, MeasurementFile
+from eigassign.case import Measurement, MeasurementFile, parse
 from eigassign.errors import CaseError
 from eigassign.pipeline import update_case
-from eigassign.study import (
-    BuiltCase,
-    UpdateResults,
-    load_case,
-    read_measurements,
-)
+from eigassign.study import BuiltCase, UpdateResults, load_case, read_measurements
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -146,20 +141,9 @@ def test_a_fit_that_explains_nothing_is_sought_from_other_starts_too() -> None:
         "mass": {"max": 1},
     }
     model, truth = load_case(case).model(), np.array([0.735, 2.66])
-    poses = [
-        [0.871, 0.995],
-        [0.598, 0.33],
-        [0.388, 0.911],
-        [0.15, 1.996],
-        [0.379, 2.353],
-        [0.59, 1.531],
-    ]
-    case["measurements"] = [
-        {"mode": mode, "frequency": float(hz), "deviation": float(0.004 * hz), "q": pose}
-        for pose in poses
-        for mode, hz in enumerate(model.frequencies([pose], truth, count=2)[0], 1)
-    ]
-    found = updated(load_case(case))
+    poses = np.array([[0.871, 0.598, 0.388, 0.15, 0.379, 0.59],
+                      [0.995, 0.33, 0.911, 1.996, 2.353, 1.531]]).T  # fmt: skip
+    found = updated(measuring(load_case(case), poses, model.frequencies(poses, truth, 2), "0.4 %"))
     assert found.verdict == "fitted"
     np.testing.assert_allclose([row.value for row in found.parameters], truth, rtol=1e-4)
     notes = " ".join(found.notes)
@@ -182,8 +166,6 @@ def test_a_wrong_measurement_is_an_outlier_and_the_fit_poor() -> None:
 
 
 def case_of(text: str, folder: Path = CASES) -> BuiltCase:
-    from eigassign.case import parse
-
     return BuiltCase(parse(text.encode(), folder / "two_link.yaml"))
 
 
@@ -231,6 +213,12 @@ def test_measurements_without_modes_are_paired_by_frequency_and_said(tmp_path: P
     assert measured[0].paired_hz is None
 
 
+def test_ranges_stand_in_two_columns_of_a_file(tmp_path: Path) -> None:
+    rows, _ = read_measurements(from_file(tmp_path, f"{RANGES}\n0,1,1,10.1,10.4\n0,1,2,32,34\n"))
+    both = [(row.hz, row.deviation_hz, row.is_range) for row in rows]
+    np.testing.assert_allclose(both, [(10.25, 0.15, True), (33.0, 1.0, True)])
+
+
 def test_of_several_trajectories_each_row_names_its_own(tmp_path: Path) -> None:
     case = load_case(CASES / "five_bar.yaml")
     names = [name for _, name, _ in case.file.trajectories]
@@ -245,6 +233,8 @@ def test_of_several_trajectories_each_row_names_its_own(tmp_path: Path) -> None:
 
 
 HEADER = "time,mode,frequency,deviation"
+RANGES = "q1,q2,mode,lower,upper [Hz]"
+ALONE = "of ranges give lower and upper alone"
 
 
 @pytest.mark.parametrize(
@@ -270,6 +260,12 @@ HEADER = "time,mode,frequency,deviation"
         (f"{HEADER}\n0,1e9,3,1\n", r"m.csv:2: column mode: 1e\+09 is not a mode"),
         (f"{HEADER}\n7,1,3,1\n", "m.csv:2: 7 s is outside: the trajectory lasts from 0 to 1 s"),
         (f"{HEADER}\n0,1,3\n", "m.csv:2: 3 values for 4 columns"),
+        (f"{RANGES}\n0,1,1,10.4,10.1\n", "m.csv:2: lower 10.4 is not below upper 10.1"),
+        (f"{RANGES}\n0,1,1,-1,10\n", "m.csv:2: column lower: must be > 0 Hz, got -1"),
+        ("q1,q2,mode,lower\n0,1,1,10\n", ALONE),
+        (f"{RANGES},deviation\n0,1,1,9,10,1\n", ALONE),
+        (f"{RANGES},frequency\n0,1,1,9,10,9.5\n", ALONE),
+        ("q1,q2,mode,upper\n0,1,1,10\n", "m.csv:1: no column frequency"),
     ],
 )
 def test_files_that_hold_no_measurements_are_refused(
@@ -278,6 +274,11 @@ def test_files_that_hold_no_measurements_are_refused(
     with pytest.raises(CaseError, match=message) as error:
         read_measurements(from_file(tmp_path, content))
     assert error.value.exit_code == 2
+
+
+def test_a_deviation_for_all_ranges_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CaseError, match=ALONE):
+        read_measurements(from_file(tmp_path, f"{RANGES}\n0,1,1,9,10\n", deviation="1 %"))
 
 
 def test_a_case_that_lacks_measurements_and_parameters_is_told_both() -> None:
