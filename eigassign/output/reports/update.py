@@ -98,7 +98,11 @@ def _parameters(results: UpdateResults) -> FigurePlan:
         )
     else:
         bounds = graph.segments(at, least, most, _STEM, "bounds", lying=True)
-        drawn = bounds, graph.segments(at, *outer, _OUTER, "none is outside", lying=True), *drawn
+        drawn = (
+            bounds,
+            graph.segments(at, outer[0], outer[1], _OUTER, "none is outside", lying=True),
+            *drawn,
+        )
         title, label = "What the parameters may be", "between the bounds [%]"
         caption = (
             "The values that explain all measured ranges, beside the bounds of each parameter: "
