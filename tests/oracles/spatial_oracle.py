@@ -501,6 +501,25 @@ class Builder:
         self.n += count
         return self.n - count
 
+    def fill(self) -> tuple[int, Array]:
+        """All parts; how many free coordinates there are, and in a plane the dofs out of it."""
+        planar = self.m["space"] == "planar"
+        for name in self.m["links"]:
+            self.add_link(name)
+        for data in self.m.get("bodies", {}).values():
+            self.add_body(data)
+        for data in self.m.get("springs", {}).values():
+            self.add_spring(data, planar)
+        out = [6 * k + d for k in range(self.n // 6 if planar else 0) for d in (2, 3, 4)]
+        n_free = sum(self.add_joint(name) for name in self.m["joints"])
+        return n_free, np.array(out, dtype=int)
+
+    def dense_rows(self) -> Array:
+        rows = np.zeros((len(self.rows), self.n))
+        for i, row in enumerate(self.rows):
+            rows[i, list(row)] = list(row.values())
+        return rows
+
     def dense(self) -> tuple[Array, Array]:
         out = []
         for parts in (self.K, self.M):
@@ -636,22 +655,6 @@ class Builder:
 def world(tree: Tree, q: Any, pose: Pose | None = None) -> World:
     """The assembled mechanism at q."""
     pose = solve_pose(tree, np.atleast_1d(np.asarray(q, float))) if pose is None else pose
-    b, planar = Builder(tree, pose), tree["mechanism"]["space"] == "planar"
-    for name in b.m["links"]:
-        b.add_link(name)
-    for data in b.m.get("bodies", {}).values():
-        b.add_body(data)
-    for data in b.m.get("springs", {}).values():
-        b.add_spring(data, planar)
-    nodes = b.n
-    n_free = sum(b.add_joint(name) for name in b.m["joints"])
-    K, M = b.dense()
-    rows = []
-    for row in b.rows:
-        full = np.zeros(b.n)
-        full[list(row)] = list(row.values())
-        rows.append(full)
-    out_of_plane = np.zeros(0, dtype=int)
-    if planar:
-        out_of_plane = np.array([6 * k + d for k in range(nodes // 6) for d in (2, 3, 4)])
-    return World(K, M, rows, n_free, pose, out_of_plane, b.where)
+    b = Builder(tree, pose)
+    n_free, out_of_plane = b.fill()
+    return World(*b.dense(), list(b.dense_rows()), n_free, pose, out_of_plane, b.where)

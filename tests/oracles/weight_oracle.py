@@ -500,21 +500,9 @@ def lowest(K: Array, M: Array, count: int) -> Array:
 def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed:
     """The mechanism at q under ``gravity`` in m/s²."""
     pose = solve_pose(tree, np.atleast_1d(np.asarray(q, float))) if pose is None else pose
-    b, planar = WeightBuilder(tree, pose), tree["mechanism"]["space"] == "planar"
-    g = point(np.asarray(gravity).tolist())
-    for name in b.m["links"]:
-        b.add_link(name)
-    for data in b.m.get("bodies", {}).values():
-        b.add_body(data)
-    for data in b.m.get("springs", {}).values():
-        b.add_spring(data, planar)
-    nodes = b.n
-    n_free = sum(b.add_joint(name) for name in b.m["joints"])
-    K, M = b.dense()
-    rows = np.zeros((len(b.rows), b.n))
-    for i, row in enumerate(b.rows):
-        rows[i, list(row)] = list(row.values())
-    out = [6 * k + d for k in range(nodes // 6) for d in (2, 3, 4)] if planar else []
+    b, g = WeightBuilder(tree, pose), point(np.asarray(gravity).tolist())
+    n_free, out = b.fill()
+    (K, M), rows = b.dense(), b.dense_rows()
     keep = np.setdiff1d(np.arange(b.n), out)
     slope, curve = np.zeros(b.n), np.zeros((b.n, b.n))
 
@@ -543,7 +531,6 @@ def weigh(tree: Tree, q: Any, gravity: Any, pose: Pose | None = None) -> Weighed
         add(beam.dofs, beam.bowing(x, lambda _: g, pulled))
     held = np.setdiff1d(keep, b.driven)
     assert np.abs(slope[held]).max() < 1e-6 * max(np.abs(forces).max(initial=0.0), 1.0)
-    T = np.zeros((b.n, 0))
     small = null_space(rows[:, keep])
     T = np.zeros((b.n, small.shape[1]))
     T[keep] = small
@@ -567,10 +554,7 @@ def sag_slopes(found: Weighed, count: int) -> tuple[Array, Array]:
     its inertia forces, w the places of matter, 2 uᵀ (n·ε'' + μ·c'' − p·w'') φ, u the sag.
     """
     b = found.builder
-    K, M = b.dense()
-    rows = np.zeros((len(b.rows), b.n))
-    for i, row in enumerate(b.rows):
-        rows[i, list(row)] = list(row.values())
+    (K, M), rows = b.dense(), b.dense_rows()
     shift = np.trace(found.K) / np.trace(found.M) * 1e-6
     mu, z = linalg.eigh(found.M, found.K + shift * found.M)
     order = np.argsort(-mu)[found.n_free : found.n_free + count]
