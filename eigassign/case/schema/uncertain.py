@@ -97,7 +97,8 @@ class Uncertain(Part):
 
     def _mistakes(self, space: str | None) -> Mistakes:
         if not self.entries and self.file is not None:
-            yield wrong("has no key uncertain: give the folder of an update", "file")
+            message = "has no key uncertain: give the folder of an update that explained something"
+            yield wrong(message, "file")
         elif not self.entries:
             yield wrong("names no property: such as {k: {parameter: …, standard_deviation: 3 %}}")
         named = [*self.spread]
