@@ -14,7 +14,7 @@ from eigassign.output.figures.curves import LEVEL
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
 from eigassign.output.reports import page as report
 from eigassign.output.tables import Table, facts_table
-from eigassign.study.updating.fit import OUTLIER, UpdateResults
+from eigassign.study.updating.fit import OUTLIER, UpdatedParameter, UpdateResults
 
 Floats = NDArray[np.float64]
 _BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
@@ -29,19 +29,6 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
     """Measurements against the model, and the intervals of the parameters."""
     after = max((abs(row.residual) for row in results.measurements), default=0.0)
     unit = "standard deviation" if results.fit else "half the width of its range"
-    last = (
-        _ranges(results)
-        if results.fit is None
-        else FigurePlan(
-            "parameters",
-            "Parameters with their 95 % intervals",
-            "Of each parameter the interval of values that the measurements allow while the others "
-            "are fitted anew, in % of the value found; the file's value where it is so near.",
-            "One line for each parameter about its value, with its interval.",
-            _parameters(results),
-            "parameters",
-        )
-    )
     return (
         FigurePlan(
             "measurements",
@@ -52,44 +39,7 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             _measurements(results),
             "answer",
         ),
-        last,
-    )
-
-
-def _ranges(results: UpdateResults) -> FigurePlan:
-    """The range of each parameter beside its bounds, in % of the way between these."""
-    rows = [row for row in results.parameters if row.upper > row.lower]
-    at = -np.arange(float(len(rows)))
-    least, width = np.array([[row.lower, row.upper - row.lower] for row in rows]).T
-    inner, outer, initial = (
-        100.0 * (np.array(amounts).T - least) / width
-        for amounts in (
-            [(row.low, row.high) for row in rows],
-            [row.ends for row in rows],
-            [row.initial for row in rows],
-        )
-    )
-    bounds = np.zeros(len(rows)), np.full(len(rows), 100.0)
-    curves = (
-        graph.segments(at, bounds[0], bounds[1], _STEM, "bounds", lying=True),
-        graph.segments(at, outer[0], outer[1], _OUTER, "none is outside", lying=True),
-        graph.segments(at, inner[0], inner[1], _INTERVAL, "found", lying=True),
-        Curve(at, _BEFORE, "before", initial),
-    )
-    names = tuple(f"{row.name}: {row.lower / size:.4g} … {row.upper / size:.4g} {unit}".rstrip()
-                  for row in rows for unit, size in [row.handy])  # fmt: skip
-    room = np.array([0.5, 0.5 - len(rows)])
-    panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
-    title = "What the parameters may be"
-    whole = Graph(title, "between the bounds [%]", np.zeros(0), (panel,), x_limits=(-2.0, 102.0))
-    return FigurePlan(
-        "parameters",
-        title,
-        "The values that explain all measured ranges, beside the bounds of each parameter: those "
-        "that were found, and the range that no value which explains them lies outside of.",
-        "One line for each parameter from bound to bound, with its ranges.",
-        whole,
-        "parameters",
+        _parameters(results),
     )
 
 
@@ -128,31 +78,50 @@ def _measurements(results: UpdateResults) -> Graph:
     return Graph(title, "measurement", at, panels, x_limits=ends)
 
 
-def _parameters(results: UpdateResults) -> Graph:
-    """One line a parameter with its interval about the value found; the start where it is near."""
+def _parameters(results: UpdateResults) -> FigurePlan:
+    """A line a parameter: its interval about the value found; its ranges between the bounds."""
     rows = [row for row in results.parameters if row.upper > row.lower]
-    at = -np.arange(float(len(rows)))
-    low, high, initial = (
-        np.array([100.0 * (getattr(row, of) - row.value) / (abs(row.value) or row.upper - row.lower)
-                  for row in rows])
-        for of in ("low", "high", "initial")
-    )  # fmt: skip
-    ends = graph.bounds([1.2 * low, 1.2 * high, np.zeros(1)])
-    initial = np.where((initial >= ends[0]) & (initial <= ends[1]), initial, np.nan)
-    names = tuple(
-        f"{row.name}: {row.initial / size:.4g} → {row.value / size:.4g} {unit}".rstrip()
-        for row in rows  # k1: 40 → 52.47 kN m/rad
-        for unit, size in [row.handy]
-    )
-    curves = (
-        graph.segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
-        Curve(at, _BEFORE, "before", initial, names=names),
-        Curve(at, _AFTER, "after", np.zeros(at.size), names=names),
-    )
+    at, fitted = -np.arange(float(len(rows))), results.fit is not None
+    amounts = [(r.lower, r.upper, r.value, r.initial, r.low, r.high, *r.ends) for r in rows]
+    lower, upper, value, *_ = every = np.reshape(amounts, (-1, 8)).T
+    zero, size = (value, np.abs(value)) if fitted else (lower, upper - lower)
+    size = np.where(size > 0.0, size, upper - lower)
+    least, most, found, initial, low, high, *outer = 100.0 * (every - zero) / size
+    words = "95 % interval" if fitted else "found"
+    drawn: tuple[Curve, ...] = (graph.segments(at, low, high, _INTERVAL, words, lying=True),)
+    ends = -2.0, 102.0
+    if fitted:
+        ends = graph.bounds([1.2 * low, 1.2 * high, np.zeros(1)])
+        initial = np.where((initial >= ends[0]) & (initial <= ends[1]), initial, np.nan)
+        title, label = "Parameters with their 95 % intervals", "off the value found [%]"
+        caption = (
+            "Of each parameter the interval of values that the measurements allow while the others "
+            "are fitted anew, in % of the value found; the file's value where it is so near."
+        )
+    else:
+        bounds = graph.segments(at, least, most, _STEM, "bounds", lying=True)
+        drawn = bounds, graph.segments(at, *outer, _OUTER, "none is outside", lying=True), *drawn
+        title, label = "What the parameters may be", "between the bounds [%]"
+        caption = (
+            "The values that explain all measured ranges, beside the bounds of each parameter: "
+            "those that were found, and the range that none which explains them lies outside of."
+        )
+    names = tuple(_between(row, fitted) for row in rows)
+    drawn += (Curve(at, _BEFORE, "before", initial, names=names),)
+    drawn += (Curve(at, _AFTER, "after", found, names=names),) * fitted
     room = np.array([0.5, 0.5 - len(rows)])
-    panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
-    title, label = "Parameters with their 95 % intervals", "off the value found [%]"
-    return Graph(title, label, np.zeros(0), (panel,), x_limits=ends)
+    panel = Panel("", drawn, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
+    shows = Graph(title, label, np.zeros(0), (panel,), x_limits=ends)
+    alt = "One line for each parameter, with its interval or ranges."
+    return FigurePlan("parameters", title, caption, alt, shows, "parameters")
+
+
+def _between(row: UpdatedParameter, fitted: bool) -> str:
+    """``k1: 40 → 52.47 kN m/rad``, before and after; of ranges the bounds."""
+    unit, size = row.handy
+    pair = f"{row.initial / size:.4g} → {row.value / size:.4g}"
+    pair = pair if fitted else f"{row.lower / size:.4g} … {row.upper / size:.4g}"
+    return f"{row.name}: {pair} {unit}".rstrip()
 
 
 SECTIONS = {"parameters": "Parameters", "fit": "How well it fits"}

@@ -227,10 +227,9 @@ def least_along(
         low = min(low, least.room, float(bound[~open_].min(initial=np.inf)))
         if not open_.any():
             return Lowest(low, least.at)
-        halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
-        start, end, g_start, g_end = (
-            np.concatenate([half[k][open_] for half in halves]) for k in range(4)
-        )
+        firsts, seconds = (start, middle, g_start, g_middle), (middle, end, g_middle, g_end)
+        halves = np.stack([firsts, seconds], axis=2)[:, open_]
+        start, end, g_start, g_end = halves.reshape(4, -1)
     return Lowest(min(low if within is not None else 0.0, float(bound.min())), least.at)
 
 
@@ -251,14 +250,10 @@ def _between(at: Floats, values: Floats) -> Floats:
 
 
 def _beside(change: Floats, start: Floats, end: Floats) -> Floats:
-    """The largest of a piece and of the two that it meets, (n,)."""
-    order = np.argsort(start)
-    change, start, end = change[order], start[order], end[order]
-    meet = np.concatenate([[False], start[1:] == end[:-1], [False]])
-    before = np.where(meet[:-1], np.concatenate([[0.0], change[:-1]]), 0.0)
-    after = np.where(meet[1:], np.concatenate([change[1:], [0.0]]), 0.0)
-    found = np.empty_like(change)
-    found[order] = np.maximum(change, np.maximum(before, after))
+    """The largest (n,) of each piece and of the two that it meets, in the order of the pieces."""
+    meet, found = start[1:] == end[:-1], change.copy()
+    found[1:] = np.maximum(found[1:], np.where(meet, change[:-1], 0.0))
+    found[:-1] = np.maximum(found[:-1], np.where(meet, change[1:], 0.0))
     return found
 
 
@@ -302,7 +297,7 @@ def finer_path(
     path: Trajectories, model: Model, asked: Iterable[Requirement], designs: Sequence[Floats]
 ) -> Trajectories:
     """The trajectories with instants where designs (n_y,) have less room than at samples."""
-    times: list[list[float]] = [[] for _ in path.parts]
+    times: dict[str, list[float]] = {part.name: [] for part in path.parts}
     for one, y in itertools.product(asked, designs):
         low = lowest_room(model, one, path, y)
         room = low.room
@@ -314,10 +309,8 @@ def finer_path(
             k = int(low.at)
             name, last = path.name_of(k), min(k + 1, len(path.q) - 1)
             time_s = float(np.interp(low.at, [k, last], path.time_s[[k, last]]))
-            next(t for t, part in zip(times, path.parts, strict=True) if part.name == name).append(
-                time_s
-            )
-    return path.with_instants(times)
+            times[name].append(time_s)
+    return path.with_instants([*times.values()])
 
 
 def wanting(found: Sequence[ClearanceRow]) -> float:

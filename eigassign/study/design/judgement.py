@@ -129,16 +129,11 @@ def _summary(
     errors: Mapping[str, Floats | None], weights: Floats, own: slice = slice(None)
 ) -> ErrorSummary:
     """The errors (n,) of one target, at some ``own`` of its samples, by the names of the rows."""
-    rows: dict[str, Any] = {
-        name: None if one is None else _row(one[own], weights[own]) for name, one in errors.items()
-    }
+    rows: dict[str, Any] = dict.fromkeys(errors)
+    for name, e in ((name, every[own]) for name, every in errors.items() if every is not None):
+        rms = float(np.sqrt(weights[own] @ e**2 / weights[own].sum()))
+        rows[name] = ErrorRow(float(np.abs(e).max()), rms)
     return ErrorSummary(**rows)
-
-
-def _row(errors: Floats, weights: Floats) -> ErrorRow:
-    """Largest magnitude and root of the weighted mean square."""
-    rms = float(np.sqrt(weights @ errors**2 / weights.sum()))
-    return ErrorRow(float(np.abs(errors).max()), rms)
 
 
 # --- What a colleague would ask of the initial design
@@ -226,7 +221,8 @@ def _word(facts: Facts) -> tuple[str, str]:
     worst = next(iter(missed), None)  # limits decide before what is wanted
     far = [*([] if worst is None else [_far(worst)]), *broken]
     if facts.unreachable:
-        return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
+        nearest = f"the nearest design: {'; '.join(far)}"
+        return "unreachable", "; ".join([*facts.unreachable, nearest])
     if facts.conflict:
         return "infeasible", _beside(facts.conflict, far) + facts.held
     if not far:
@@ -242,11 +238,11 @@ def _word(facts: Facts) -> tuple[str, str]:
         gain = GAINED * abs(before)
     if violation > MET:
         limits = broken if broken and (worst is None or worst.asked.is_goal) else far
-        return "do_not_use", f"no design was found that meets all limits: {_all(limits)}"
+        return "do_not_use", f"no design was found that meets all limits: {'; '.join(limits)}"
     if before_violation > MET or after < before - gain:
         though = "" if worst is None else _though(worst)
-        return "improved", f"better than the initial design; {_all(far)}{though}"
-    return "do_not_use", f"no better than the initial design: {_all(far)}"
+        return "improved", f"better than the initial design; {'; '.join(far)}{though}"
+    return "do_not_use", f"no better than the initial design: {'; '.join(far)}"
 
 
 def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
@@ -262,14 +258,11 @@ def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
 
 def _beside(conflict: str, far: Sequence[str]) -> str:
     """The contradiction with what is missed, whose name is not said twice."""
-    name, _, how = _all(far).partition(": ")
+    missed = "; ".join(far)
+    name, _, how = missed.partition(": ")
     if len(far) == 1 and how and name in conflict and conflict.count("(line ") == 1:
         return f"{conflict}: {how}"
-    return f"{conflict} ({_all(far)})" if far else conflict
-
-
-def _all(far: Sequence[str]) -> str:
-    return "; ".join(far)
+    return f"{conflict} ({missed})" if far else conflict
 
 
 def _far(target: TargetStudy) -> str:
