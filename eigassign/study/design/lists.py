@@ -7,7 +7,7 @@ continuous.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import prod
 from typing import NamedTuple
 
@@ -45,6 +45,11 @@ class ListedValues(NamedTuple):
     def nearest(self, y: Floats) -> Ints:
         """The rows (...) nearest to designs (..., n_y), in shares of the columns' ranges."""
         return nearest_rows(self.rows, y[..., list(self.columns)])
+
+    def label(self, y: Floats) -> str:
+        """The name of the choice that a design (n_y,) holds; empty where it holds none."""
+        held = np.equal(self.rows, y[list(self.columns)]).all(axis=1)
+        return self.labels[held.argmax()] if held.any() else ""
 
     def price(self, y: Floats) -> Floats | float:
         """The prices (...) of the rows nearest to designs (..., n_y)."""
@@ -93,13 +98,8 @@ def price_of_one(file: CaseFile) -> float:
 
 def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
     """One row for each design parameter, in the order of the file."""
-    parameters, units, initial = (
-        scene.file.design.parameters,
-        scene.file.design_units,
-        scene.initial,
-    )
-    listed = catalogues(scene.file)
-    chosen = {k: choice for own in listed for k, choice in _chosen(own, optimal)}
+    listed, units, initial = catalogues(scene.file), scene.file.design_units, scene.initial
+    chosen = {k: label for own in listed if (label := own.label(optimal)) for k in own.columns}
     unit = price_of_one(scene.file)
     whole = {own.columns[0]: unit * float(own.price(optimal)) for own in listed if own.prices}
     return tuple(
@@ -115,7 +115,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
             p.price,
             whole.get(k),
         )
-        for k, (name, p) in enumerate(parameters.items())
+        for k, (name, p) in enumerate(scene.file.design.parameters.items())
     )
 
 
@@ -125,12 +125,3 @@ def cost(scene: Scene, y: Floats) -> float | None:
     if (limits := scene.file.design.mass) is not None and limits.price is not None:
         costs.append(limits.price * (scene.model.mass(y) - scene.model.mass(scene.initial)))
     return sum(costs) if costs else None
-
-
-def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:
-    """Yield each column of a catalogue with the name of the choice that y holds."""
-    own = y[list(catalogue.columns)]
-    row = next((k for k, row in enumerate(catalogue.rows) if np.array_equal(row, own)), None)
-    if row is not None:
-        for column in catalogue.columns:
-            yield column, catalogue.labels[row]

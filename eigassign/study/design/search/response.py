@@ -17,7 +17,8 @@ has, and what the weight does along that way is in K (see `apart_from_rigid`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -35,7 +36,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.dense import Modes
 from eigassign.modal.exact.solver import exact_slopes, in_hz, mode_slopes
 from eigassign.modal.model import Model
-from eigassign.study.design.followed import Named, follow_all, followers, with_followed
+from eigassign.study.design.followed import Named, follow_all, followers, unfollowed, with_followed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -159,8 +160,7 @@ class Glances:
         """A design at the first samples, ``unknown`` Hz elsewhere; None without an answer."""
         hz = np.full((len(self.order), self.count), unknown)
         hz[self.order[:few]] = self.known[y.tobytes()][:few] if few else np.zeros((0, self.count))
-        nothing = np.zeros((len(hz), 0))
-        return None if np.isnan(hz).any() else Solved(hz, nothing, nothing.astype(np.intp))
+        return None if np.isnan(hz).any() else unfollowed(hz)
 
 
 class Outlook(NamedTuple):
@@ -182,13 +182,12 @@ class Outlook(NamedTuple):
         own.look(np.concatenate(corners(self.file, lower, lower, upper)), few)
         for low, high, softest, stiffest in boxes:
             lowest, highest = own.solved(softest, few, 0.0), own.solved(stiffest, few, ENDLESS)
-            if lowest is None or highest is None:  # of several designs others may have an answer
-                yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
-                continue
-            try:
-                yield self.requirements.least(low, high, lowest, highest)
-            except EigassignError:  # no mechanism has such properties
-                yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
+            with suppress(EigassignError):  # no mechanism has such properties
+                if lowest is not None and highest is not None:
+                    yield self.requirements.least(low, high, lowest, highest)
+                    continue
+            # of several designs others may have an answer
+            yield np.inf if np.array_equal(low, high) else 0.0, np.zeros(0)
 
 
 def outlook_of(
@@ -214,13 +213,9 @@ MOST_SIDES = 6  # of a box with at most 64 corners, as many as a tolerance study
 
 def effects(file: CaseFile) -> Floats:
     """+1 for each parameter (n_y,) that raises every frequency, −1 that lowers it, 0 unknown."""
-    return np.array([_common(file, column.factors) for column in file.design.parameters.values()])
-
-
-def _common(file: CaseFile, factors: Mapping[str, float]) -> float:
-    """The effect of all properties of a parameter, where it is the same; else unknown."""
-    found = {np.sign(factor) * _effect(file, path) for path, factor in factors.items()}
-    return found.pop() if len(found) == 1 else 0.0
+    columns = (column.factors.items() for column in file.design.parameters.values())
+    each = [{np.sign(c) * _effect(file, path) for path, c in factors} for factors in columns]
+    return np.array([found.pop() if len(found) == 1 else 0.0 for found in each])
 
 
 def _effect(file: CaseFile, path: str) -> float:
@@ -303,15 +298,16 @@ class Designs:
         designs = [scene.initial, lower, upper, 0.5 * (lower + upper), *extremes]
         if len(lower):
             designs += list(spread_designs(scene.bounds, ALL_OVER, 1))
-        found: list[tuple[Floats, Solved]] = []
-        for y in designs:
+        y, solved = list[Floats](), list[Solved]()
+        for each in designs:
             try:
-                found.append((y, solved_below(scene, bands, own, y)))
+                solved.append(solved_below(scene, bands, own, each))
+                y.append(each)
             except EigassignError as error:
                 lost = error
-        if not found:
+        if not y:
             raise lost
-        return cls(scene, bands, *(np.array([y for y, _ in found]), [each for _, each in found]))
+        return cls(scene, bands, np.array(y), solved)
 
     @cached_property
     def choices(self) -> list[tuple[int, ...]]:
@@ -335,13 +331,14 @@ class Designs:
         self, modes: int, worth: Callable[[Floats, Floats], tuple[float, float]], most: int
     ) -> list[Floats]:
         """The designs that promise most, of a ``worth`` in y and frequencies (n_t, modes)."""
-        worths = []
-        for y, each in zip(self.y, self.solved, strict=True):
+
+        def worth_of(k: int) -> tuple[float, float]:
+            each = self.solved[k]
             lacking = ((0, 0), (0, max(modes - each.hz.shape[1], 0)))
             lowest = np.pad(each.hz, lacking, constant_values=np.inf)
-            worths.append(worth(y, np.hstack([lowest, each.followed])))
-        order = best_first(range(len(worths)), lambda k: worths[k])
-        return [self.y[k] for k in order[:most]]
+            return worth(self.y[k], np.hstack([lowest, each.followed]))
+
+        return [self.y[k] for k in best_first(range(len(self.y)), worth_of)[:most]]
 
 
 def solved_below(
