@@ -46,7 +46,7 @@ def _links(file: CaseFile) -> Iterator[str]:
 def _made_of(file: CaseFile, name: str, link: Any) -> str:
     kind = link_type(file, name)
     beams = [*link.beams.values()] if kind == "frame" else [link]
-    sections = {n for beam in beams for n in _names(getattr(beam, "section", None))}
+    sections = {n for beam in beams for n in section_names(beam)}
     materials = dict.fromkeys(m for beam in beams if (m := getattr(beam, "material", None)))
     said = sorted(sections)[:2]
     said += [f"{len(sections) - 2} more sections"] if len(sections) > 2 else []
@@ -54,7 +54,9 @@ def _made_of(file: CaseFile, name: str, link: Any) -> str:
     return ", ".join(filter(None, (*what, " and ".join(said), *materials)))
 
 
-def _names(section: Any) -> tuple[str, ...]:
+def section_names(beam: Any) -> tuple[str, ...]:
+    """The sections of a beam: none, one, or those at its start and end."""
+    section = getattr(beam, "section", None)
     if section is None:
         return ()
     return (section,) if isinstance(section, str) else (section.start, section.end)

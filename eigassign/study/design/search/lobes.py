@@ -42,16 +42,12 @@ class Basin(NamedTuple):
     y: Floats
 
 
-def duration_column(scene: Scene) -> int:
-    """Which entry of y is the motion time."""
-    return [own.parameter for own in scene.file.design.parameters.values()].index(DURATION_PATH)
-
-
 def fastest(
     scene: Scene, starts: Sequence[Floats], progress: Callable[[str], None], deadline: float
 ) -> Found:
     """The design with the least motion time that keeps all limits, from many basins."""
-    column, (lower, upper) = duration_column(scene), scene.bounds
+    designed = [own.parameter for own in scene.file.design.parameters.values()]
+    column, (lower, upper) = designed.index(DURATION_PATH), scene.bounds
     times = np.geomspace(lower[column], upper[column], TIMES)
     width = np.delete(upper - lower, column)
     count = DESIGNS * int((width > 0.0).sum())
