@@ -34,14 +34,13 @@ LOOKS = 8  # searches from boxes that are left
 
 @dataclass(frozen=True)
 class Explained:
-    """What explains the measurements: ``worst`` is the largest |r| at the design ``y`` (n_y,).
+    """What explains the measurements; ``y`` (n_y,) is the design of the least largest |r|.
 
     Ranges are (2, n_y): ``inner`` None where no design was found that explains them, ``outer``
     None where frequencies are not known to lie between two.
     """
 
     y: Floats
-    worst: float
     inner: Floats | None
     outer: Floats | None
     is_impossible: bool  # no design of the bounds explains them
@@ -57,15 +56,14 @@ def explain(
     """The ranges of what explains the measurements; raises what ``response`` does at all starts."""
     search = _Search(response, lower, upper)
     centre = search.centre(starts)
-    worst = float(np.abs(response(centre)[0]).max())
-    if worst <= 1.0 + ON:
+    if np.abs(response(centre)[0]).max() <= 1.0 + ON:
         search.found = [centre]
         while search.widened(centre, *search.inner):
             pass
     outer = None if between is None else _outer(search, between)
     inner = search.inner if search.found else None
     empty = outer is not None and not np.isfinite(outer).all()
-    return Explained(centre, worst, inner, None if empty else outer, empty)
+    return Explained(centre, inner, None if empty else outer, empty)
 
 
 class _Search:

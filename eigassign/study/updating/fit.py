@@ -331,11 +331,10 @@ def solve_update(problem: UpdateProblem) -> Identified | Explained:
 
         between = problem.between if (known | (limits[0] == limits[1])).all() else None
         return explain(standardised, *limits, [start, *others], between)
-
-    def enough(starts: int, found: int) -> bool:
-        return unseen(starts, found) <= PAYS
-
-    return identify(problem.response, problem.frequencies, *limits, start, others, enough)
+    return identify(
+        *(problem.response, problem.frequencies, *limits, start, others),
+        enough=lambda starts, found: unseen(starts, found) <= PAYS,
+    )
 
 
 def collect_update(
