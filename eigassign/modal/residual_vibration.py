@@ -328,15 +328,13 @@ class ReducedMove:
         """
         T = np.atleast_1d(np.asarray(durations, dtype=np.float64))
         free, near = self.free(T), np.asarray(last, dtype=np.float64)
-        found = [free._replace(tip=free.tip[own]).largest() for own in self.groups]
+        found = np.array([free._replace(tip=free.tip[own]).largest() for own in self.groups])
         if near.any():
             tau, error = self.errors(T, float(near.max()))
-            ways = [np.linalg.norm(error[..., own], axis=2) for own in self.groups]
             there = tau >= 1.0 - np.broadcast_to(near, T.shape)[:, None]
-            found = [
-                np.maximum(a, (b * there).max(axis=1)) for a, b in zip(found, ways, strict=True)
-            ]
-        return np.stack(found, axis=1)
+            ways = (np.linalg.norm(error[..., own], axis=2) for own in self.groups)
+            found = np.maximum(found, [(way * there).max(axis=1) for way in ways])
+        return found.T
 
     def errors(self, durations: ArrayLike, last: float = 1.0) -> tuple[Floats, Floats]:
         """τ (n_t,), and the error of the tips while they move, (n_T, n_t, m) in m by directions.

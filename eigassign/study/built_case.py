@@ -19,7 +19,7 @@ import numpy as np
 from eigassign.arrays import Floats
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile, from_mapping, load
-from eigassign.case.schema.trajectory import DURATION_PATH, TrajectoryForm
+from eigassign.case.schema.trajectory import DURATION_PATH
 from eigassign.case.units import handy
 from eigassign.errors import (
     AccuracyError,
@@ -147,7 +147,15 @@ def _loaded(file: CaseFile, model: Model, k: int) -> Trajectory:
     """Trajectory k of the case file, its loads behind the coordinates in q."""
     path, _, keys = file.trajectories[k]
     loads = np.array([load.along[k] for load in file.loads.values()])
-    found = _followed(file, model, keys, path, loads)
+    parameters, y = model.poses.parameters, initial_design(file)
+    with located(file, path):
+        found = build_trajectory(
+            keys,
+            parameters.coordinates,
+            lambda tip, turns: tip_chain(file, parameters, model.motion, tip, y, turns, loads),
+            file.coordinate_units,
+            lambda tip, turns: bool(design_dependence(model.poses, tip, turns).any()),
+        )
     designed = [column.parameter for column in file.design.parameters.values()]
     if DURATION_PATH in designed:
         stretch = designed.index(DURATION_PATH), file.value_at(DURATION_PATH)
@@ -156,23 +164,6 @@ def _loaded(file: CaseFile, model: Model, k: int) -> Trajectory:
         return found
     said = [f"{name} = {handy(load.along[k], load.unit, 6)}" for name, load in file.loads.items()]
     return replace(found.joined(loads), notes=(*said, *found.notes))
-
-
-def _followed(
-    file: CaseFile, model: Model, keys: TrajectoryForm, path: str, loads: Floats
-) -> Trajectory:
-    """One trajectory of the coordinates, which stands at ``path`` of the case file."""
-    parameters, y = model.poses.parameters, initial_design(file)
-    with located(file, path):
-        return build_trajectory(
-            keys,
-            parameters.coordinates,
-            lambda tip, oriented: tip_chain(
-                file, parameters, model.motion, tip, y, oriented, loads
-            ),
-            file.coordinate_units,
-            lambda tip, oriented: bool(design_dependence(model.poses, tip, oriented).any()),
-        )
 
 
 # Poses and designs at which reduced links are judged; each costs a solve of the whole ones, and of
@@ -306,15 +297,8 @@ def _left_to_auto(file: CaseFile) -> list[str]:
 
 def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
     """The highest edges of the bands that every mode shall keep out of, (k,) in Hz."""
-    if path is None:
-        return np.empty(0)
-    bands = (
-        one
-        for w in requirements_of(file, with_instants(file, path))
-        for one in w.bands
-        if not one.modes
-    )
-    return np.array([band.upper.max() for band in bands])
+    wanted = () if path is None else requirements_of(file, with_instants(file, path))
+    return np.array([band.upper.max() for w in wanted for band in w.bands if not band.modes])
 
 
 def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:
@@ -346,11 +330,6 @@ class BuiltCase:
     def settled(self) -> SettledModel:
         """The model with what was chosen for links that leave it to ``auto``; raises as `model`."""
         return settle_model(self.file)
-
-    @property
-    def mesh(self) -> Choice | None:
-        """The elements chosen for links that leave them to ``auto``; None where none does."""
-        return self.settled.mesh
 
     @cached_property
     def initial_design(self) -> Floats:

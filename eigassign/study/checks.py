@@ -50,7 +50,6 @@ MOVED = 0.005  # of a frequency, from which on it is warned of where max_error i
 INSTANTS, INSTANTS_LARGE = 9, 3
 SLOW_INSTANT = 2_000  # degrees of freedom, from which on an instant takes 0.1 s and more
 EQUAL = 1e-6  # relative distance below which modes count as this far apart
-NEGLECTED = "the neglected velocity terms and forces of the motion change"
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,8 @@ class MotionRow:
     def words(self) -> str:
         """The mode, how much and where."""
         return (
-            f"{NEGLECTED} mode {self.mode} by about {100 * abs(self.change):.2g} % at {self.where}"
+            "the neglected velocity terms and forces of the motion change mode "
+            f"{self.mode} by about {100 * abs(self.change):.2g} % at {self.where}"
         )
 
 

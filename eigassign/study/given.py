@@ -46,13 +46,20 @@ def _links(file: CaseFile) -> Iterator[str]:
 def _made_of(file: CaseFile, name: str, link: Any) -> str:
     kind = link_type(file, name)
     beams = [*link.beams.values()] if kind == "frame" else [link]
-    given = [s for beam in beams if (s := getattr(beam, "section", None)) is not None]
-    sections = {n for s in given for n in ((s,) if isinstance(s, str) else (s.start, s.end))}
+    sections = {n for beam in beams for n in section_names(beam)}
     materials = dict.fromkeys(m for beam in beams if (m := getattr(beam, "material", None)))
     said = sorted(sections)[:2]
     said += [f"{len(sections) - 2} more sections"] if len(sections) > 2 else []
     what = [kind] if kind != "beam" else []
     return ", ".join(filter(None, (*what, " and ".join(said), *materials)))
+
+
+def section_names(beam: Any) -> tuple[str, ...]:
+    """The sections of a beam: none, one, or those at its start and end."""
+    section = getattr(beam, "section", None)
+    if section is None:
+        return ()
+    return (section,) if isinstance(section, str) else (section.start, section.end)
 
 
 def _drives(file: CaseFile) -> Iterator[str]:

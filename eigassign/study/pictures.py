@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from eigassign.mechanism.solids.part import couplings
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model, ModeShapes
+from eigassign.study.given import section_names
 from eigassign.study.results import (
     DrawnBody,
     DrawnJoint,
@@ -113,14 +115,9 @@ def _phase(shapes: ModeShapes) -> Floats:
     The sign of Σ_l v̄_l · (1, 0.7, 0.4) / l over the lines l = 1, 2, … with mean motion v̄_l.
     """
     leaning = np.array([1.0, 0.7, 0.4])
-    total = np.sum(
-        [
-            (s.motions.mean(axis=1) @ leaning[: s.motions.shape[2]]) / k
-            for k, s in enumerate(shapes.strands, start=1)
-        ],
-        axis=0,
-    )
-    return np.where(total < 0.0, -1.0, 1.0)
+    means = (s.motions.mean(axis=1) for s in shapes.strands)
+    each = [v @ leaning[: v.shape[1]] / k for k, v in enumerate(means, start=1)]
+    return np.where(np.sum(each, axis=0) < 0.0, -1.0, 1.0)
 
 
 def displaced(
@@ -135,11 +132,8 @@ def displaced(
     d, n = _dimension(file), len(found)
 
     def at(node: NodeName) -> Floats:
-        own = (one.nodes[node] for one in found)
-        each = [
-            shape.place + f @ shape.motion[:, :3] for shape, f in zip(own, factors, strict=True)
-        ]
-        return frozen(np.array(each)[:, :d])
+        own = zip((one.nodes[node] for one in found), factors, strict=True)
+        return frozen(np.array([at.place + f @ at.motion[:, :3] for at, f in own])[:, :d])
 
     lines = []
     for one, f in zip(found, factors, strict=True):
@@ -259,7 +253,6 @@ def _dimension(file: CaseFile) -> int:
 # --- Joints, bodies and springs, and the size of sections
 
 At = Callable[[NodeName], Floats]  # places (n, d) of a node in n poses
-_ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def edges(tree: Topology) -> tuple[JointEdge, ...]:
@@ -269,21 +262,19 @@ def edges(tree: Topology) -> tuple[JointEdge, ...]:
 
 def joint_axes(file: CaseFile, poses: LinkFrames) -> list[NDArray[np.object_]]:
     """The direction to draw each joint along, in world axes: where it slides, else its link."""
-    return [_axis(file, poses, edge) for edge in edges(poses.motion.tree)]
-
-
-def _axis(file: CaseFile, poses: LinkFrames, edge: JointEdge) -> NDArray[np.object_]:
-    joint: Any = file.mechanism.joints[edge.joint]
-    if joint.type not in SLIDING:
-        R = poses.motion.placement(edge.follower[0]).world_rotation
-        ahead = -1.0 if edge.follower[1] == "end" else 1.0
-        return np.asarray(multiply(R, ahead * _ALONG))
-    axis = _ALONG if joint.type in RIDING else sliding_axis(joint)
-    mount = mounting(poses.parameters.angles(f"joints.{edge.joint}", joint))
-    turned = multiply(np.eye(3) if joint.type in RIDING else mount, axis)
-    if edge.base == GROUND:
-        return np.asarray(turned)
-    return np.asarray(multiply(poses.motion.placement(edge.base[0]).world_rotation, turned))
+    found = []
+    for edge in edges(poses.motion.tree):
+        joint: Any = file.mechanism.joints[edge.joint]
+        base, axis = edge.base, np.array([1.0, 0.0, 0.0])
+        if joint.type not in SLIDING:
+            base, axis = edge.follower, -axis if edge.follower[1] == "end" else axis
+        elif joint.type not in RIDING:
+            mount = mounting(poses.parameters.angles(f"joints.{edge.joint}", joint))
+            axis = multiply(mount, sliding_axis(joint))
+        if base != GROUND:
+            axis = multiply(poses.motion.placement(base[0]).world_rotation, axis)
+        found.append(np.asarray(axis))
+    return found
 
 
 def joints(
@@ -338,18 +329,11 @@ def depths(
     for link, pairs in zip(links, drawn, strict=True):
         data: Any = file.mechanism.links[link]
         beams = data.beams.values() if link_type(file, link) == "frame" else [data] * len(pairs)
-        found += [_line_depths(file, getattr(beam, "section", None)) for beam in beams]
+        for beam in beams:
+            ends = (file.mechanism.sections[name] for name in section_names(beam))
+            deep = [end.depth(_dimension(file) == 3) for end in ends] or [0.0]
+            found.append((deep[0], deep[-1]))
     return tuple(found)
-
-
-def _line_depths(file: CaseFile, section: Any) -> tuple[float, float]:
-    if section is None:
-        return 0.0, 0.0
-    ends = (section, section) if isinstance(section, str) else (section.start, section.end)
-    start, end = (
-        file.mechanism.sections[name].depth(file.mechanism.space == "spatial") for name in ends
-    )
-    return start, end
 
 
 FRAMES, FEW_FRAMES = 41, 9  # poses of all trajectories; of each of several or of a large model
@@ -397,13 +381,8 @@ def _modes(
 def _scales(found: Sequence[ModeShapes], modes: Ints) -> Floats:
     """The factor of each pose that makes the largest displacements alike, signs following on."""
     size = AMPLITUDE * max(extent_of(one) for one in found)
-    scales = np.array(
-        [size / largest_of(one)[mode] for one, mode in zip(found, modes, strict=True)]
-    )
-    before: Floats | None = None
-    for k, (one, mode) in enumerate(zip(found, modes, strict=True)):
-        now = np.concatenate([strand.motions[mode].ravel() for strand in one.strands])
-        if before is not None and now @ before < 0.0:
-            scales[k] *= -1.0
-        before = np.sign(scales[k]) * now
-    return scales
+    each = list(zip(found, modes, strict=True))
+    moved = [np.concatenate([s.motions[m].ravel() for s in one.strands]) for one, m in each]
+    turned = [before @ now < 0.0 for before, now in pairwise(moved)]
+    signs = np.cumprod([1.0, *np.where(turned, -1.0, 1.0)])
+    return np.asarray(signs * size / [largest_of(one)[m] for one, m in each])

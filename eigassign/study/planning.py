@@ -7,7 +7,8 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -91,22 +92,20 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     n, given = len(file.coordinates), file.expansion.q
     of_loads = ", loads in the middle of their ranges" if file.loads else ""
     if given != "auto":
-        q0 = with_middle_loads(file, given)
-        why = f"from the case file{of_loads}"
-        point = shown_point(model.q_names, q0, file.q_units)
-        return q0, f"expansion point: {point}, {why}"
-    if trajectory is None:
+        q0, why = with_middle_loads(file, given), "from the case file"
+    elif trajectory is None:
         if n == 0:
             return np.zeros(0), ""
         message = "auto takes a pose of the trajectory, and the case has none: give values"
         raise _wrong(file, "expansion.q", message)
-    poses = trajectory.q.copy()
-    poses[:, n:] = 0.0
-    k = central_sample(poses @ joint_map(model).T)
-    q0 = with_middle_loads(file, trajectory.q[k, :n])
+    else:
+        poses = trajectory.q.copy()
+        poses[:, n:] = 0.0
+        k = central_sample(poses @ joint_map(model).T)
+        q0 = with_middle_loads(file, trajectory.q[k, :n])
+        why = f"{trajectory.where(k)}, the middle of the motion"
     point = shown_point(model.q_names, q0, file.q_units)
-    why = f"the middle of the motion{of_loads}"
-    return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
+    return q0, f"expansion point: {point}, {why}{of_loads}"
 
 
 def with_middle_loads(file: CaseFile, coordinates: ArrayLike) -> Floats:
@@ -127,33 +126,25 @@ def central_sample(points: ArrayLike) -> int:
     if rows.shape[1] == 0:
         return len(rows) // 2
     others = rows[:: 1 + len(rows) // MANY_SAMPLES]
-    farthest = np.zeros(len(rows))
-    for other in others:
-        distance: Floats = np.square(rows - other).sum(axis=1)
-        np.maximum(farthest, distance, out=farthest)
-    return int(np.argmin(farthest))
+    distances: Iterator[Floats] = (np.square(rows - other).sum(axis=1) for other in others)
+    return int(reduce(np.maximum, distances).argmin())
 
 
 def _y0(file: CaseFile, model: Model, q0: Floats) -> tuple[Floats, str]:
     n_y, given = len(model.y_names), file.expansion.y
     if n_y == 0 and given in ("auto", ()):
         return np.zeros(0), ""
+    lower, upper = design_bounds(file)
+    y0, why = 0.5 * (lower + upper), "the middle of the bounds"
     if given != "auto":
-        y0 = np.array(given, dtype=np.float64)
-        return y0, f"{_design(file, model, y0)}, from the case file"
-    y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
-    if model.pencil.weight is not None:
+        y0, why = np.array(given, dtype=np.float64), "from the case file"
+    elif model.pencil.weight is not None:
         try:
             model.require_standing(q0, y0)
         except MechanismError as error:
-            why = f"the initial one, because the middle of the bounds {error.message}"
-            y0 = initial_design(file)
-            return y0, f"{_design(file, model, y0)}, {why}"
-    return y0, f"{_design(file, model, y0)}, the middle of the bounds"
-
-
-def _design(file: CaseFile, model: Model, y0: Floats) -> str:
-    return f"expansion design: {shown_point(model.y_names, y0, file.design_units)}"
+            y0, why = initial_design(file), f"the initial one, because {why} {error.message}"
+    point = shown_point(model.y_names, y0, file.design_units)
+    return y0, f"expansion design: {point}, {why}"
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:

@@ -39,5 +39,5 @@ def test_the_mesh_is_good_enough_at_every_corner_of_the_design() -> None:
         for y in itertools.product((0.004, 0.04), repeat=2)
     ]
     assert max(error) <= 0.5 * ACCURACY
-    assert max(error) <= case.mesh.error <= 0.5 * ACCURACY
+    assert max(error) <= case.settled.mesh.error <= 0.5 * ACCURACY
     assert np.argmax(error) in (1, 2)

@@ -86,8 +86,6 @@ class Identified:
 
     y: Floats  # (n_y,)
     fit: Optimum
-    initial_hz: Floats  # (m,) at the start
-    hz: Floats  # (m,) at y
     residual: Floats  # (m,) standardised
     initial_chi_squared: float
     chi_squared: float
@@ -181,8 +179,6 @@ def identify(
     return Identified(
         y=fit.y,
         fit=fit,
-        initial_hz=frozen(initial_hz),
-        hz=frozen(hz),
         residual=frozen(measured.standardised(hz)),
         initial_chi_squared=float(np.sum(measured.standardised(initial_hz) ** 2)),
         chi_squared=chi_squared,
@@ -208,17 +204,6 @@ def _are_same(
         return abs(a.objective - b.objective) <= SAME * max(a.objective, b.objective)
     most = MET, max(a.objective, b.objective) + NOTICED**2
     return has_way(problem, a.y, b.y, most, 1)
-
-
-def _held_at(problem: DesignProblem, j: int, at: float, start: Floats) -> Optimum | None:
-    """The fit from ``start`` with y_j ``at`` a value; None where there is no answer."""
-    lower, upper = problem.lower.copy(), problem.upper.copy()
-    lower[j] = upper[j] = at
-    held = problem._replace(lower=lower, upper=upper)
-    try:
-        return minimise(held, np.clip(start, lower, upper))
-    except EigassignError:
-        return None
 
 
 # --- Covariance, and what cannot be told
@@ -393,12 +378,15 @@ class _Profile:
         centre, best = self.fit.y, None
         along = near.y - centre
         line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
-        corners = (self.problem.lower, self.problem.upper)
+        lower, upper = corners = self.problem.lower.copy(), self.problem.upper.copy()
+        lower[j] = upper[j] = at
+        held = self.problem._replace(lower=lower, upper=upper)
         for start in (centre, line, *(corners if everywhere else ())):
             if self._over(best) > 0.0:
-                found = _held_at(self.problem, j, at, start)
-                if found is not None and (best is None or found.objective < best.objective):
-                    best = found
+                with suppress(EigassignError):
+                    found = minimise(held, np.clip(start, lower, upper))
+                    if best is None or found.objective < best.objective:
+                        best = found
         if best is not None and self._over(best) <= 0.0:
             self.allowed.append(best)
             # another minimum, not round-off: lower by more than a thousandth of χ²

@@ -35,14 +35,13 @@ LOOKS = 8  # searches from boxes that are left
 
 @dataclass(frozen=True)
 class Explained:
-    """What explains the measurements: ``worst`` is the largest |r| at the design ``y`` (n_y,).
+    """What explains the measurements; ``y`` (n_y,) is the design of the least largest |r|.
 
     Ranges are (2, n_y): ``inner`` None where no design was found that explains them, ``outer``
     None where frequencies are not known to lie between two.
     """
 
     y: Floats
-    worst: float
     inner: Floats | None
     outer: Floats | None
     is_impossible: bool  # no design of the bounds explains them
@@ -68,7 +67,7 @@ def explain(
     outer = None if between is None else _outer(search, between)
     inner = search.inner if search.found else None
     empty = outer is not None and not np.isfinite(outer).all()
-    return Explained(centre, worst, inner, None if empty else outer, empty)
+    return Explained(centre, inner, None if empty else outer, empty)
 
 
 class _Search:
@@ -137,38 +136,34 @@ class _Search:
 
 def _outer(search: _Search, between: Between) -> Floats:
     """The range (2, n_y) that all designs lie in which explain; infinite where there is none."""
-    low, high, looks, made = search.lower[None], search.upper[None], 0, 0
-    done: list[Floats] = []
-    while len(low) and made < MOST:
-        least, most = between(low, high)
-        possible = ((least <= 1.0) & (most >= -1.0)).all(axis=1)
-        low, high, made = low[possible], high[possible], made + len(low)
-        far = _beyond(search, low, high)
+    boxes, looks, made = np.array([[search.lower, search.upper]]), 0, 0  # (n, 2, n_y)
+    done = boxes[:0]
+    while len(boxes) and made < MOST:
+        least, most = between(boxes[:, 0], boxes[:, 1])
+        made += len(boxes)
+        boxes = boxes[((least <= 1.0) & (most >= -1.0)).all(axis=1)]
+        far = _beyond(search, boxes)
         if len(far) and far.max() > 0.0 and looks < LOOKS:
             looks += 1
-            k = int(far.argmax())
-            search.widened(0.5 * (low[k] + high[k]))
-            far = _beyond(search, low, high)
-        done += [*np.array([low, high]).transpose(1, 0, 2)[far <= 0.0]]
-        low, high = low[far > 0.0], high[far > 0.0]
-        side = ((high - low) / search.width).argmax(axis=1)
+            search.widened(boxes[far.argmax()].mean(axis=0))
+            far = _beyond(search, boxes)
+        done, boxes = np.concatenate([done, boxes[far <= 0.0]]), boxes[far > 0.0]
+        side = (np.ptp(boxes, axis=1) / search.width).argmax(axis=1)
         at = np.arange(len(search.lower)) == side[:, None]
+        low, high = boxes[:, 0], boxes[:, 1]
         middle = 0.5 * (low + high)
-        low, high = (
-            np.concatenate([low, np.where(at, middle, low)]),
-            np.concatenate([np.where(at, middle, high), high]),
-        )
-    left = [*done, *np.array([low, high]).transpose(1, 0, 2)]
-    if not left:
-        return np.array([np.full(len(search.lower), np.inf), np.full(len(search.lower), -np.inf)])
-    boxes = np.array(left)
-    return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        halves = [[low, np.where(at, middle, high)], [np.where(at, middle, low), high]]
+        boxes = np.concatenate([np.stack(half, axis=1) for half in halves])
+    left = np.concatenate([done, boxes])
+    least, most = left[:, 0].min(axis=0, initial=np.inf), left[:, 1].max(axis=0, initial=-np.inf)
+    return np.array([least, most])
 
 
-def _beyond(search: _Search, low: Floats, high: Floats) -> Floats:
-    """How far boxes (n, n_y) lie beyond inner ranges and `NEAR` (n,), in shares of the bounds."""
+def _beyond(search: _Search, boxes: Floats) -> Floats:
+    """How far boxes (n, 2, n_y) lie beyond inner ranges and `NEAR` (n,), in shares of bounds."""
     if not search.found:
-        return np.ones(len(low))
+        return np.ones(len(boxes))
     inner = search.inner
-    beyond = np.maximum(inner[0] - low, high - inner[1]) - NEAR * np.ptp(inner, axis=0)
+    beyond = np.maximum(inner[0] - boxes[:, 0], boxes[:, 1] - inner[1])
+    beyond -= NEAR * np.ptp(inner, axis=0)
     return np.asarray((beyond / search.width).max(axis=1, initial=-1.0) - ON)

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from eigassign.assignment.program import Floats
+from eigassign.arrays import Floats
 from eigassign.assignment.requirements.quantity import LimitedQuantity, limit_between
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import ResidualTarget

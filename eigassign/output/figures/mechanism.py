@@ -39,36 +39,22 @@ _ELEVATIONS = np.radians([22.0, 50.0])
 _AZIMUTHS = np.radians([-60.0, -30.0, -75.0, -120.0, -15.0, -150.0])
 
 
-@dataclass(frozen=True)
-class View:
-    """A parallel projection: rows are the sheet's directions across and up, in world axes."""
+def view_of(points: Floats) -> Floats:
+    """The sheet's directions across and up (2, d), in world axes, that show ``points`` (n, d) best.
 
-    directions: Floats  # (2, d)
-
-    def flat(self, points: Floats) -> Floats:
-        """(…, d) → (…, 2) in the same unit."""
-        return np.asarray(points @ self.directions.T)
-
-    @property
-    def spatial(self) -> bool:
-        """True of a view of space."""
-        return bool(self.directions.shape[1] == 3)
-
-
-def view_of(points: Floats) -> View:
-    """A plane as it is; space with z upright, by a viewer far away who faces the motion.
+    A plane as it is; space with z upright, by a viewer far away who faces the motion.
 
     The first view that shows 85 % of the best one's area; what is nearly a line on the sheet counts
     by its length. From high above only what is flat on the floor is seen better.
     """
     if points.shape[1] == 2:
-        return View(np.eye(2))
+        return np.eye(2)
     views, seen = [], []
     for elevation, azimuth in product(_ELEVATIONS, _AZIMUTHS):
         c, s = np.cos(azimuth), np.sin(azimuth)
         high, low = np.cos(elevation), np.sin(elevation)
-        views.append(View(np.array([[-s, c, 0.0], [-low * c, -low * s, high]])))
-        flat = views[-1].flat(points)
+        views.append(np.array([[-s, c, 0.0], [-low * c, -low * s, high]]))
+        flat = points @ views[-1].T
         long, wide = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
         seen.append(long * max(wide, 0.2 * long))
     return next(v for v, area in zip(views, seen, strict=True) if area >= 0.85 * max(seen))
@@ -85,12 +71,21 @@ _GROUND = "#e6e6e6"
 
 @dataclass(frozen=True)
 class Extent:
-    """The box in the view, m, that holds some points; never without width and height both."""
+    """The box in a parallel projection that holds some points; never without width and height."""
 
-    view: View
-    middle: Floats  # (2,)
-    size: Floats  # (2,) width and height
-    thick: float  # of the thickest link
+    directions: Floats  # (2, d) of the sheet, as `view_of` returns them
+    middle: Floats  # (2,) in m
+    size: Floats  # (2,) width and height, m
+    thick: float  # of the thickest link, m
+
+    def flat(self, points: Floats) -> Floats:
+        """(…, d) → (…, 2) in the same unit."""
+        return np.asarray(points @ self.directions.T)
+
+    @property
+    def spatial(self) -> bool:
+        """True of a view of space."""
+        return bool(self.directions.shape[1] == 3)
 
     @cached_property
     def height(self) -> float:
@@ -115,7 +110,7 @@ class Extent:
 
     def heading(self, direction: Floats) -> Floats:
         """Unit vector on the sheet of a direction; across where it points at the viewer."""
-        flat = self.view.flat(direction)
+        flat = self.flat(direction)
         length = float(np.linalg.norm(flat))
         return flat / length if length > 0.05 * np.linalg.norm(direction) else np.array([1.0, 0.0])
 
@@ -143,9 +138,9 @@ class Extent:
 
     def _bearings(self, low: Floats) -> Iterator[Curve]:
         """The axes' directions, and a bar of round length as scale, from the corner ``low``."""
-        origin = low + self.per_inch * np.array([0.2, 0.24] if self.view.spatial else [0.08, 0.12])
-        for axis, name in zip(np.eye(self.view.directions.shape[1]), "xyz", strict=False):
-            end = origin + 0.3 * self.per_inch * self.view.flat(axis)
+        origin = low + self.per_inch * np.array([0.2, 0.24] if self.spatial else [0.08, 0.12])
+        for axis, name in zip(np.eye(self.directions.shape[1]), "xyz", strict=False):
+            end = origin + 0.3 * self.per_inch * self.flat(axis)
             yield polyline(np.array([origin, end]), Look(GREY, 1.0), name)
         power = 10.0 ** np.floor(np.log10(self.per_inch))
         length = max(n * power for n in (1.0, 2.0, 5.0) if n * power <= self.per_inch * 1.000001)
@@ -163,7 +158,7 @@ def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
     """The extent of these poses and other points in the view that suits the poses."""
     shown = points_of(poses)
     view = view_of(shown)
-    flat = view.flat(np.concatenate([shown, *others]))
+    flat = np.concatenate([shown, *others]) @ view.T
     low, high = flat.min(axis=0), flat.max(axis=0)
     thick = max((thick for part in scene.links(poses) for thick in part.ends), default=0.0)
     size = high - low + thick
@@ -188,7 +183,7 @@ def drawn(
     """The parts in one pose, in ``colour`` but for the roles in ``look``."""
     for part in shown:
         own, at = look.get(part.role, colour), min(pose, len(part.places) - 1)
-        places = held.view.flat(part.places[at])
+        places = held.flat(part.places[at])
         if part.faces is not None:
             yield polyline(silhouette(places, part.faces), Look(own, 1.0))
         elif part.kind == "line":
@@ -270,7 +265,7 @@ def poses(title: str, shown: DrawnPoses) -> FigurePlan:
     tip = "" if shown.tip_path is None else ", and the path of the tip"
     held, every = extent(shown), parts(shown)
     colours = [_TIMES[round(6.0 * k / max(count - 1, 1))] for k in range(count)]
-    marks = [] if shown.tip_path is None else [polyline(held.view.flat(shown.tip_path), _TIP)]
+    marks = [] if shown.tip_path is None else [polyline(held.flat(shown.tip_path), _TIP)]
     marks += drawn(held, of_roles(every, "ground"), 0, GREY)
     moving = of_roles(every, "spring", "link", "rigid", "slide", "pivot")
     bodies = of_roles(every, "body")
@@ -292,7 +287,7 @@ def poses(title: str, shown: DrawnPoses) -> FigurePlan:
         "Mechanism",
         f"The links ({links}) in {several}{tip}. {scale_words(shown)}".strip(),
         f"Line drawing of the mechanism with links {links} in {several}.",
-        held.graph(heading, marks, key, bare=held.view.spatial),
+        held.graph(heading, marks, key, bare=held.spatial),
         "answer",
     )
 
@@ -320,7 +315,7 @@ def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
     ).strip()
 
     def figure(k: int, hz: float) -> FigurePlan:
-        other = [polyline(held.view.flat(line), Look(graph.SKY, 1.0)) for line in opposite[k]]
+        other = [polyline(held.flat(line), Look(graph.SKY, 1.0)) for line in opposite[k]]
         title = f"{short(pictures.title, 60)}: mode {k + 1}, {hz:.5g} Hz"
         marks = (*below, *other, *drawn(held, moving, k, BLUE))
         return FigurePlan(

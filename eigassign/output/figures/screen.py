@@ -245,17 +245,13 @@ def _note(rule: Rule, axis: str) -> Iterator[Json]:
 # --- The mechanism in motion
 
 
-def motions(shown: Sequence[Motion]) -> list[Json]:
-    """What the page draws of each trajectory: the parts of the scene, their places, and modes.
+def moving(shown: Motion) -> Json:
+    """What the page draws of one trajectory: the parts of the scene, their places, and modes.
 
     Of all parts together: ``rest`` are places in each pose, direction by direction, ``axes`` those
     that parts lie along, and ``motion`` what each mode adds at its largest. ``at`` says which of
     these places are a part's own, ``axis`` which of the axes.
     """
-    return [_motion(one) for one in shown]
-
-
-def _motion(shown: Motion) -> Json:
     parts = scene.parts(shown.rest)
     held = mechanism.extent(shown.rest, [mechanism.points_of(m.deformed) for m in shown.modes])
     n = len(shown.rest.lines)
@@ -266,7 +262,7 @@ def _motion(shown: Motion) -> Json:
     return {
         "trajectory": shown.trajectory,
         "time": _numbers(shown.rest.time_s),
-        "view": held.view.directions.tolist(),
+        "view": held.directions.tolist(),
         "middle": _numbers(held.middle),
         "size": _numbers(held.size),
         "thick": held.thick,

@@ -29,7 +29,7 @@ from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
-from eigassign.output.figures.screen import motions, screen_figure
+from eigassign.output.figures.screen import moving, screen_figure
 from eigassign.output.result_files import sample_files
 from eigassign.output.tables import SECTIONS, TONES, Table, headline, helps, run_tables, tone_of
 from eigassign.study.results import LimitRow, RunResults, TargetStudy, violated
@@ -257,7 +257,7 @@ def page(
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
     graphs = {p.name: screen_figure(p.shows) for p in plans if full and not p.shows.sheet}
-    moving = run.moving if run is not None and full else ()
+    moved = run.moving if run is not None and full else ()
     kept = full and len(content) <= 400_000
     figures = list(_shown(plans, graphs, files, 900_000))
     return page_of(
@@ -270,8 +270,8 @@ def page(
         date=today(),
         answer=[one for one in figures if one.plan.section == "answer"],
         sections=[*_sections(shown, figures, headings)],
-        moving=moving,
-        moving_json=inside(motions(moving)) if full else "",
+        moving=moved,
+        moving_json=inside([*map(moving, moved)]) if full else "",
         figures_json=inside(graphs) if full else "",
         document=content.decode().replace("<", "\\u003c") if kept else "",
         document_name=name,

@@ -84,7 +84,7 @@ def _parameters(results: UpdateResults) -> FigurePlan:
     lower, upper, value, *_ = every = np.reshape(amounts, (-1, 8)).T
     zero, size = (value, np.abs(value)) if fitted else (lower, upper - lower)
     size = np.where(size > 0.0, size, upper - lower)
-    least, most, found, initial, low, high, *outer = 100.0 * (every - zero) / size
+    least, most, found, initial, low, high, left, right = 100.0 * (every - zero) / size
     words = "95 % interval" if fitted else "found"
     drawn: tuple[Curve, ...] = (graph.segments(at, low, high, _INTERVAL, words, lying=True),)
     ends = -2.0, 102.0
@@ -97,12 +97,8 @@ def _parameters(results: UpdateResults) -> FigurePlan:
             "are fitted anew, in % of the value found; the file's value where it is so near."
         )
     else:
-        bounds = graph.segments(at, least, most, _STEM, "bounds", lying=True)
-        drawn = (
-            bounds,
-            graph.segments(at, outer[0], outer[1], _OUTER, "none is outside", lying=True),
-            *drawn,
-        )
+        outer = graph.segments(at, left, right, _OUTER, "none is outside", lying=True)
+        drawn = graph.segments(at, least, most, _STEM, "bounds", lying=True), outer, *drawn
         title, label = "What the parameters may be", "between the bounds [%]"
         caption = (
             "The values that explain all measured ranges, beside the bounds of each parameter: "

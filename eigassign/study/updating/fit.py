@@ -36,6 +36,7 @@ from eigassign.modal.model import Model
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.checks import WEIGHT_POSES, judged_poses, study_weight
 from eigassign.study.design.search.response import corners, effects, spread_designs
+from eigassign.study.planning import design_bounds
 from eigassign.study.results import CaseRow, InOneUnit, Origin
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
@@ -170,11 +171,6 @@ class UpdateResults(Origin):
     @property
     def headline(self) -> Annotated[str, Fact("the verdict in words", name="headline")]:
         """The verdict in a sentence: the parameters, and whether they explain anything."""
-        found = []
-        for row in self.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
-            unit, size = row.handy
-            value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
-            found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
         of, why = self.fit, [direction.words for direction in self.unidentified]
         if of is None:
             return self._of_ranges
@@ -189,6 +185,11 @@ class UpdateResults(Origin):
             "not_identified": f"NOT IDENTIFIED: {'; '.join(why)} ({fit})",
             "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
         }[self.verdict]
+        found = []
+        for row in self.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
+            unit, size = row.handy
+            value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
+            found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
         return f"{verdict}. {', '.join(found)}."
 
     @property
@@ -268,9 +269,9 @@ class UpdateProblem:
         return self.case.model()
 
     @property
-    def is_ranged(self) -> bool:
-        """True where each frequency is known to lie between two."""
-        return self.measured[0].is_range
+    def modes(self) -> list[int]:
+        """The modes that were measured, ascending."""
+        return sorted({each.mode for each in self.measured})
 
     def between(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """r (n, m) that no design of boxes (n, n_y) is below, and that none is above.
@@ -304,7 +305,7 @@ def update_problem(case: BuiltCase) -> UpdateProblem:
     require_updatable(case.file)
     measured, notes = read_measurements(case)
     q, rows = np.unique(np.array([each.q for each in measured]), axis=0, return_inverse=True)
-    parameters = case.file.design.parameters.values()
+    lower, upper = design_bounds(case.file)
     problem = UpdateProblem(
         case=case,
         measured=measured,
@@ -312,8 +313,8 @@ def update_problem(case: BuiltCase) -> UpdateProblem:
         q=q,
         rows=rows.ravel(),
         columns=np.array([each.mode - 1 for each in measured]),
-        lower=np.array([p.min for p in parameters]),
-        upper=np.array([p.max for p in parameters]),
+        lower=lower,
+        upper=upper,
     )
     with case.located():
         labels = {int(row): each.label for row, each in zip(problem.rows, measured, strict=True)}
@@ -328,7 +329,7 @@ def solve_update(problem: UpdateProblem) -> Identified | Explained:
     """
     start, limits = problem.case.initial_design, (problem.lower, problem.upper)
     others = spread_designs(limits, STARTS - 1, 0) if len(start) else ()
-    if problem.is_ranged:
+    if problem.measured[0].is_range:
         measured, known = problem.frequencies, effects(problem.case.file) != 0.0
 
         def standardised(y: Floats) -> tuple[Floats, Floats]:
@@ -337,11 +338,10 @@ def solve_update(problem: UpdateProblem) -> Identified | Explained:
 
         between = problem.between if (known | (limits[0] == limits[1])).all() else None
         return explain(standardised, *limits, [start, *others], between)
-
-    def enough(starts: int, found: int) -> bool:
-        return unseen(starts, found) <= PAYS
-
-    return identify(problem.response, problem.frequencies, *limits, start, others, enough)
+    return identify(
+        *(problem.response, problem.frequencies, *limits, start, others),
+        enough=lambda starts, found: unseen(starts, found) <= PAYS,
+    )
 
 
 def collect_update(
@@ -349,11 +349,8 @@ def collect_update(
 ) -> UpdateResults:
     """Everything that was found, as plain numbers and words."""
     case, model = problem.case, problem.model
-    q, modes = (
-        judged_poses(model, problem.q, WEIGHT_POSES),
-        {each.mode for each in problem.measured},
-    )
-    weight = study_weight(case.file, model, sorted(modes), q, found.y, "updated")
+    q, modes = judged_poses(model, problem.q, WEIGHT_POSES), problem.modes
+    weight = study_weight(case.file, model, modes, q, found.y, "updated")
     start = np.clip(case.initial_design, problem.lower, problem.upper)
     both = (problem.response(y)[0].tolist() for y in (start, found.y))
     measurements = tuple(
@@ -412,51 +409,48 @@ def collect_update(
 def _parameters(
     problem: UpdateProblem, found: Identified, directions: Sequence[UnidentifiedDirection]
 ) -> Iterator[UpdatedParameter]:
-    file, initial, deviation = problem.case.file, problem.case.initial_design, found.deviation
+    deviation = found.deviation
     held = {name for name, side in zip(problem.model.y_names, found.held, strict=True) if side}
     # their deviation while the bounds hold says nothing
     moving = {name for each in directions if held & set(each.change) for name in each.change}
-    for k, (name, column) in enumerate(file.design.parameters.items()):
-        interval = found.intervals[k]
+    rows = zip(_given(problem, found.y), found.intervals, strict=True)
+    for k, (given, interval) in enumerate(rows):
+        known = 0.0 < deviation[k] < np.inf and given["name"] not in moving
         yield UpdatedParameter(
-            name=name,
-            parameter=column.said,
-            unit=file.design_units[k],
-            initial=float(initial[k]),
-            value=float(found.y[k]),
-            deviation=float(deviation[k])
-            if 0.0 < deviation[k] < np.inf and name not in moving
-            else None,
+            **given,
+            deviation=float(deviation[k]) if known else None,
             low=interval.low,
             high=interval.high,
             low_is_bound=interval.at_lower,
             high_is_bound=interval.at_upper,
-            lower=column.min,
-            upper=column.max,
             held=found.held[k],
         )
 
 
+def _given(problem: UpdateProblem, y: Floats) -> Iterator[dict[str, Any]]:
+    """Yield what each parameter is, its bounds, and its values before and in ``y`` (n_y,)."""
+    file, initial = problem.case.file, problem.case.initial_design
+    for k, (name, column) in enumerate(file.design.parameters.items()):
+        yield {
+            **{"name": name, "parameter": column.said, "unit": file.design_units[k]},
+            **{"lower": column.min, "upper": column.max},
+            **{"initial": float(initial[k]), "value": float(y[k])},
+        }
+
+
 def _ranges(problem: UpdateProblem, found: Explained) -> Iterator[UpdatedParameter]:
     """What each parameter may be; where nothing explains the measurements, what is nearest."""
-    file, start = problem.case.file, problem.case.initial_design
     low, high = (found.y, found.y) if found.inner is None else found.inner
     outer = np.full((2, len(low)), None) if found.outer is None else found.outer.tolist()
-    for k, (name, column) in enumerate(file.design.parameters.items()):
-        near = ON * (column.max - column.min)
+    near = ON * (problem.upper - problem.lower)
+    for k, given in enumerate(_given(problem, found.y)):
         yield UpdatedParameter(
-            name=name,
-            parameter=column.said,
-            unit=file.design_units[k],
-            initial=float(start[k]),
-            value=float(found.y[k]),
+            **given,
             deviation=None,
             low=float(low[k]),
             high=float(high[k]),
-            low_is_bound=bool(low[k] <= column.min + near),
-            high_is_bound=bool(high[k] >= column.max - near),
-            lower=column.min,
-            upper=column.max,
+            low_is_bound=bool(low[k] <= problem.lower[k] + near[k]),
+            high_is_bound=bool(high[k] >= problem.upper[k] - near[k]),
             held="",
             outer_low=outer[0][k],
             outer_high=outer[1][k],
@@ -564,9 +558,9 @@ def _warnings(problem: UpdateProblem, y: Floats, hz: Floats) -> Iterator[str]:
             "measurements without a mode are paired by frequency with the model as it is written: "
             f"{told}; where a pair is wrong, write its mode"
         )
-    modes = sorted({each.mode for each in problem.measured})
+    modes = problem.modes
     error = problem.model.discretisation_error(problem.q, y, modes)
-    at = [modes.index(each.mode) for each in problem.measured]
+    at = np.searchsorted(modes, problem.columns + 1)
     share = error[problem.rows, at] * hz / problem.frequencies.deviation
     worst = int(np.argmax(share))
     if share[worst] > 0.5:  # half of what the measurement itself leaves open

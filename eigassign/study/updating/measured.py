@@ -22,7 +22,7 @@ from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, Measurem
 from eigassign.case.table import CsvColumn, CsvTable, read_table, renamed
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism.trajectory.trajectory import TIME, Trajectories, coordinate_columns
+from eigassign.mechanism.trajectory.trajectory import TIME, coordinate_columns
 from eigassign.study.built_case import BuiltCase
 
 _KEY = "measurements.file"
@@ -89,33 +89,26 @@ def _paired(case: BuiltCase, given: tuple[PosedMeasurement, ...]) -> tuple[Posed
     return tuple(found)
 
 
-def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
+def _posed(case: BuiltCase, label: str, given: Measurement, where: str = "") -> PosedMeasurement:
+    """A measurement at its pose; ``where`` begins what is said of one in a table."""
     with case.located():
-        if given.time is not None:
-            q = _at_time(case.trajectory, given.time, given.trajectory, f"{label}.time", "")
-        else:
+        if given.time is None:
             q = _with_loads(case.file, given.q or (), given.trajectory)
+        else:
+            path, key = case.trajectory, _KEY if where else f"{label}.time"
+            time_s = path.time_s[path.rows_of(given.trajectory)]
+            slack = 1e-9 * float(np.ptp(time_s))
+            if not time_s[0] - slack <= given.time <= time_s[-1] + slack:
+                lasts = f"the trajectory lasts from {time_s[0]:g} to {time_s[-1]:g} s"
+                raise MechanismError(key, f"{where}{given.time:g} s is outside: {lasts}")
+            q = path.pose(given.time, given.trajectory)
     ends, of = given.frequency, given.deviation
     if is_range := isinstance(ends, tuple):
-        hz, deviation = _middle(*ends)
+        hz, deviation = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
     else:
         hz, deviation = float(ends), of.deviation(ends) if of else 0.0
     own = given.trajectory, frozen(q), given.mode or 0, hz, deviation, is_range
     return PosedMeasurement(label, given.time, *own)
-
-
-def _middle(low: float, high: float) -> tuple[float, float]:
-    """The middle of a range, and half its width."""
-    return 0.5 * (low + high), 0.5 * (high - low)
-
-
-def _at_time(path: Trajectories, time: float, name: str | None, key: str, where: str) -> Floats:
-    time_s = path.time_s[path.rows_of(name)]
-    slack = 1e-9 * float(np.ptp(time_s))
-    if not time_s[0] - slack <= time <= time_s[-1] + slack:
-        lasts = f"the trajectory lasts from {time_s[0]:g} to {time_s[-1]:g} s"
-        raise MechanismError(key, f"{where}{time:g} s is outside: {lasts}")
-    return path.pose(time, name)
 
 
 def _with_loads(file: CaseFile, coordinates: ArrayLike, name: str | None) -> Floats:
@@ -172,43 +165,35 @@ def _rows(
 ) -> Iterator[PosedMeasurement]:
     known = [name for _, name, _ in case.file.trajectories]
     for k in range(len(table.lines)):
-        where = f"{table.where(k)}: "
-        mode = table.numbers.get("mode", {k: 0.0})[k]
-        low, high = (table.numbers.get(key, {k: 0.0})[k] for key in ("lower", "upper"))
-        is_range = "lower" in table.numbers
-        if is_range and not low < high:
+        where, deviation = f"{table.where(k)}: ", default
+        row = {name: column[k] for name, column in table.numbers.items()}
+        least = "lower" if "lower" in row else "frequency"
+        low, high, mode = row[least], row.get("upper", np.inf), row.get("mode", 1.0)
+        if not low < high:
             raise MechanismError(_KEY, f"{where}lower {low:g} is not below upper {high:g}")
-        hz, half = _middle(low, high) if is_range else (table.numbers["frequency"][k], 0.0)
-        if "mode" in table.numbers and not (mode.is_integer() and 1 <= mode <= 1000):
+        if not (mode.is_integer() and 1 <= mode <= 1000):
             raise MechanismError(_KEY, f"{where}column mode: {mode:g} is not a mode (1, 2, …)")
-        if not hz - half > 0.0:
-            message = f"{where}column {'lower' if is_range else 'frequency'}: must be > 0 Hz, got "
-            raise MechanismError(_KEY, f"{message}{hz - half:g}")
+        if not low > 0.0:
+            raise MechanismError(_KEY, f"{where}column {least}: must be > 0 Hz, got {low:g}")
         named = table.words["trajectory"][k] if "trajectory" in table.words else ""
         if named and named not in known:
             raise MechanismError(_KEY, where + unknown("trajectory", named, known))
-        if TIME in table.numbers:
-            time: float | None = table.numbers[TIME][k]
-            if not known:
-                raise MechanismError(_KEY, f"{where}there is no trajectory: give q")
-            if not named and len(known) > 1:
-                message = f"which trajectory? Give a column trajectory ({', '.join(known)})"
-                raise MechanismError(_KEY, where + message)
-            q = _at_time(case.trajectory, time or 0.0, named or None, _KEY, where)
-        else:
-            pose = [table.numbers[name][k] for name in names]
-            time, q = None, _with_loads(case.file, pose, named or None)
-        deviation = half if is_range else _deviation(table, k, hz, default)
-        own = named or None, frozen(q), int(mode), hz, deviation, is_range
-        yield PosedMeasurement(table.where(k), time, *own)
-
-
-def _deviation(table: CsvTable, k: int, hz: float, default: Tolerance | None) -> float:
-    """The standard deviation of a row, in Hz."""
-    if "deviation" not in table.numbers:
-        return default.deviation(hz) if default is not None else 0.0
-    value = table.numbers["deviation"][k]
-    if not value > 0.0:
-        message = f"{table.where(k)}: column deviation: must be > 0, got {shown(value)}"
-        raise MechanismError(_KEY, message)
-    return value if table.dimensions["deviation"].si else value * hz
+        if TIME in row and not known:
+            raise MechanismError(_KEY, f"{where}there is no trajectory: give q")
+        if TIME in row and not named and len(known) > 1:
+            message = f"which trajectory? Give a column trajectory ({', '.join(known)})"
+            raise MechanismError(_KEY, where + message)
+        if "deviation" in row:
+            if not row["deviation"] > 0.0:
+                said = f"must be > 0, got {shown(row['deviation'])}"
+                raise MechanismError(_KEY, f"{where}column deviation: {said}")
+            deviation = Tolerance(row["deviation"], not table.dimensions["deviation"].si)
+        given = Measurement.model_construct(
+            time=row.get(TIME),
+            q=None if TIME in row else tuple(row[name] for name in names),
+            trajectory=named or None,
+            mode=int(mode) if "mode" in row else None,
+            frequency=(low, high) if least == "lower" else low,
+            deviation=deviation,
+        )
+        yield _posed(case, table.where(k), given, where)

@@ -461,7 +461,7 @@ def test_elements_are_chosen_alike_beside_parts_whose_reduction_is_not_chosen_ye
         given["coordinates"]["turn"] = {"joint": "turn", "drive": {"stiffness": 1e4}}
         given["expansion"] = {"q": [0.0, 0.3], "accuracy": 1e-4}
         built = load_case(given, allow_outside=True)
-        found.append(built.mesh.values["arm"])
+        found.append(built.settled.mesh.values["arm"])
         assert built.model().discretisation_error([0.0, 0.3], [], (1,)) < 2e-2
     assert found[0] == found[1]
 

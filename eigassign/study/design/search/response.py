@@ -77,9 +77,7 @@ class DesignResponse:
         pencil, wanted = self.model.pencil, self.wanted
         if self.followers:
             found = follow_all(self.model, self.path, self.followers, y, self.count)
-            own = Modes(
-                *(each[..., : self.count + 1] for each in (found.modes.lam, found.modes.phi))
-            )
+            own = Modes(*(each[..., : self.count + 1] for each in found.modes))
             slopes, mixed = mode_slopes(pencil, found.x, own, wanted, mixed=True)
             slopes = np.concatenate([slopes, found.slopes(pencil, wanted)], axis=1)
             lam = np.hstack([own.lam, found.followed.lam])
