@@ -134,12 +134,9 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
     """
     if not file.trajectories:
         raise CaseError((file.problem("trajectory", "is needed here and missing"),))
-    found = Trajectories(
-        tuple(
-            NamedTrajectory(name, _loaded(file, model, k), keys.weight)
-            for k, (_, name, keys) in enumerate(file.trajectories)
-        )
-    )
+    every = enumerate(file.trajectories)
+    own = (NamedTrajectory(n, _loaded(file, model, k), keys.weight) for k, (_, n, keys) in every)
+    found = Trajectories(tuple(own))
     with located(file):
         model.require_standing(found.q, initial_design(file), found.sample)
     return found

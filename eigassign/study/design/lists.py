@@ -7,8 +7,8 @@ continuous.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -66,9 +66,8 @@ def with_rows(listed: Sequence[ListedValues], rows: Ints, y: Floats) -> Floats:
 
 def every_combination(allowed: Sequence[Ints]) -> Ints:
     """All combinations (n, n_lists); the last list varies first. There is one of no lists."""
-    each = np.meshgrid(*allowed, indexing="ij")
-    shape = prod(map(len, allowed)), len(allowed)
-    return np.stack(each, axis=-1).reshape(shape) if allowed else np.zeros(shape, dtype=np.intp)
+    each = list(itertools.product(*allowed))
+    return np.array(each, dtype=np.intp).reshape(len(each), len(allowed))
 
 
 def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
