@@ -183,8 +183,7 @@ def solve_assignment(
         for bound, limit in sides
     )
     G = np.vstack([np.eye(len(unit)), C[:, free] * unit / row_unit[:, None]])
-    nothing = np.zeros(len(unit))
-    program = Program(r, q.T @ error / np.sqrt(size), G, least, most, nothing)
+    program = Program(r, q.T @ error / np.sqrt(size), G, least, most, np.zeros(len(unit)))
     rows = [row.name for row in constraints]
     solved, rank = _optimum(program, rows)
     x, mu = solved.x, solved.mu

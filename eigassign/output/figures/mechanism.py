@@ -132,10 +132,8 @@ class Extent:
         label = "" if bare else "y [m]"
         panel = Panel(label, marks, self.height + foot, key=tuple(key), within=ends)
         limits = (float(low[0]), float(high[0]))
-        sheet = "bare" if bare else "axes"
-        return Graph(
-            title, note or "x [m]" * (not bare), np.zeros(0), (panel,), limits, sheet=sheet
-        )
+        note, sheet = note or "x [m]" * (not bare), "bare" if bare else "axes"
+        return Graph(title, note, np.zeros(0), (panel,), limits, sheet=sheet)
 
     def _bearings(self, low: Floats) -> Iterator[Curve]:
         """The axes' directions, and a bar of round length as scale, from the corner ``low``."""
