@@ -183,9 +183,9 @@ def solve_assignment(
         for bound, limit in sides
     )
     G = np.vstack([np.eye(len(unit)), C[:, free] * unit / row_unit[:, None]])
-    nothing = np.zeros(len(unit))
-    program = Program(r, q.T @ error / np.sqrt(size), G, least, most, nothing)
-    solved, rank = _optimum(program, tuple(row.name for row in constraints))
+    program = Program(r, q.T @ error / np.sqrt(size), G, least, most, np.zeros(len(unit)))
+    rows = [row.name for row in constraints]
+    solved, rank = _optimum(program, rows)
     x, mu = solved.x, solved.mu
     primal, dual, gap = judge(program, x, mu)
     if not max(primal, dual, gap) <= ACCEPT:
@@ -206,9 +206,7 @@ def solve_assignment(
     names = names or [f"y{j + 1}" for j in range(y0.size)]
     found = (
         *_active(names, "bound", y, (lower, upper), 0.0 * y, of_bounds),
-        *_active(
-            [row.name for row in constraints], "constraint", C @ y, (low, high), row_unit, of_rows
-        ),
+        *_active(rows, "constraint", C @ y, (low, high), row_unit, of_rows),
     )
     return Assignment(
         y=frozen(y),

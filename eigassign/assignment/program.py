@@ -236,13 +236,9 @@ def feasible_point(program: Program) -> Floats | None:
     nothing = np.zeros(G.shape[1])
     if not nothing.size:
         return nothing if np.all(h >= -TOUCH) else None
+    A, b = G[finite], h[finite]
     found = linprog(
-        nothing,
-        A_ub=G[finite],
-        b_ub=h[finite],
-        bounds=(None, None),
-        method="highs",
-        options={"primal_feasibility_tolerance": TOUCH},
+        nothing, A, b, bounds=(None, None), options={"primal_feasibility_tolerance": TOUCH}
     )
     return np.asarray(found.x) if found.status == 0 else None
 

@@ -161,12 +161,12 @@ class Design(NamedTuple):
 
 
 def excited_modes(
-    hz: ArrayLike, zeta: ArrayLike, weights: ArrayLike = 1.0, least: float = V
+    hz: ArrayLike, zeta: ArrayLike, weights: ArrayLike = 1.0
 ) -> tuple[ModeOnPath, ...]:
     """The modes of ``hz`` (n, m), in Hz at n samples of a path, that are excited enough to count.
 
     ``zeta`` and ``weights`` (how strongly each is excited) broadcast to (n, m). Left out is what is
-    below ``least`` of the most, as EI leaves as much of that. Between samples values are linear.
+    below `V` of the most, as EI leaves as much of that. Between samples values are linear.
     Raises UsageError unless f > 0, 0 <= ζ < 1, weights >= 0 and one above.
     """
     f, z, w = np.broadcast_arrays(np.atleast_2d(np.asarray(hz, float)), zeta, weights)
@@ -175,10 +175,10 @@ def excited_modes(
     n, w = len(f), w / w.max()
     fine = np.linspace(0.0, n - 1.0, -(-FINE // max(n - 1, 1)) * (n - 1) + 1)
 
-    def mode(i: int) -> ModeOnPath:
-        return ModeOnPath(i + 1, *(np.interp(fine, np.arange(n), x[:, i]) for x in (f, z, w)))
-
-    return tuple(mode(int(i)) for i in np.flatnonzero(w.max(axis=0) >= least))
+    return tuple(
+        ModeOnPath(i + 1, *(np.interp(fine, np.arange(n), x[:, i]) for x in (f, z, w)))
+        for i in np.flatnonzero(w.max(axis=0) >= V).tolist()
+    )
 
 
 def worst_share(shaper: Shaper, modes: Sequence[ModeOnPath], spread: float = 0.0) -> float:

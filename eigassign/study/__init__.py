@@ -8,12 +8,12 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object, against exact solves
     checks      what is measured of an answer: mesh, links, expansions, whether the motion is slow
     response    responses along the trajectory, and speeds that are free
-    moves       what a move leaves at a node, and input shapers
+    moves       what a move leaves, by time and by motion time; input shapers
     design      from the targets to the answer, and the verdict
     meaning     what the answer means, as far as the user asks for it
+    given       the inputs of a case in three lines
     pictures    what is drawn of a mechanism, as plain lines and numbers
     updating    parameters from measured frequencies
-    given       the inputs of a case in three lines
     collect     all of it put together as the results of a run
 """
 

@@ -132,12 +132,9 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
     """
     if not file.trajectories:
         raise CaseError((file.problem("trajectory", "is needed here and missing"),))
-    found = Trajectories(
-        tuple(
-            NamedTrajectory(name, _loaded(file, model, k), keys.weight)
-            for k, (_, name, keys) in enumerate(file.trajectories)
-        )
-    )
+    every = enumerate(file.trajectories)
+    own = (NamedTrajectory(n, _loaded(file, model, k), keys.weight) for k, (_, n, keys) in every)
+    found = Trajectories(tuple(own))
     with located(file):
         model.require_standing(found.q, initial_design(file), found.sample)
     return found
@@ -330,6 +327,11 @@ class BuiltCase:
     def settled(self) -> SettledModel:
         """The model with what was chosen for links that leave it to ``auto``; raises as `model`."""
         return settle_model(self.file)
+
+    @property
+    def mesh(self) -> Choice | None:
+        """The elements chosen for links that leave them to ``auto``; None where none does."""
+        return self.settled.mesh
 
     @cached_property
     def initial_design(self) -> Floats:

@@ -128,9 +128,9 @@ def motion_doubt(
     study: MotionStudy | None, asked: Collection[int], accepted: float
 ) -> Iterator[str]:
     """Say why no number can be vouched for: the motion changes a mode ``asked`` for by too much."""
-    own = [] if study is None else [row for row in study.rows if row.mode in asked]
-    worst = max(own, key=lambda row: abs(row.change), default=None)
-    if worst is not None and abs(worst.change) > accepted:
+    rows = () if study is None else study.rows
+    own = (row for row in rows if row.mode in asked and abs(row.change) > accepted)
+    for worst in sorted(own, key=lambda row: -abs(row.change))[:1]:
         yield f"{worst.words}, and {100 * accepted:.3g} % are accepted"
 
 
@@ -337,12 +337,11 @@ def mesh_lines(found: MeshError | None, model: Model) -> list[str]:
     if found is None:
         return []
     where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
+    where = f"{where} of the {found.design} design"
     return [
-        f"mode {mode}: the mesh raises its frequency by {about(error)}, {where} of the "
-        f"{found.design} design"
+        f"mode {mode}: the mesh raises its frequency by {about(error)}, {where}"
         if np.isfinite(error)
-        else f"mode {mode}: the mesh is too coarse for an error, {where} of the {found.design} "
-        f"design: {finer(model)}"
+        else f"mode {mode}: the mesh is too coarse for an error, {where}: {finer(model)}"
         for mode, error in zip(found.modes, found.error, strict=True)
     ]
 

@@ -78,9 +78,8 @@ def _motion(file: CaseFile, path: Trajectories | None) -> Iterator[str]:
     if path is None:
         yield "no trajectory"
     else:
-        several = len(path.parts) > 1
         seconds = sum(float(np.ptp(part.trajectory.time_s)) for part in path.parts)
-        along = f"{len(path.parts)} trajectories, " if several else ""
+        along = f"{len(path.parts)} trajectories, " if len(path.parts) > 1 else ""
         yield f"{along}{seconds:.3g} s in {len(path.time_s)} samples"
     for name, body in file.mechanism.bodies.items():
         if body.mass:

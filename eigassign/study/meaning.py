@@ -294,9 +294,10 @@ def relaxed_limits(
     """The gain of a little more room at each active limit, where there is one to be seen."""
     problem, kind = variant.problem, error_kind(variant.problem, variant.requirements)
     for row in active:
-        if row.multiplier <= 0.0 or _is_natural(file, problem, row):
+        asked = None if row.multiplier <= 0.0 else _relaxation(file, problem, row)
+        if asked is None:
             continue
-        amount, unit = _amount(file, problem, row)
+        amount, unit = asked
         while row.multiplier * amount > MOST * abs(F) > 0.0:
             amount = _rounded(0.5 * amount, unit)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
@@ -313,18 +314,15 @@ def relaxed_limits(
         )  # fmt: skip
 
 
-def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> bool:
-    """True if nature sets the bound: no mass, inertia or stiffness is below zero."""
-    if row.kind != "bound" or row.side != "lower":
-        return False
-    k = list(file.design.parameters).index(row.name)
-    return problem.lower[k] == 0.0 and file.design_units[k].startswith(("kg", "N"))
-
-
-def _amount(file: CaseFile, problem: DesignProblem, row: ActiveLimit) -> tuple[float, str]:
+def _relaxation(
+    file: CaseFile, problem: DesignProblem, row: ActiveLimit
+) -> tuple[float, str] | None:
+    """How far a limit is relaxed; None of a mass, inertia or stiffness that is not below zero."""
     if row.kind == "bound":
         k = list(file.design.parameters).index(row.name)
         unit = file.design_units[k]
+        if row.side == "lower" and problem.lower[k] == 0.0 and unit.startswith(("kg", "N")):
+            return None
         return _rounded(STEP * float(problem.upper[k] - problem.lower[k]), unit), unit
     if row.kind == "constraint":
         (terms,) = (one.coefficients for one in problem.constraints if one.name == row.name)

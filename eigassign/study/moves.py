@@ -95,8 +95,7 @@ def _trace(solved: ReducedMove, T: float) -> tuple[Floats, Floats]:
     after = np.linspace(0.0, AFTER * 2.0 * np.pi / slowest, FINE)
     ways = np.vstack([during[0], free.at(after)[0].T])
     time_s = np.concatenate([T * tau, T + after])
-    single = ways[:, 0] if ways.shape[1] == 1 else np.linalg.norm(ways, axis=1)
-    return time_s, single
+    return time_s, ways[:, 0] if ways.shape[1] == 1 else np.linalg.norm(ways, axis=1)
 
 
 def _modes(solved: ReducedMove, T: float) -> tuple[ModeOnPath, ...]:

@@ -58,9 +58,8 @@ def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats
     else:
         tip = frozen(np.insert(trajectory.tip, seams, np.nan, axis=0))
     poses = _posed(file, model, model.x(trajectory.q[chosen], y), trajectory.time_s[chosen], tip)
-    if not trajectory.several:
-        return poses
-    return replace(poses, of=tuple(trajectory.name_of(k) for k in chosen))
+    of = (trajectory.name_of(k) for k in chosen if trajectory.several)
+    return replace(poses, of=tuple(of))
 
 
 def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> DrawnPoses:
@@ -294,10 +293,8 @@ def joints(
 
 def bodies(file: CaseFile, at: At) -> tuple[DrawnBody, ...]:
     """The bodies, and the rigid links without extent."""
-    found = [
-        DrawnBody(name, body.mass, at(split(body.at)))
-        for name, body in file.mechanism.bodies.items()
-    ]
+    given = file.mechanism.bodies.items()
+    found = [DrawnBody(name, body.mass, at(split(body.at))) for name, body in given]
     links: Mapping[str, Any] = file.mechanism.links
     for name, link in links.items():
         if link_type(file, name) != "rigid":

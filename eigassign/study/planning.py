@@ -357,13 +357,12 @@ def scattered(
     y = lower + u[:, 1:] * (upper - lower)
     if trajectory is None:
         return np.hstack([np.tile(q0, (count, 1)), y])
-    starts = np.concatenate(
-        [np.arange(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows]
-    )
-    last = np.concatenate([np.full(r.stop - r.start, r.stop - 1) for r in trajectory.rows])
+    own = (range(r.start, max(r.stop - 1, r.start + 1)) for r in trajectory.rows)
+    starts = np.concatenate([*own])
     k, share = np.divmod(u[:, 0] * len(starts), 1.0)
-    start = starts[k.astype(int)]
-    end, q = np.minimum(start + 1, last[start]), trajectory.q
+    start, q = starts[k.astype(int)], trajectory.q
+    lasts = np.array([r.stop - 1 for r in trajectory.rows])
+    end = np.minimum(start + 1, lasts[np.searchsorted(lasts, start)])
     between = q[start] + share[:, None] * (q[end] - q[start])
     return np.hstack([between, y])
 

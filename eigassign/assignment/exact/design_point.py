@@ -274,12 +274,8 @@ def _left_over(
     """
     kinks = int(kink.max(initial=-1)) + 1
     normals = np.array([one[0] for one in held]).reshape(-1, len(slope))
-    system = np.block(
-        [
-            [normals, np.zeros((len(normals), kinks))],
-            [branches, unit * np.eye(kinks)[kink]],
-        ]
-    ).T
+    shares = unit * np.eye(kinks)[kink]
+    system = np.block([[normals, np.zeros((len(normals), kinks))], [branches, shares]]).T
     slope = np.append(slope, -np.full(kinks, unit))
     if not system.size:
         return float(np.abs(slope).max()), np.zeros(0)

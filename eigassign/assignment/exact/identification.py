@@ -150,9 +150,16 @@ def identify(
         return bool(gammaincc(room / 2.0, found.objective / 2.0) >= POOR)
 
     def joined(found: Optimum) -> list[Optimum]:
-        """The minima with one more, if it is one; the better of two that are the same."""
+        """The minima with one more, if it is one; the better of two that are the same.
+
+        A way joins these; of such as explain nothing, χ² is equal.
+        """
         for k, known in enumerate(minima):
-            if _are_same(problem, known, found, explains):
+            most = max(known.objective, found.objective)
+            same = abs(known.objective - found.objective) <= SAME * most
+            if explains(known) and explains(found):
+                same = has_way(problem, known.y, found.y, (MET, most + NOTICED**2), 1)
+            if same:
                 better = min(known, found, key=lambda each: each.objective)
                 return [*minima[:k], better, *minima[k + 1 :]]
         return [*minima, found]
@@ -194,16 +201,6 @@ def identify(
         starts=starts,
         met=len(minima),
     )
-
-
-def _are_same(
-    problem: DesignProblem, a: Optimum, b: Optimum, explains: Callable[[Optimum], bool]
-) -> bool:
-    """True where two minima are one: a way joins them; of such as explain nothing, χ² is equal."""
-    if not (explains(a) and explains(b)):
-        return abs(a.objective - b.objective) <= SAME * max(a.objective, b.objective)
-    most = MET, max(a.objective, b.objective) + NOTICED**2
-    return has_way(problem, a.y, b.y, most, 1)
 
 
 # --- Covariance, and what cannot be told

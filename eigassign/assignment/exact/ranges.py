@@ -16,12 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from eigassign.arrays import Floats
 from eigassign.assignment.exact.design_problem import ON, Appraisal, DesignProblem, Objective
-from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.exact.sequential import Optimum, minimise
 from eigassign.errors import EigassignError
 
 Response = Callable[[Floats], tuple[Floats, Floats]]  # y → r (m,), ∂r/∂y (m, n_y)
@@ -90,31 +91,26 @@ class _Search:
             return Appraisal(*self.response(y), np.zeros(0), np.zeros((0, len(y))))
 
         problem = DesignProblem(appraise, self.lower, self.upper, objective=Objective.WORST_CASE)
-        best, lost = None, None
+        found = list[Optimum]()
         for start in starts:
             try:
-                found = minimise(problem, start)
+                found.append(minimise(problem, start))
             except EigassignError as error:
                 lost = error
-                continue
-            if best is None or found.objective < best.objective:
-                best = found
-            if best.objective <= 1.0:
+            if found and found[-1].objective <= 1.0:
                 break
-        if best is None:
-            raise lost or EigassignError("no design to start from")
-        return best.y
+        if not found:
+            raise lost
+        return min(found, key=lambda one: one.objective).y
 
     def widened(self, *starts: Floats) -> bool:
         """Whether searches from starts widen the inner ranges, by more than `NEAR`."""
         before = self.inner if self.found else np.array([self.upper, self.lower])
-        for j in np.flatnonzero(self.upper > self.lower):
-            for sign in (-1.0, 1.0):
-                for start in starts:
-                    with suppress(EigassignError):
-                        found = minimise(self._outwards(int(j), sign), start)
-                        if found.seen.violation <= ON:
-                            self.found.append(found.y)
+        for j, sign, start in product(np.flatnonzero(self.upper > self.lower), (-1.0, 1.0), starts):
+            with suppress(EigassignError):
+                found = minimise(self._outwards(int(j), sign), start)
+                if found.seen.violation <= ON:
+                    self.found.append(found.y)
         if not self.found:
             return False
         gained = (before - self.inner) * np.array([[1.0], [-1.0]])

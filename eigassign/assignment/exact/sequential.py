@@ -223,10 +223,8 @@ class _Run:
 
     def _fall(self, place: DesignPoint, reached: DesignPoint) -> float:
         """The fall of the merit between two places."""
-        before, after = (
-            merit(self.problem, p.value, p.seen.violation, self.region.weight)
-            for p in (place, reached)
-        )
+        both = ((p.value, p.seen.violation) for p in (place, reached))
+        before, after = (merit(self.problem, *each, self.region.weight) for each in both)
         return before - after
 
     def _kept(self, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> bool:

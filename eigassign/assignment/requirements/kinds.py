@@ -128,8 +128,7 @@ class ForbiddenBand(Requirement):
     def below(self, solved: Solved) -> Ints:
         """The number of modes below each edge (2, n), of all that matter."""
         hz = self._counted(solved)
-        edges = (self.lower, self.upper)
-        return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
+        return np.array([(hz < e[:, None]).sum(axis=1) for e in (self.lower, self.upper)])
 
     def kept_clear(self, k: int, above: int | None, margin: Margin) -> Iterator[Requirement]:
         """Yield what says: k of the modes that count are below, and mode ``above`` is above.
@@ -151,13 +150,6 @@ class ForbiddenBand(Requirement):
         if mode > 0:
             own |= {"label": f"{self.name}: mode {mode}", "modes": (mode,)}
         return kind(**vars(self) | own | {"lower": lower, "upper": upper, "part_of": self.name})
-
-    def curve(self, solved: Solved) -> Floats:
-        """The frequency (n,) nearest to the middle of the band."""
-        own = self._counted(solved)
-        middle = 0.5 * (self.lower + self.upper)
-        nearest = np.abs(own - middle[:, None]).argmin(axis=1)
-        return np.asarray(own[np.arange(len(own)), nearest])
 
     def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
         """Bounds (n,) of the curve: no farther from the middle than one mode is at the most."""

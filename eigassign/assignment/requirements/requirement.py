@@ -93,9 +93,7 @@ class NeighbourPairs(NamedTuple):
 
         Any convex combination of them and the row's own is a generalised slope of the row (Clarke).
         """
-        ones = np.ones(len(self.row))
-        mixtures = [self._mixture(slopes, np.cos(a) * ones, np.sin(a) * ones) for a in ANGLES]
-        return np.concatenate(mixtures)
+        return np.concatenate([self._mixture(slopes, np.cos([a]), np.sin([a])) for a in ANGLES])
 
     def _mixture(self, slopes: Floats, cos: Floats, sin: Floats) -> Floats:
         """Slopes of the form of both modes' mixture at half the angle."""
@@ -245,12 +243,9 @@ class Requirement(Brief):
 
     def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
         """The range (n,) of its curve where each mode is between two frequencies."""
-        least: Floats | float = 0.0
-        most: Floats | float = 0.0
-        for mode, c in self.mode_terms:
-            low, high = (c * solved.curve(mode)[self.rows] for solved in (lowest, highest))
-            least, most = least + (low if c > 0.0 else high), most + (high if c > 0.0 else low)
-        return np.asarray(least), np.asarray(most)
+        both = [[c * s.curve(m)[self.rows] for m, c in self.mode_terms] for s in (lowest, highest)]
+        each = np.reshape(both, (2, len(self.mode_terms), len(self.lower)))
+        return each.min(axis=0).sum(axis=0), each.max(axis=0).sum(axis=0)
 
     def range_over(self, lower: Floats, upper: Floats, lowest: Solved, highest: Solved) -> Edges:
         """The range (n,) of its curve over designs between two (n_y,), of modes between two."""

@@ -99,8 +99,7 @@ def exerted(results: RunResults, name: str) -> FigurePlan:
 
 
 def _over_time(title: str, results: RunResults, panels: Sequence[Panel]) -> Graph:
-    clock = results.only or ""
-    return Graph(title, "time [s]", results.time_s, tuple(panels), clock=clock)
+    return Graph(title, "time [s]", results.time_s, tuple(panels), clock=results.only or "")
 
 
 # --- What was asked for, before and after (the paper's Figures 4 and 5)
@@ -161,11 +160,9 @@ def _groups(
             break
         top = max(high, held[k][0][1])
         held[k : k + 2] = [((low, top), [*held[k][1], *held[k + 1][1]])]
-    margins = (0.05 * (high - low) for (low, high), _ in held)
-    return [
-        (own, (low - margin, high + margin))
-        for ((low, high), own), margin in zip(held, margins, strict=True)
-    ]
+    ends = ((low, high, 0.05 * (high - low)) for (low, high), _ in held)
+    shown = ((low - margin, high + margin) for low, high, margin in ends)
+    return [(own, each) for (_, own), each in zip(held, shown, strict=True)]
 
 
 def _range(target: TargetStudy, spectrum: Sequence[ModeRow]) -> tuple[float, float]:
@@ -295,12 +292,10 @@ def mode_colour(mode: int) -> str:
     return _MODES[(mode - 1) % len(_MODES)]
 
 
-def before_and_after(shown: Sequence[ModeRow], x: Floats | None = None) -> tuple[Curve, ...]:
-    """One colour a mode: dashed before, solid after, its number at the end of its curve."""
-    found = []
+def before_and_after(shown: Sequence[ModeRow], x: Floats | None) -> Iterator[Curve]:
+    """Yield one colour a mode: dashed before, solid after, its number at the end of its curve."""
     for row in shown:
         before, after = (replace(look, colour=mode_colour(row.mode)) for look in (_BEFORE, _AFTER))
         name = f"mode {row.mode}"
-        found.append(Curve(row.initial_hz, before, x=x, hover=f"{name}, initial design"))
-        found.append(Curve(row.optimal_hz, after, x=x, end=name))
-    return tuple(found)
+        yield Curve(row.initial_hz, before, x=x, hover=f"{name}, initial design")
+        yield Curve(row.optimal_hz, after, x=x, end=name)

@@ -131,10 +131,8 @@ class Extent:
         label = "" if bare else "y [m]"
         panel = Panel(label, marks, self.height + foot, key=tuple(key), within=ends)
         limits = (float(low[0]), float(high[0]))
-        sheet = "bare" if bare else "axes"
-        return Graph(
-            title, note or "x [m]" * (not bare), np.zeros(0), (panel,), limits, sheet=sheet
-        )
+        note, sheet = note or "x [m]" * (not bare), "bare" if bare else "axes"
+        return Graph(title, note, np.zeros(0), (panel,), limits, sheet=sheet)
 
     def _bearings(self, low: Floats) -> Iterator[Curve]:
         """The axes' directions, and a bar of round length as scale, from the corner ``low``."""
@@ -271,13 +269,12 @@ def poses(title: str, shown: DrawnPoses) -> FigurePlan:
     bodies = of_roles(every, "body")
     for pose, colour in enumerate(colours):
         marks += drawn(held, moving, pose, colour, {"spring": GREY})
-    for at, body in enumerate(bodies):
-        for pose in range(count):
-            marks += drawn(held, [body], pose, _BODIES[at % len(_BODIES)], {})
     key = [] if shown.tip_path is None else [("tip path", _TIP)]
-    for at, body in enumerate(bodies[:6]):
+    for at, body in enumerate(bodies):
         look = Look(_BODIES[at % len(_BODIES)], 0.0, marker="o")
-        key.append((short(body.name, 22), look))
+        key += [(short(body.name, 22), look)] * (at < 6)
+        for pose in range(count):
+            marks += drawn(held, [body], pose, look.colour, {})
     for at, (colour, time) in enumerate(zip(colours, shown.time_s, strict=True)):
         whose = f"{short(shown.of[at], 12)} " if shown.of else ""
         key += [(f"{whose}at {time:.3g} s", Look(colour, 2.6))] * (count > 1)

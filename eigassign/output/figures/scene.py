@@ -173,7 +173,6 @@ def links(poses: DrawnPoses) -> Iterator[Part]:
 
 def _joints(poses: DrawnPoses) -> Iterator[Part]:
     """Yield boxes and squares, then bodies, then rings, and a dot where a coordinate moves them."""
-    turning = [joint for joint in poses.joints if joint.kind == "turning"]
     for joint in poses.joints:
         if joint.kind == "sliding" or (joint.kind == "fixed" and not joint.grounded):
             yield _symbol(joint, "slide")
@@ -182,7 +181,7 @@ def _joints(poses: DrawnPoses) -> Iterator[Part]:
         share = max(body.mass, 0.0) / heaviest if heaviest > 0.0 else 0.0
         shape = Shape(fill="own" if body.mass > 0.0 else "page", dot=6.0 + 6.0 * np.cbrt(share))
         yield Part("stamp", "body", body.name, body.places[:, None], shapes=(shape,))
-    yield from (_symbol(joint, "pivot") for joint in turning)
+    yield from (_symbol(joint, "pivot") for joint in poses.joints if joint.kind == "turning")
 
 
 def _symbol(joint: DrawnJoint, role: str) -> Part:

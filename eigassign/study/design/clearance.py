@@ -155,9 +155,8 @@ def _solved(
     """The modes that parts are on, solved at places along their rows; ``own`` are followed."""
     rows, top, named = parts[0].rows, max(one.top for one in parts), parts[0].followed
     poses, name = path.between(rows, y), path.name_of(rows.start)
-
-    def numbered(at: Floats) -> Solved:
-        return unfollowed(model.frequencies(poses(at), y, top))
+    if not named:
+        return lambda at: unfollowed(model.frequencies(poses(at), y, top))
 
     def with_followed(at: Floats) -> Solved:
         time_s = _between(at, path.time_s[rows, None])[:, 0]
@@ -169,7 +168,7 @@ def _solved(
         found = follow_all(model, fine, shapes, y, top).solved
         return Solved(found.hz[k], found.followed[k], found.numbers[k])
 
-    return with_followed if named else numbered
+    return with_followed
 
 
 def _drive_room(

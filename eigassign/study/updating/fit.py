@@ -518,8 +518,7 @@ def _in_words(
 
 
 def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
-    several = len(problem.measured) != len(problem.q)
-    poses = f" at {len(problem.q)} poses" if several else ""
+    poses = f" at {len(problem.q)} poses" * (len(problem.measured) != len(problem.q))
     yield f"{len(problem.measured)} measured frequencies{poses}, {len(found.y)} parameters"
     if found.rounds > 1:
         yield "the first fit was a local minimum: the fit began again from a better one"

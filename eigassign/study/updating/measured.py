@@ -76,11 +76,9 @@ def _paired(case: BuiltCase, given: tuple[PosedMeasurement, ...]) -> tuple[Posed
         hz = case.model().frequencies(q, y0, count)[0]
         left = [mode for mode in range(1, count + 1) if mode not in taken]
         if len(left) < len(rows):
-            message = (
-                f"{given[rows[0]].label}: {len(rows)} frequencies at one pose, of which the model"
-            )
-            message += f" has {len(left)} modes: give its links more elements, or leave some out"
-            raise MechanismError("measurements", message)
+            has = f"{len(rows)} frequencies at one pose, of which the model has {len(left)} modes"
+            what = f"{has}: give its links more elements, or leave some out"
+            raise MechanismError("measurements", f"{given[rows[0]].label}: {what}")
         ratios = [[hz[mode - 1] / given[k].hz for mode in left] for k in rows]
         wide = np.log(ratios) ** 2  # squares keep the order of those that are as far off
         for i, j in zip(*linear_sum_assignment(wide), strict=True):
@@ -145,10 +143,8 @@ def _from_file(
     ]
     table = read_table(Path(given.file), _KEY, renamed(columns, given.columns, _KEY))
     if not 0 < len(table.lines) <= MOST_MEASUREMENTS:
-        some = (
-            "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
-        )
-        raise MechanismError(_KEY, f"{table.file}: {some}")
+        some = f"more than {MOST_MEASUREMENTS}" if table.lines else "no"
+        raise MechanismError(_KEY, f"{table.file}: {some} measurements")
     own = {"frequency", "deviation", "lower", "upper"} & table.numbers.keys()
     if own & {"lower", "upper"} and (own != {"lower", "upper"} or given.deviation is not None):
         expected = "of ranges give lower and upper alone, without frequency and deviation"

@@ -431,17 +431,12 @@ def _drawn_in(
 
 def _clearances(task: Task, below: Counts, y: Floats) -> tuple[ClearanceRow, ...]:
     """The bands that are not left out, checked at a design, in the scenario of least room."""
-    return tuple(
-        min(
-            (
-                check_band(task.scene.model, task.scene.path, band, k, one, task.followers)
-                for one in task.designs(y)
-            ),
-            key=lambda row: (row.clear, row.room),
-        )
-        for band, k in zip(task.bands, below, strict=True)
-        if k is not None
-    )
+    model, path, designs, found = task.scene.model, task.scene.path, task.designs(y), []
+    for band, k in zip(task.bands, below, strict=True):
+        if k is not None:
+            rows = (check_band(model, path, band, k, one, task.followers) for one in designs)
+            found.append(min(rows, key=lambda row: (row.clear, row.room)))
+    return tuple(found)
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:

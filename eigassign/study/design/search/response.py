@@ -313,10 +313,7 @@ class Designs:
         """
         each = [[band.below(solved) for solved in self.solved] for band in self.bands]
         near = np.array([[int(np.median(own[k])) for own in each] for k in range(len(self.y))])
-        counts = (
-            range(min(int(k.min()) for k in own), max(int(k.max()) for k in own) + 1)
-            for own in each
-        )
+        counts = (range(int(np.min(own)), int(np.max(own)) + 1) for own in each)
         listed = itertools.islice(itertools.product(*counts), MOST_CHOICES)
         return sorted(
             dict.fromkeys((*map(tuple, near.tolist()), *listed)),
