@@ -83,7 +83,7 @@ WRONG = [
     (L + BESIDE_OTHER, "others[0].correlation.k.r", "is between −1 and 1"),
     ("  correlation: {}\n", "", "names no property: such as {k: {parameter: …, standard_dev"),
     ("  file: nowhere\n", "file", "no such file"),
-    ("  file: empty\n", "file", "has no key uncertain: give the folder of an update that explained"),
+    ("  file: empty\n", "file", "has no key uncertain: give the folder of an update that"),
 ]  # fmt: skip
 
 
