@@ -66,9 +66,8 @@ class ReducedModel:
     program: Program
     to_program: Floats
     shift: Floats
-    terms: tuple[Ints, Ints]  # the j that K and M have
-    stiffness: Floats  # VᵀK_jV, (n_terms, k, k)
-    mass: Floats  # M_j on [V 0; 0 I], (n_terms, k + f, k + f)
+    stiffness: SymmetricTerms  # of (k, k)
+    mass: SymmetricTerms  # of (k + f, k + f)
 
     def __repr__(self) -> str:
         return (
@@ -80,7 +79,7 @@ class ReducedModel:
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
-        return int(self.stiffness.shape[1])
+        return len(self.stiffness.place)
 
     @one_thread
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -94,7 +93,7 @@ class ReducedModel:
         parts = [
             np.linalg.eigvalsh(self._standard(theta[:, part]))[:, ::-1]
             for theta in map(self._theta, chunks(x, 1))
-            for part in chunks(np.arange(theta.shape[1]), self.mass[0].size)
+            for part in chunks(np.arange(theta.shape[1]), self.mass.place.size)
         ]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
@@ -108,12 +107,42 @@ class ReducedModel:
 
     def _standard(self, theta: Floats) -> Floats:
         """L⁻¹ M̂_c L⁻ᵀ (n, k, k) at θ (n_theta, n), its lower triangle."""
-        k = self.size
-        each = zip(self.terms, (self.stiffness, self.mass), strict=True)
-        K, M = (np.tensordot(theta[j], A, (0, 0)) for j, A in each)
-        M_c = condense_blocks(M[:, :k, :k], M[:, k:, :k], M[:, k:, k:])[1]
-        inverse = inverse_factor(K)
+        E, F = slice(0, self.size), slice(self.size, None)
+        K, M = self.stiffness(theta), self.mass(theta)
+        M_c = condense_blocks(*(self.mass.block(M, *at) for at in ((E, E), (F, E), (F, F))))[1]
+        inverse = inverse_factor(self.stiffness.block(K, E, E))
         return np.asarray(inverse @ M_c @ np.swapaxes(inverse, 1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricTerms:
+    """Sums Σ θ_j A_j of small symmetric matrices from their lower triangles: half the work.
+
+    ``triangles`` (n_terms, k(k + 1)/2) are those of A_j; ``place`` (k, k) is where in them each
+    entry is.
+    """
+
+    terms: Ints  # indices j of θ
+    triangles: Floats
+    place: Ints
+
+    def __call__(self, theta: Floats) -> Floats:
+        """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
+        return np.asarray(theta[self.terms].T @ self.triangles)
+
+    def block(self, triangles: Floats, rows: slice, columns: slice) -> Floats:
+        """Rows and columns of whole matrices, (n, …, …), from their triangles."""
+        place = self.place[rows, columns]
+        return triangles.take(place.ravel(), axis=1).reshape(len(triangles), *place.shape)
+
+
+def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
+    """Terms from whole matrices (n_terms, k, k), of which the lower triangle is read."""
+    k = matrices.shape[1]
+    i, j = np.tril_indices(k)
+    place = np.empty((k, k), dtype=np.intp)
+    place[i, j] = place[j, i] = np.arange(len(i))
+    return SymmetricTerms(terms, np.ascontiguousarray(matrices[:, i, j]), place)
 
 
 # --- The basis, and the pencil on it
@@ -151,9 +180,8 @@ def reduce(
         program=pencil.program,
         to_program=pencil.to_program,
         shift=pencil.shift,
-        terms=(k_terms, m_terms),
-        stiffness=stiffness[k_terms, :k, :k],
-        mass=mass[m_terms],
+        stiffness=symmetric_terms(k_terms, stiffness[k_terms, :k, :k]),
+        mass=symmetric_terms(m_terms, mass[m_terms]),
     )
 
 

@@ -39,12 +39,14 @@ def stated(model: Model, approximation: Surrogate, q: object, y: object) -> np.n
     return stated_error(model, approximation, at)
 
 
-def judged(model: Model, approximation: Surrogate, q: object, y: object) -> np.ndarray:
+def judged(
+    model: Model, approximation: Surrogate, q: object, y: object, round_off: float = 1e-12
+) -> np.ndarray:
     """True relative errors; what is stated of their range must show them: else this fails."""
     pick = np.array(approximation.modes) - 1
     exact = model.frequencies(q, y, max(approximation.modes))[:, pick]
     error = np.abs(approximation.frequencies(q, y) / exact - 1.0)
     error = np.where(np.isnan(error), np.inf, error)
-    covered = error <= 4.0 / 3.0 * stated(model, approximation, q, y) + 1e-12
+    covered = error <= 4.0 / 3.0 * stated(model, approximation, q, y) + round_off
     assert covered.all(), "a confident wrong number"
     return error

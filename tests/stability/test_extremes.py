@@ -158,7 +158,8 @@ def test_far_from_its_point_an_approximation_is_refused_or_covered():
     model = case("decoupled_body").model()
     point = (model.pencil, ELBOW_AT_1, [500.0], (1, 2))
     for found in (*(expand(*point, order=order) for order in (2, 4, 8)), reduce(*point, 3)):
-        judged(model, found, ELBOW_AT_1, K)
+        # of a drive of 1e-6 N m/rad the exact λ itself has lost digits: 4e-10 on one processor
+        judged(model, found, ELBOW_AT_1, K, 2e-9)
 
 
 def test_the_exact_frequency_falls_as_the_root_of_the_stiffness():

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import listed
 from eigassign.errors import MechanismError
@@ -45,6 +45,7 @@ from eigassign.mechanism.kinematics.parameters import (
 from eigassign.mechanism.solids.part import solid_part
 from eigassign.series.expression import Expression, Scalar
 
+Floats = NDArray[np.float64]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
 ROUND_OFF = 1e-15  # of strains: what is less is said so
 LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs
@@ -226,6 +227,7 @@ def _term(coefficient: Scalar, matrix: sparse.csr_array) -> Term:
 
 _NOWHERE = 1e-9  # of a part's size: a centre of mass as near to an axis is shown on it
 _THIN = 1e-5  # kg/m³ of a cube as large as the part: a wire of 10 g/m has that from 30 m on
+_FAR = 10.0  # radii of gyration: the ends of a bar are 1.7 from its centre
 
 
 def part_lines(case: CaseFile) -> tuple[str, ...]:
@@ -272,7 +274,8 @@ def free_part_lines(
     inertia = turning - m * (c @ c - (0.0 if flat else c**2))
     X = np.array([p[: len(c)] for p in mesh.positions.values()], dtype=np.float64)
     far = float(np.linalg.norm(X - c, axis=1).max(initial=0.0))
-    size = far + float(np.sqrt(max(inertia.max(), 0.0) / m))  # with the radius of gyration
+    gyration = float(np.sqrt(max(inertia.max(), 0.0) / m))
+    size = far + gyration
     centre = ", ".join(f"{x:.4g}" for x in np.where(np.abs(c) < _NOWHERE * size, 0.0, c))
     about = ", ".join(f"{each:.4g}" for each in inertia)
     strain = max(rigid_strain(K, N), ROUND_OFF)  # the digits below differ by machine
@@ -281,6 +284,11 @@ def free_part_lines(
         f"{about} kg m2",
         f"{title}: strain under rigid motion {strain:.1g} (accepted up to {STRAIN_FREE:g})",
     ]
+    if far > _FAR * gyration:
+        lines.append(
+            f"{title}: its nodes are up to {far:.3g} m from its centre of mass, a part of about "
+            f"{2.0 * gyration:.2g} m: see the positions and their units"
+        )
     if size > 1.0 and m < _THIN * size**3:
         lines.append(
             f"{title}: no part has {m:.3g} kg and nodes up to {far:.3g} m from their centre: if "
