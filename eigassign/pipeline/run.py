@@ -47,7 +47,7 @@ from eigassign.study.moves import study_moves
 from eigassign.study.pictures import motions
 from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.response import study_responses
-from eigassign.study.results import Motion, ResponseRow, RunResults, TargetStudy
+from eigassign.study.results import Motion, MoveRow, ResponseRow, RunResults, TargetStudy
 from eigassign.study.scene import (
     TRAJECTORY,
     Expansions,
@@ -147,8 +147,7 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
             if answer.found is not None and asked is not Studies.NONE:
                 bound = proof(scene, answer.found, thorough=asked is Studies.ALL)
         drawn = _responses(scene, answer.y, stages)
-        with stages("moves", "what the move leaves, and input shapers"):
-            moves = tuple(study_moves(scene, answer.y))
+        moves = _moves(scene, answer.y, stages)
     found = VerifiedAssignment(answer, targets, solved, meaning, bound)
     moving = _moving(scene, answer.y, targets, options)
     results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s, drawn)
@@ -201,6 +200,13 @@ def _responses(scene: Scene, y: Floats, stages: Stages) -> tuple[ResponseRow, ..
         return ()
     with stages("responses", "computing responses along the trajectory"):
         return tuple(study_responses(scene, y))
+
+
+def _moves(scene: Scene, y: Floats, stages: Stages) -> tuple[MoveRow, ...]:
+    if not scene.residuals:
+        return ()
+    with stages("moves", "what the move leaves, and input shapers"):
+        return tuple(study_moves(scene, y))
 
 
 def respond(case: BuiltCase, options: Options = DEFAULT) -> RunResults:

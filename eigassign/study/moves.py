@@ -48,9 +48,8 @@ AFTER = 6.0  # periods of the slowest mode that are shown after the stop
 
 def study_moves(scene: Scene, y: Floats) -> Iterator[MoveRow]:
     """Each limit of residual vibration, of design y (n_y,) beside the initial one."""
-    for one in scene.limits:
-        if isinstance(one, LimitedQuantity) and one.is_residual:
-            yield _row(scene, one, y)
+    for one in scene.residuals:
+        yield _row(scene, one, y)
 
 
 def _row(scene: Scene, limit: LimitedQuantity, y: Floats) -> MoveRow:

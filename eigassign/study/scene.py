@@ -218,6 +218,11 @@ class Scene:
         return tuple(one for one in self.limits if isinstance(one, StaticLimit))
 
     @property
+    def residuals(self) -> list[LimitedQuantity]:
+        """The limits of vibration after a move."""
+        return [one for one in self.limits if one.is_residual]
+
+    @property
     def followed_limits(self) -> tuple[LimitedQuantity, ...]:
         """The limits that are looked at between the samples: static targets and drives."""
         return tuple(one for one in self.limits if isinstance(one, StaticLimit | DriveLimit))

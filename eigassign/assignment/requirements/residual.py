@@ -69,6 +69,16 @@ class Residual:
         each = [own.residuals(durations, last)[:, 0] for own in self.solved(y, sizes)]
         return np.asarray(np.max(each, axis=0))
 
+    def amplitudes(self, y: Floats) -> Floats:
+        """What w is made of, and zero with it: Re and Im of each mode at the node, (n,) in m."""
+        found = []
+        for own in self.solved(y):
+            Z, _, tip = own.free(np.array([self.duration(y)]))
+            each = np.zeros((len(tip), SIZES.modes), dtype=np.complex128)
+            each[:, : tip.shape[1]] = Z * tip
+            found += [each.real.ravel(), each.imag.ravel()]
+        return np.concatenate(found)
+
     def __call__(self, y: Floats) -> tuple[float, Floats]:
         """w of a design, and its slopes (n_y,) by differences."""
         own, slopes = np.array([self.duration(y)]), np.zeros(len(y))

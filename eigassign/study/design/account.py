@@ -213,8 +213,8 @@ def _unproved(scene: Scene, own: VerifiedAssignment, largest: float) -> Iterator
     answer, found = own.answer, own.answer.found
     designs = [answer.y] if found is None else found.task.designs(answer.y)
     yield from _missed_between(scene, designs, own.targets, largest)
-    for one in scene.limits:
-        for y in designs if one.is_residual else ():
+    for one in scene.residuals:
+        for y in designs:
             at = np.array([one.quantity.duration(y)])
             way = float(one.quantity.along(y, at, FINER)[0])
             if way > one.allowed[1] and one.violation(one.amount(y), 0.0) <= ON:
