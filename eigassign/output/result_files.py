@@ -46,6 +46,13 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         columns = zip(*every, strict=True) if every else ((), (), ())
         files["shapers.csv"] = csv_text([*zip(headings, columns, strict=True)])
         files["shapers.txt"] = "\n".join(row.lines for row in results.moves).encode()
+        for k, row in enumerate(results.moves, start=1):
+            if row.command is not None:
+                times, q = row.command
+                turned = map(_column, results.q_names, results.q_units, q.T)
+                files[f"zv_over_time_{k}.csv"] = csv_text(
+                    [(f"{TIME} [s]", times.tolist()), *turned]
+                )
     for name, rows in {"drives.csv": results.drives, "statics.csv": results.statics}.items():
         if rows:
             files[name] = csv_text([*_samples(results), *_both(rows)])

@@ -37,7 +37,7 @@ from eigassign.study.results import (
 MOST_HELPS = 10  # properties of a mode in the table; results.json has all
 SAGGING = 6  # nodes in the table; results.json has all
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
-ANSWER = ("Design", "Objective", "Distance to the target", "Limits and bands")  # on a terminal
+ANSWER = "Design", "Objective", "Distance to the target", "Limits and bands", "Input shapers"
 RUNS = "runs"  # the section whose columns are runs, with cells of all kinds: all to the left
 _RANGES = "label lowest_hz highest_hz error"
 

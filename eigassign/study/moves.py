@@ -65,7 +65,10 @@ def _row(scene: Scene, limit: LimitedQuantity, y: Floats) -> MoveRow:
     modes = _modes(solved, T)
     made = [*_made(modes)]
     rows = [_shaped(move, one, y, T) for one in made]
-    rows += _along(move, modes, y, T)
+    lines = [line for one, row in zip(made, rows, strict=True) for line in _lines(one, row)]
+    command = _along(move, modes, y, T)
+    if command is not None:
+        rows.append(_over_time(move, modes[0], y, T, *command))
     rows.sort(key=lambda row: row.delay)
     return MoveRow(
         name=limit.noun,
@@ -81,7 +84,8 @@ def _row(scene: Scene, limit: LimitedQuantity, y: Floats) -> MoveRow:
         times=times,
         lobes=own.along(y, times),
         lobes_before=own.along(scene.initial, times),
-        lines="\n".join(line for one in made for line in _lines(one)),
+        command=command,
+        lines="\n".join(lines),
         impulses=tuple((one.name, one.amplitudes, one.times_s) for one in made),
     )
 
@@ -136,18 +140,25 @@ def _shaped(move: Move, shaper: Shaper, y: Floats, T: float) -> ShaperRow:
     return ShaperRow(shaper.name, hz, float(np.mean(shaper.zeta)), shaper.delay, left)
 
 
-def _along(move: Move, modes: tuple[ModeOnPath, ...], y: Floats, T: float) -> Iterator[ShaperRow]:
-    """A ZV that changes with the frequency along the path, where that is not one number."""
+def _along(
+    move: Move, modes: tuple[ModeOnPath, ...], y: Floats, T: float
+) -> tuple[Floats, Floats] | None:
+    """Times and q of a ZV that changes with the frequency along the path, unless that is one."""
     if not modes or np.ptp(modes[0].hz) <= CHANGES * modes[0].hz.min():
-        return
+        return None
     t = np.linspace(0.0, T, len(modes[0].hz))
     first, last = move.trajectory.time_s[[0, -1]]
     own = np.linspace(float(first), float(last), len(t))
     q = move.trajectory.motion.poses(own, y)
-    times, q = shaped_along(t, q, modes[0].hz, modes[0].zeta)
+    return shaped_along(t, q, modes[0].hz, modes[0].zeta)
+
+
+def _over_time(
+    move: Move, mode: ModeOnPath, y: Floats, T: float, times: Floats, q: Floats
+) -> ShaperRow:
     left = _left(move, sampled_motion(times, q), y, float(times[-1]))
-    hz = "{:.4g} … {:.4g}".format(*modes[0].hz_range)
-    yield ShaperRow("zv over time", hz, float(modes[0].zeta.mean()), float(times[-1]) - T, left)
+    hz = "{:.4g} … {:.4g}".format(*mode.hz_range)
+    return ShaperRow("zv over time", hz, float(mode.zeta.mean()), float(times[-1]) - T, left)
 
 
 def _left(move: Move, motion: Motion, y: Floats, total: float) -> float:
@@ -156,9 +167,10 @@ def _left(move: Move, motion: Motion, y: Floats, total: float) -> float:
     return float(other.at(y).residuals(ends[1:])[0, 0])
 
 
-def _lines(shaper: Shaper) -> Iterator[str]:
+def _lines(shaper: Shaper, row: ShaperRow) -> Iterator[str]:
     """Yield what controllers take of a shaper; nothing of what none of them knows."""
+    said = f"{row.name}: {1e3 * row.delay:.3g} ms longer, leaves {1e3 * row.residual:.3g} mm"
     with suppress(UsageError):
-        yield klipper_lines({"x": shaper, "y": shaper})
+        yield f"# {said}\n{klipper_lines({'x': shaper, 'y': shaper})}"
     with suppress(UsageError):
-        yield f"{reprap_line(shaper)}\n"
+        yield f"; {said}\n{reprap_line(shaper)}\n"

@@ -338,7 +338,7 @@ class ShaperRow:
     name: Annotated[str, Fact("as controllers call it; with * one for each mode", "shaper")]
     hz: Annotated[str, Fact("what it is designed for", "for", "Hz")]
     zeta: Annotated[float, Fact("damping ratio that it is designed for", "ζ", digits=".3g")]
-    delay: Annotated[Seconds, Fact("by which the command is longer", digits=".3g")]
+    delay: Annotated[float, Fact("by which the command is longer", "delay", "s", ".3g")]
     residual: Annotated[Metres, Fact("largest way after the stop", "leaves")]
 
 
@@ -359,6 +359,7 @@ class MoveRow(InOneUnit):
     times: Unwritten[Floats]  # (k,) s
     lobes: Unwritten[Floats]  # (k,) m
     lobes_before: Unwritten[Floats]
+    command: Unwritten[tuple[Floats, Floats] | None]  # of a ZV over time: t (n,) and q (n, n_q)
     lines: Unwritten[str]  # for controllers
     impulses: Unwritten[tuple[tuple[str, Floats, Floats], ...]]
 

@@ -12,6 +12,7 @@ import pytest
 import yaml
 from calibration import Floats
 from json_schema_reader import reads_back
+from scipy.interpolate import CubicSpline
 from whole_moves import largest, left, whole_scara
 
 import eigassign as ea
@@ -190,6 +191,7 @@ def test_a_run_says_what_the_move_leaves_and_what_controllers_take(folder: Path)
     assert "[input_shaper]\nshaper_type_x: mzv\nshaper_freq_x: " in lines
     (said,) = (line for line in lines.splitlines() if line.startswith('M593 P"mzv" F'))
     assert float(said.split()[2][1:]) == pytest.approx(hz, rel=1e-3)
+    assert f"\n; mzv: {1e3 * told['mzv']['delay']:.3g} ms longer, leaves " in lines
 
 
 def test_shapers_leave_what_an_integration_of_their_commands_says(folder: Path) -> None:
@@ -199,6 +201,12 @@ def test_shapers_leave_what_an_integration_of_their_commands_says(folder: Path) 
     case, T = ea.load_case(folder / "case.yaml"), row["duration"]
     start, end = case.trajectory.q[[0, -1]]
     y = np.array([one["optimal"] for one in results["design"].values()])
+    times, *q = np.genfromtxt(folder / "zv_over_time_1.csv", delimiter=",", skip_header=1).T
+    curve, matter = CubicSpline(times, np.deg2rad(q), axis=1), whole_scara(case, y)
+    matter.moving, matter.T = lambda t, _: Moving(curve(t).T, *[np.zeros((0, 2))] * 2), times[-1]
+    exact = largest(matter, times[-1:], 201)[0]
+    assert told["zv over time"] == pytest.approx(exact, rel=5e-2)
+    assert told["zv over time"] < 0.3 * min(told["zv"], row["residual"])
     for name, A, t in [*shapers(folder)][:3]:  # zv, mzv, zv*zv
 
         def command(time_s: Floats, _: Floats, A: Floats = A, t: Floats = t) -> Moving:

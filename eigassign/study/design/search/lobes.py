@@ -61,7 +61,7 @@ def basins(scene: Scene, starts: Sequence[Floats], progress: Callable[[str], Non
     designs += [lower + side * (upper - lower) for side in box_corners(len(lower))]
     progress(f"fastest: {len(designs)} designs at {TIMES} motion times")
     found = [b for y in designs for b in _basins(scene, y, column, times)]
-    near = [_quietest(scene, basin, column) for basin in _best(found, LOOKS)]
+    near = [b if b.missed <= 1.0 else _quietest(scene, b, column) for b in _best(found, LOOKS)]
     return [basin.y for basin in _best(near, LOBES)]
 
 
