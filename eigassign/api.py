@@ -22,7 +22,7 @@ from eigassign.pipeline import queries
 from eigassign.pipeline.run import Options, Result, respond, responding, solve_case
 from eigassign.pipeline.stages import silent
 from eigassign.pipeline.studies import Updated, update_case
-from eigassign.pipeline.urdf import urdf_mapping
+from eigassign.pipeline.urdf import urdf_mapping as urdf_mapping
 from eigassign.process import one_thread
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case
@@ -31,17 +31,6 @@ from eigassign.study.results import ResponseRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = [
-    "Case",
-    "assign",
-    "expand",
-    "load_case",
-    "reduce",
-    "response",
-    "update",
-    "urdf_mapping",
-]
 
 
 class Case(built_case.BuiltCase):

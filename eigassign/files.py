@@ -18,13 +18,15 @@ import os
 import re
 import shlex
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from eigassign.errors import UsageError
 
+T = TypeVar("T")
 VARIABLE = "EIGASSIGN_LIMITS"
 UPDATED = "updated.yaml"  # in the folder of an update
 CASE = 10_000_000  # bytes of a case file
@@ -75,6 +77,20 @@ def file_digest(path: str | Path, limit: int) -> str | None:
     except (OSError, ValueError):
         return None
     return found.hexdigest()
+
+
+def once(read: Callable[[str | Path], T], most: int) -> Callable[[str | Path], T]:
+    """``read``, once as long as the file stays the same, of the last ``most`` files."""
+    known = lru_cache(most)(lambda path, *_: read(path))
+
+    def kept(path: str | Path) -> T:
+        try:
+            status = os.stat(path)
+        except (OSError, ValueError):
+            return read(path)
+        return known(path, status.st_mtime_ns, status.st_size)
+
+    return kept
 
 
 def seen_from(folder: Path, path: str | Path) -> str:

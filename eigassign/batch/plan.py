@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, partial
 from itertools import accumulate
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from eigassign.case.case_file import Unchecked, read
 from eigassign.case.reader import NUMBER, dotted, key_path, short_keys
 from eigassign.case.schema.study import text_of
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
-from eigassign.files import MATRIX, file_digest, folder_name
+from eigassign.files import MATRIX, file_digest, folder_name, once
 from eigassign.modal.expansion import ALGORITHM
 from eigassign.output.batch.index import NAMES
 from eigassign.output.store.run_folder import MARKER
@@ -164,18 +164,7 @@ def _texts(value: object) -> Iterator[str]:
             yield from _texts(inner)
 
 
-def _digest(file: Path) -> str | None:
-    """SHA-256 of a file, None where there is none."""
-    try:
-        status = os.stat(file)
-    except (OSError, ValueError):
-        return None
-    return _digest_once(file, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=100)
-def _digest_once(file: Path, _time: int, _size: int) -> str | None:
-    return file_digest(file, MATRIX)
+_digest = once(partial(file_digest, limit=MATRIX), 100)
 
 
 def variant_problem(plan: BatchPlan, index: int, problem: Problem) -> Problem:

@@ -6,7 +6,6 @@ import errno
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -19,8 +18,9 @@ from eigassign.batch.plan import (
     key_of,
     variant_problem,
 )
-from eigassign.case.case_file import Unchecked, checked, read
+from eigassign.case.case_file import checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError, UsageError
+from eigassign.files import once
 from eigassign.output.batch.summary import CaseOutcome, Status, frequency_ranges, to_plain
 from eigassign.output.store.run_folder import MARKER, read_record
 from eigassign.pipeline.run import Options, solve_case
@@ -75,18 +75,7 @@ def load(variant: Variant, options: CaseOptions) -> BuiltCase:
     return BuiltCase(checked(_written(variant.path), options.allow_outside, variant.values))
 
 
-def _written(path: str) -> Unchecked:
-    """The case file, parsed once as long as it stays the same."""
-    try:
-        status = os.stat(path)
-    except OSError:
-        return read(path)
-    return _parsed(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=4)
-def _parsed(path: str, _time: int, _size: int) -> Unchecked:
-    return read(path)
+_written = once(read, 4)  # case files, parsed
 
 
 # --- Running

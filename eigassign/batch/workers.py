@@ -47,20 +47,16 @@ def this_machine(jobs: int | None) -> Workers:
     """This process for one job, else a pool of processes; None is one for each core."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     slots = jobs or usable or 1
-    return Workers(slots, in_this_process if slots == 1 else process_pool)
+    return Workers(slots, process_pool if slots > 1 else lambda _: _AtOnce())
 
 
 class _AtOnce(Executor):
+    """Runs each task in this process as it is submitted."""
+
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
-
-
-@contextlib.contextmanager
-def in_this_process(_slots: int) -> Iterator[Executor]:
-    """An executor that runs each task in this process as it is submitted."""
-    yield _AtOnce()
 
 
 class _Pool(ProcessPoolExecutor):

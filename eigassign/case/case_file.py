@@ -59,7 +59,6 @@ from eigassign.case.rules.plausibility import (
 from eigassign.case.rules.properties import (
     below,
     coordinate_lists,
-    is_place,
     known_property,
     properties_of,
     property_at,
@@ -394,9 +393,8 @@ class CaseFile:
         """
         entries = {
             path: Parameter(parameter=path, min=value, max=value)
-            for path in properties_of(self)
-            if path not in self.loads and (places or not is_place(path))
-            if (value := self.value_at(path))
+            for path in properties_of(self, places)
+            if path not in self.loads and (value := self.value_at(path))
         }
         return replace(self, design=Design.model_construct(entries=FrozenDict(entries)))
 

@@ -77,10 +77,8 @@ def expand(case: Path, order: int | None, modes: tuple[int, ...], as_json: bool,
     """
     from eigassign.pipeline import run
 
-    def expanded(path: Path, options: Options) -> Outcome:
-        return run.expand_case(path, options, order=order, modes=modes or None)
-
-    return _finished(expanded, case, as_json, how)
+    work = partial(run.expand_case, order=order, modes=modes or None)
+    return _finished(work, case, as_json, how)
 
 
 @click.command(
@@ -121,11 +119,7 @@ def response(case: Path, y: str | None, as_json: bool, **how: Any) -> int:
         drawn["seen"] = {**drawn, **place(how["seen"], how["along"])}
     names = {"lowest": "from", "highest": "to", "teeth": "teeth", "harmonics": "harmonics"}
     drawn |= {key: how[name] for name, key in names.items() if how[name] is not None}
-
-    def responded(path: Path, options: Options) -> Outcome:
-        return run.respond_case(path, options, drawn, y)
-
-    return _finished(responded, case, as_json, how)
+    return _finished(partial(run.respond_case, drawn=drawn, y=y), case, as_json, how)
 
 
 def _finished(

@@ -51,7 +51,7 @@ def _rows(values: ArrayLike, width: int, name: str) -> Floats:
     return array.reshape(-1, width) if width else np.zeros((max(1, len(np.atleast_2d(array))), 0))
 
 
-# --- Modes, orders, counts and gaps
+# --- Modes, orders and counts
 
 
 def whole(value: object, name: str) -> int:
@@ -84,13 +84,6 @@ def mode_numbers(modes: Sequence[int]) -> tuple[int, ...]:
     if not given or min(given) < 1:
         raise UsageError("modes count from 1, the lowest elastic one; at least one is needed")
     return tuple(sorted(given))
-
-
-def relative_gap(value: object) -> float:
-    """A finite number of at least 0."""
-    if isinstance(value, int | float | np.number) and np.isfinite(value) and value >= 0.0:
-        return float(value)
-    raise UsageError(f"cluster_gap must be a number of at least 0, not {value!r}")
 
 
 # --- Chunks of samples, and few of many

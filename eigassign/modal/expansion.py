@@ -26,7 +26,7 @@ from eigassign.arrays import Floats, Ints
 from eigassign.brief import Brief, counted, cut, of_modes
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
+from eigassign.modal.arguments import mode_numbers, point, samples, whole_within
 from eigassign.modal.exact.solver import CLUSTER_GAP
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.recursion import (
@@ -198,7 +198,8 @@ def expand(
     order = whole_within(order, "order", 1, MAX_ORDER)
     if vector_order is not None:
         vector_order = whole_within(vector_order, "vector_order", 0, MAX_ORDER)
-    cluster_gap = relative_gap(cluster_gap)
+    if not (isinstance(cluster_gap, int | float | np.number) and 0.0 <= cluster_gap < np.inf):
+        raise UsageError(f"cluster_gap must be a number of at least 0, not {cluster_gap!r}")
     x0 = point(q0, y0, pencil.n_q, pencil.to_program.shape[1] - pencil.n_q)
     local = local_space(pencil, order, linear_in_y, space)
     half = vector_set(local.space, local.n_linear, vector_order)[0]
@@ -294,7 +295,7 @@ class NearestExpansion:
 
 
 Array = NDArray[Any]
-ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
+ALGORITHM = "expansion 4"  # raise it whenever the numbers an expansion is made of may change
 
 
 # --- Expansions: the clusters of each, one after the other

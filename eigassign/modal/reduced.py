@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,8 +67,8 @@ class ReducedModel:
     program: Program
     to_program: Floats
     shift: Floats
-    stiffness: SymmetricTerms  # of (k, k)
-    mass: SymmetricTerms  # of (k + f, k + f)
+    stiffness: Terms  # of (k, k)
+    mass: Terms  # of (k + f, k + f)
 
     def __repr__(self) -> str:
         return (
@@ -79,7 +80,7 @@ class ReducedModel:
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
-        return len(self.stiffness.place)
+        return int(self.stiffness.matrices.shape[1])
 
     @one_thread
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -93,7 +94,7 @@ class ReducedModel:
         parts = [
             np.linalg.eigvalsh(self._standard(theta[:, part]))[:, ::-1]
             for theta in map(self._theta, chunks(x, 1))
-            for part in chunks(np.arange(theta.shape[1]), self.mass.place.size)
+            for part in chunks(np.arange(theta.shape[1]), self.mass.matrices[0].size)
         ]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
@@ -108,41 +109,22 @@ class ReducedModel:
     def _standard(self, theta: Floats) -> Floats:
         """L⁻¹ M̂_c L⁻ᵀ (n, k, k) at θ (n_theta, n), its lower triangle."""
         E, F = slice(0, self.size), slice(self.size, None)
-        K, M = self.stiffness(theta), self.mass(theta)
-        M_c = condense_blocks(*(self.mass.block(M, *at) for at in ((E, E), (F, E), (F, F))))[1]
-        inverse = inverse_factor(self.stiffness.block(K, E, E))
+        M = self.mass(theta)
+        M_c = condense_blocks(M[:, E, E], M[:, F, E], M[:, F, F])[1]
+        inverse = inverse_factor(self.stiffness(theta))
         return np.asarray(inverse @ M_c @ np.swapaxes(inverse, 1, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class SymmetricTerms:
-    """Sums Σ θ_j A_j of small symmetric matrices from their lower triangles: half the work.
-
-    ``triangles`` (n_terms, k(k + 1)/2) are those of A_j; ``place`` (k, k) is where in them each
-    entry is.
-    """
+class Terms(NamedTuple):
+    """Sums Σ θ_j A_j of small ``matrices`` A_j (n_terms, k, k)."""
 
     terms: Ints  # indices j of θ
-    triangles: Floats
-    place: Ints
+    matrices: Floats
 
     def __call__(self, theta: Floats) -> Floats:
-        """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
-        return np.asarray(theta[self.terms].T @ self.triangles)
-
-    def block(self, triangles: Floats, rows: slice, columns: slice) -> Floats:
-        """Rows and columns of whole matrices, (n, …, …), from their triangles."""
-        place = self.place[rows, columns]
-        return triangles.take(place.ravel(), axis=1).reshape(len(triangles), *place.shape)
-
-
-def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
-    """Terms from whole matrices (n_terms, k, k), of which the lower triangle is read."""
-    k = matrices.shape[1]
-    i, j = np.tril_indices(k)
-    place = np.empty((k, k), dtype=np.intp)
-    place[i, j] = place[j, i] = np.arange(len(i))
-    return SymmetricTerms(terms, np.ascontiguousarray(matrices[:, i, j]), place)
+        """The sums (n, k, k) at θ (n_theta, n)."""
+        sums = theta[self.terms].T @ self.matrices.reshape(len(self.terms), -1)
+        return np.asarray(sums.reshape(-1, *self.matrices.shape[1:]))
 
 
 # --- The basis, and the pencil on it
@@ -180,8 +162,8 @@ def reduce(
         program=pencil.program,
         to_program=pencil.to_program,
         shift=pencil.shift,
-        stiffness=symmetric_terms(k_terms, stiffness[k_terms, :k, :k]),
-        mass=symmetric_terms(m_terms, mass[m_terms]),
+        stiffness=Terms(k_terms, np.ascontiguousarray(stiffness[k_terms, :k, :k])),
+        mass=Terms(m_terms, mass[m_terms]),
     )
 
 

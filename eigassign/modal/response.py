@@ -258,18 +258,11 @@ def modal_response(
     lost = np.einsum("nmm->nm", _seen(damping.loss, x, rest))
     whole = stiff + (beta**2 / lam[..., None]).sum(axis=1)
     eta = np.divide(lost, stiff, out=np.zeros_like(lost), where=stiff > NEAR * whole)
-    mu, X = _complex_modes(lam, _seen(damping.loss, x, phi))
+    # (Λ + iL) X = X diag(μ), by the inverse: its largest eigenvalues are those of the lowest modes
+    stiff_and_lossy = lam[..., None] * np.eye(lam.shape[1]) + 1j * _seen(damping.loss, x, phi)
+    nu, X = np.linalg.eig(np.linalg.inv(stiff_and_lossy))
     gamma = np.linalg.solve(X, beta)  # of modes that coincide X need not be orthogonal
-    return ModalResponse(*known, mu, gamma, rest / (1.0 + 1j * eta)[:, None], X)
-
-
-def _complex_modes(lam: Floats, L: Floats) -> tuple[Numbers, Numbers]:
-    """μ (n, r) and X (n, r, r) with (Λ + iL) X = X diag(μ); L (n, r, r).
-
-    Of the inverse, whose largest eigenvalues are those of the lowest modes.
-    """
-    nu, X = np.linalg.eig(np.linalg.inv(lam[..., None] * np.eye(lam.shape[1]) + 1j * L))
-    return 1.0 / nu, X
+    return ModalResponse(*known, 1.0 / nu, gamma, rest / (1.0 + 1j * eta)[:, None], X)
 
 
 def _modes_up_to(pencil: Pencil, theta: Floats, highest: float) -> tuple[Floats, Floats]:

@@ -27,7 +27,7 @@ __all__, __getattr__, __dir__ = face(
         "figures.paper": "draw render",
         "figures.run": "run_figures",
         "figures.screen": "screen_figure",
-        "reports.chart": "chart_figures chart_tables write_chart",
+        "reports.chart": "chart_tables write_chart",
         "reports.page": "page verdict_of write_figures write_run",
         "documents": "NUMBERS results_document to_json",
         "result_files": "sample_files",

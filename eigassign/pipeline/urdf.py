@@ -8,7 +8,6 @@ with the mass, centre and inertia of their ``inertial``.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +20,7 @@ from eigassign.arrays import Floats
 from eigassign.brief import LONGEST
 from eigassign.case.case_file import parse, to_yaml
 from eigassign.case.reader import listed, short
+from eigassign.case.rules.mechanism import reached
 from eigassign.errors import CaseError, StorageError, UsageError
 from eigassign.files import CASE, printable, read_bytes
 
@@ -331,7 +331,8 @@ def _require_tree(links: Collection[str], joints: Sequence[_Joint], count: int) 
     missing = {n for j in joints for n in (j.parent, j.child)} - set(links)
     _require_masters(joints)
     once = len(set(children)) == len(children) == len(links) - 1
-    if missing or not once or len(_beyond(*set(links) - set(children), joints=joints)) != count:
+    pairs = [(joint.parent, joint.child) for joint in joints]
+    if missing or not once or len(reached(next(iter(links)), pairs)) != count:
         loose = [n for n in links if n not in children][1:] or sorted(missing)
         which = f": see {', '.join(loose)}" if loose else ""
         raise ValueError(f"the joints do not connect all links to one tree{which}")
@@ -349,16 +350,6 @@ def _require_masters(joints: Sequence[_Joint]) -> None:
         wrong += [f"{name} mimics itself, by {over[name]}"] if at in over else []
     if wrong:
         raise ValueError("; ".join(f"joint {each}" for each in wrong))
-
-
-def _beyond(*links: str, joints: Sequence[_Joint]) -> list[str]:
-    """These links and all that they carry."""
-    found, below = list(links), defaultdict[str, list[str]](list)
-    for joint in joints:
-        below[joint.parent] += [joint.child] if joint.child != joint.parent else []
-    for name in found:  # which grows
-        found += below[name]
-    return found
 
 
 def _identifiers(names: Iterable[str], path: str | Path) -> dict[str, str]:

@@ -92,18 +92,6 @@ def compose(space: LowerSet, taylor: Floats, a: Floats) -> Floats:
     return result
 
 
-def reciprocal(space: LowerSet, a: Floats) -> Floats:
-    """1/a for stacks a (n, N): with a = a_0 (1 − d) the sum 1 + d (1 + d (1 + …)), d nilpotent."""
-    small = a / -a[:, :1]
-    small[:, 0] = 0.0
-    result = small.copy()
-    result[:, 0] = 1.0
-    for _ in range(space.order - 1):
-        result = multiply(space, result, small)
-        result[:, 0] += 1.0
-    return result / a[:, :1]
-
-
 def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
     """Derivatives of sin(a + quarters π/2) over k!, k = 0…p: shape (p + 1, n); 1 is the cosine.
 

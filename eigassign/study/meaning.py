@@ -136,7 +136,7 @@ def unreachable(
 def _words(scene: Scene, wanted: Requirement, k: int, reached: float | None, how: str) -> str:
     """The frequency that is ``reached`` at sample k of a target, and the one that was asked for."""
     asked = float(wanted.hz[k])
-    curve = wanted.curve_name if len(wanted.terms) == 1 else f"the {wanted.axis}"
+    curve = wanted.curve_name if len(wanted.terms) == 1 else "the distance of the modes"
     where = f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}"
     said = f"{where}: {asked:.4g} Hz was asked, "
     if clash := ", ".join(_contradicting(scene, wanted, k)):

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigassign.arrays import Floats
+from eigassign.arrays import Floats, Ints
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,
-    Ints,
     Requirement,
     Solved,
     Terms,

@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.arrays import Floats
+from eigassign.arrays import Floats, Ints
 from eigassign.assignment.program import LinearConstraint
 from eigassign.assignment.requirements.requirement import (
     EdgeRows,
     Edges,
     Frequencies,
-    Ints,
     Quantity,
     Requirement,
     Solved,

@@ -30,9 +30,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eigassign.arrays import Floats
+from eigassign.arrays import Bools, Floats, Ints
 from eigassign.assignment.program import LinearConstraint, frozen
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import AnyTarget, FollowedMode, NamedMode
@@ -53,12 +52,12 @@ class NeighbourPairs(NamedTuple):
     with the row's own value and slopes.
     """
 
-    row: NDArray[np.intp]  # (p,), of the residuals, then of the excesses
+    row: Ints  # (p,), of the residuals, then of the excesses
     other: Floats  # (p,), the row with the neighbour's frequency
     others: Floats  # (p, n_y), its slopes
     mixed: Floats  # (p, n_y)
     gap: Floats  # (p,), relative distance of both frequencies
-    larger: NDArray[np.bool_]  # (p,), whether the row is the larger eigenvalue
+    larger: Bools  # (p,), whether the row is the larger eigenvalue
 
     @classmethod
     def none(cls, n: int) -> NeighbourPairs:
@@ -70,13 +69,11 @@ class NeighbourPairs(NamedTuple):
         """The rows with slopes in units ``width`` of the design parameters ``free``."""
         return self._replace(others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
 
-    def chosen(self, mask: NDArray[np.bool_]) -> NeighbourPairs:
+    def chosen(self, mask: Bools) -> NeighbourPairs:
         """The pairs of a mask."""
         return NeighbourPairs._make(column[mask] for column in self)
 
-    def along(
-        self, own: Floats, slopes: Floats, d: Floats
-    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def along(self, own: Floats, slopes: Floats, d: Floats) -> tuple[Floats, Floats, Bools]:
         """The rows' eigenvalues (p,) at a change d, their slopes, and whether the mode has turned.
 
         ``own`` (p,) are the rows at d, with their ``slopes`` (p, n).
@@ -108,7 +105,6 @@ def joined(parts: Sequence[NeighbourPairs]) -> NeighbourPairs | None:
     return NeighbourPairs._make(map(np.concatenate, zip(*parts, strict=True)))
 
 
-Ints = NDArray[np.intp]
 Edges = tuple[Floats, Floats]
 # of a design y (n_y,): its value, or one at each sample, and the slopes ((n,) n_y)
 Quantity = Callable[[Floats], tuple[float | Floats, Floats]]
@@ -341,11 +337,6 @@ class Requirement(Brief):
         """The numbers of the modes ``followed``, all below 0."""
         each = {*self.modes, *(mode for mode, _ in self.mode_terms)}
         return tuple(sorted(number for number in each if number < 0))
-
-    @property
-    def axis(self) -> str:
-        """The quantity that its curve is."""
-        return "distance of the modes" if len(self.terms) > 1 else "frequency"
 
     @property
     def forbidden_hz(self) -> tuple[Floats | None, Floats | None]:

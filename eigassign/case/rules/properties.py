@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import cache, reduce
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
-from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown
+from eigassign.case.reader import Finding, KeyPath, listed, shown, suggestion, unknown, value_below
 from eigassign.case.schema.design import RESERVED, Choices, Design, Tolerance, column_names
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.links import RigidLink, SolidLink
@@ -132,17 +132,13 @@ def _numbers(case: Any, group: str, name: str) -> dict[str, Quantity]:
     return found
 
 
-def properties_of(case: Any) -> Iterator[str]:
-    """The paths of all numbers of a mechanism that can vary."""
+def properties_of(case: Any, places: bool) -> Iterator[str]:
+    """The paths of all numbers of a mechanism that can vary, or without ``places``: lengths too."""
     for group in _GROUPS:
+        fixed = () if places else ("length", "angle", *_VECTORS.get(group, ()))
         for name in _parts(case, group):
-            yield from (f"{group}.{name}.{key}" for key in _numbers(case, group, name))
-
-
-def is_place(path: str) -> bool:
-    """True where a property is a length, a place or an angle of the mechanism."""
-    group, _, key, *_ = (*path.split("."), "")
-    return key in ("length", "angle", *_VECTORS.get(group, ()))
+            keys = (k for k in _numbers(case, group, name) if k.partition(".")[0] not in fixed)
+            yield from (f"{group}.{name}.{key}" for key in keys)
 
 
 @cache
@@ -182,10 +178,8 @@ def value_at(case: Any, path: str) -> float:
 
 def below(part: Any, key: str) -> Any:
     """What stands below a part, a mapping of parts or a list; None where nothing does."""
-    if isinstance(part, Mapping):
-        return part.get(key)
-    if isinstance(part, tuple):
-        return part[int(key)] if key.isdecimal() and int(key) < len(part) else None
+    if isinstance(part, Mapping | tuple):
+        return value_below(part, int(key) if isinstance(part, tuple) and key.isdecimal() else key)
     return getattr(part, key, None)
 
 

@@ -7,7 +7,7 @@ How it moves, `mechanism.kinematics.joints` says.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -35,7 +35,6 @@ from eigassign.case.schema.parts import (
     ShareOrRange,
     ValueOr,
     Vector,
-    kinds,
     must,
     only_in,
     parallel,
@@ -193,7 +192,7 @@ Joint: TypeAlias = Annotated[
     | NutJoint,
     KindBy("type"),
 ]
-JOINTS: dict[str, type[JointBase]] = kinds(Joint)  # type: ignore[assignment]
+JOINTS: dict[str, type[JointBase]] = KindBy("type").kinds(get_args(Joint)[0])  # type: ignore[assignment]
 FREEDOMS = {kind: model.freedoms for kind, model in JOINTS.items()}
 RIDING = ("carriage", "nut")  # their base is a beam along which they move
 SLIDING = ("prismatic", "cylindrical", "screw", *RIDING)  # they move along their axis

@@ -34,7 +34,6 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
-from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from eigassign.case.reader import COMMA, listed, shown, suggestion, unknown, unspaced
@@ -93,7 +92,8 @@ class Part(BaseModel):
 
     @classmethod
     def _in_words(cls, error: Any) -> InitErrorDetails:
-        kind, (key, *below), known = error["type"], error["loc"] or ("",), keys_of(cls)
+        kind, (key, *below) = error["type"], error["loc"] or ("",)
+        known = {field.alias or name: field for name, field in cls.model_fields.items()}
         if kind == "at_key":
             kind = PydanticCustomError(kind, "{text}", error["ctx"])
         elif kind == "missing" and not below:
@@ -136,11 +136,6 @@ def needs_one_of(*groups: Sequence[str]) -> ConfigDict:
     """A ``model_config``: one of the groups of keys is needed, which a validator sees to."""
     options: list[Any] = [{"required": list(group)} for group in groups]
     return ConfigDict(json_schema_extra={"anyOf": options})
-
-
-def keys_of(model: type[Part]) -> dict[str, FieldInfo]:
-    """Fields of a model by the key a file gives them with."""
-    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def wrong(message: str, *keys: str | int) -> PydanticCustomError:
@@ -416,13 +411,6 @@ class KindBy:
             return known.index(kind)
 
         return Told(which).__get_pydantic_core_schema__(union, handler)
-
-
-def kinds(union: Any) -> dict[str, type[Part]]:
-    """Models of a union annotated with ``KindBy``, by the word that stands for each."""
-    models, by_key = get_args(union)
-    known: dict[str, type[Part]] = by_key.kinds(models)
-    return known
 
 
 LENGTH = quantity("length", above=0)

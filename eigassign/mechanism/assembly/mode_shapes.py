@@ -23,7 +23,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.elements.beam import Shear, fields
-from eigassign.mechanism.elements.links import LinkMesh, Strand, axes, element_motion
+from eigassign.mechanism.elements.links import LinkMesh, Strand, axes
 from eigassign.mechanism.kinematics.forward import LinkFrames, Placement
 from eigassign.mechanism.kinematics.joints import Objects
 from eigassign.mechanism.kinematics.loop_closure import reference
@@ -228,7 +228,9 @@ def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tupl
     n, count = len(h), max(1, -(-24 // len(h)))
     xi = np.arange(count) / count
     N = fields(np.tile(xi, (n, 1)), h[:, None], shear[:, None])[..., :3, :]  # (n, n_xi, 3, 12)
-    inner = np.einsum("exij,ejc->cexi", N, element_motion(motion, turn)) @ turn
+    turned = np.concatenate([turn @ motion[:, :3], turn @ motion[:, 3:]], axis=1)
+    both = np.concatenate([turned[:-1], turned[1:]], axis=1)  # of each element, (n, 12, count)
+    inner = np.einsum("exij,ejc->cexi", N, both) @ turn
     places = X[:-1, None] + xi[:, None] * step[:, None]
     ends = motion[-1, :3].T[:, None]
     flat = inner.reshape(len(inner), n * len(xi), 3)

@@ -141,29 +141,25 @@ def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
 
 
 def bending_shapes(
-    xi: RealOrComplex, phi: RealOrComplex, skew: RealOrComplex | float = 0.0
+    parts: tuple[Floats, ...], xi: RealOrComplex, phi: RealOrComplex, skew: RealOrComplex
 ) -> RealOrComplex:
-    """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with `Shear` Φ, Φ r, (…, 4).
+    """What bends per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with `Shear` Φ, Φ r, (…, 4).
+
+    `DEFLECTION`, whose products integrate to the consistent mass,
 
     (1+Φ) w = (1−3ξ²+2ξ³ + Φ(1−ξ)) w1 + (ξ−2ξ²+ξ³ + Φ(ξ−ξ²)/2) h θ1
             + (3ξ²−2ξ³ + Φξ) w2 + (−ξ²+ξ³ − Φ(ξ−ξ²)/2) h θ2
             + Φ r (ξ−3ξ²+2ξ³)/6 (h θ1 − h θ2),   θ = dw/dx less the shear angle
     (Przemieniecki, Theory of Matrix Structural Analysis, §11.7, for r = 0), cubic Hermite for
-    Φ = 0. These are the shapes whose products integrate to the consistent mass.
-    """
-    return _shapes(DEFLECTION, xi, phi, skew)
-
-
-def bending_slopes(
-    xi: RealOrComplex, phi: RealOrComplex, skew: RealOrComplex | float = 0.0
-) -> RealOrComplex:
-    """h × rotation of the section per (w1, h θ1, w2, h θ2) at ξ, of `bending_shapes`, (…, 4).
+    Φ = 0; and `ROTATION` of the section, whose products integrate to the rotary inertia,
 
     (1+Φ) h θ = −6(ξ−ξ²) w1 + (1−4ξ+3ξ² + Φ(1−ξ)) h θ1
               + 6(ξ−ξ²) w2 + (−2ξ+3ξ² + Φξ) h θ2 − Φ r (ξ−ξ²) (h θ1 − h θ2) .
-    These are the shapes whose products integrate to the rotary inertia.
     """
-    return _shapes(ROTATION, xi, phi, skew)
+    powers = np.stack([xi**k for k in range(parts[0].shape[1])], axis=-1)
+    plain, sheared, skewed = (powers @ part.T for part in parts)
+    whole = plain + sheared * np.asarray(phi)[..., None] + skewed * np.asarray(skew)[..., None]
+    return np.asarray(whole / (1.0 + phi)[..., None])
 
 
 def shares(bent: Shear) -> list[Scalar]:
@@ -178,7 +174,7 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
     """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
 
     xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2, 2): `Shear` of each plane. Stretch and twist are
-    linear, bending is that of `bending_shapes` and `bending_slopes`.
+    linear, bending is that of `bending_shapes`.
     """
     N = np.zeros((*xi.shape, 6, 12), dtype=np.result_type(xi, h, phi))
     for row in (0, 3):
@@ -187,23 +183,11 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
     for k, (w, slope, sign) in enumerate(PLANES):
         scale = np.stack([one, sign * h, one, sign * h], axis=-1)
         bent = phi[..., k, 0], phi[..., k, 1]
-        deflection = bending_shapes(xi, *bent) * scale
-        rotation = bending_slopes(xi, *bent) * scale * (sign / h)[..., None]
+        deflection = bending_shapes(DEFLECTION, xi, *bent) * scale
+        rotation = bending_shapes(ROTATION, xi, *bent) * scale * (sign / h)[..., None]
         for j, dof in enumerate((w, slope, w + 6, slope + 6)):
             N[..., w, dof], N[..., slope, dof] = deflection[..., j], rotation[..., j]
     return N
-
-
-def _shapes(
-    parts: tuple[Floats, Floats, Floats],
-    xi: RealOrComplex,
-    phi: RealOrComplex,
-    skew: RealOrComplex | float,
-) -> RealOrComplex:
-    powers = np.stack([xi**k for k in range(parts[0].shape[1])], axis=-1)
-    plain, sheared, skewed = (powers @ part.T for part in parts)
-    whole = plain + sheared * np.asarray(phi)[..., None] + skewed * np.asarray(skew)[..., None]
-    return np.asarray(whole / (1.0 + phi)[..., None])
 
 
 def _polynomial(
@@ -232,7 +216,7 @@ def _is_zero(x: Scalar) -> bool:
 
 # --- constant matrices: integrals of products of shapes
 
-# Coefficients of 1, ξ, ξ², … of `bending_shapes` and `bending_slopes`, times 1 + Φ: of 1, Φ and Φ r
+# Coefficients of 1, ξ, ξ², … of `bending_shapes`, times 1 + Φ: of 1, Φ and Φ r
 DEFLECTION = (
     np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]),
     np.array([[1.0, -1, 0, 0], [0, 0.5, -0.5, 0], [0, 1, 0, 0], [0, -0.5, 0.5, 0]]),

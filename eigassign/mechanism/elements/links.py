@@ -88,12 +88,6 @@ class Strand(NamedTuple):
         return np.asarray(np.kron(np.eye(count), self.axes), dtype=np.float64)  # type: ignore[arg-type]
 
 
-def element_motion(motion: Floats, axes: Floats) -> Floats:
-    """Motion (n, 12, count) of both nodes of each element from that of nodes (n + 1, 6, count)."""
-    turned = np.concatenate([axes @ motion[:, :3], axes @ motion[:, 3:]], axis=1)
-    return np.concatenate([turned[:-1], turned[1:]], axis=1)
-
-
 class LinkMesh(NamedTuple):
     """One link: ``nodes`` maps a name to the local dofs of that node (None: rigidly attached).
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.arrays import Floats
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import listed
 from eigassign.errors import MechanismError
@@ -45,7 +45,6 @@ from eigassign.mechanism.kinematics.parameters import (
 from eigassign.mechanism.solids.part import solid_part
 from eigassign.series.expression import Expression, Scalar
 
-Floats = NDArray[np.float64]
 STRAIN_FREE = 1e-6  # largest strain of rigid motion that passes for none
 ROUND_OFF = 1e-15  # of strains: what is less is said so
 LITTLE = 1e-5  # single precision left 1.2e-6 in a bar of 708 dofs

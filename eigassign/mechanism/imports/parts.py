@@ -28,22 +28,9 @@ from eigassign.case.units import DIMENSIONS, PLAIN
 from eigassign.errors import MechanismError, UsageError
 from eigassign.files import MATRIX, how_to_raise, raised, read_bytes, seen_from
 from eigassign.mechanism.imports import entries, programs
-from eigassign.mechanism.imports.entries import (
-    COMPLEX,
-    ENTRIES,
-    LABEL,
-    LARGEST,
-    LEAST,
-    Contents,
-    Ints,
-    Matrix,
-    UnfitError,
-    places_of,
-    require_few,
-)
 
 T = TypeVar("T")
-_READERS: tuple[Callable[[bytes], Contents | None], ...] = (
+_READERS: tuple[Callable[[bytes], entries.Contents | None], ...] = (
     programs.read_matrix_market,
     entries.read_numpy,
     entries.read_matlab,
@@ -57,29 +44,29 @@ _READERS: tuple[Callable[[bytes], Contents | None], ...] = (
 _KNOWN = "Nastran (DMIG, OP4, GRID), Abaqus, CalculiX, Ansys (Matrix Market), MATLAB or NumPy"
 
 
-def read_contents(file: Path, key: str) -> Contents | None:
+def read_contents(file: Path, key: str) -> entries.Contents | None:
     """What the file holds; None where it is of no kind that is told by its content.
 
     Raises MechanismError at ``key`` where it cannot be read.
     """
 
-    def contents() -> Contents | None:
+    def contents() -> entries.Contents | None:
         data = read_bytes(file, MATRIX)
-        if (lines := data.count(b"\n")) > raised(ENTRIES):  # readers make lists of lines
-            raise UnfitError(f"has {lines} lines; {how_to_raise(lines, ENTRIES)}")
+        if (lines := data.count(b"\n")) > raised(entries.ENTRIES):  # readers make lists of lines
+            raise entries.UnfitError(f"has {lines} lines; {how_to_raise(lines, entries.ENTRIES)}")
         return next(filter(None, (read(data) for read in _READERS)), None)
 
     return guarded(contents, file, key)
 
 
 def matrix_of(
-    contents: Contents | None,
+    contents: entries.Contents | None,
     file: Path,
     key: str,
     name: str = "",
     kind: str = "",
     alone: bool = True,
-) -> Matrix:
+) -> entries.Matrix:
     """The matrix of that ``name``, or else of a ``kind``: called K or M, or else beginning so.
 
     ``alone``: one that is alone in its file may have any name but one of the other kind.
@@ -100,7 +87,7 @@ def matrix_of(
     if len(named) != 1:
         raise MechanismError(key, f"{file.name} {_missing(found, name, kind, len(named), alone)}")
 
-    def matrix() -> Matrix:
+    def matrix() -> entries.Matrix:
         read = found[named[0]]()
         return read._replace(matrix=_real(read.matrix))
 
@@ -144,7 +131,7 @@ def guarded(
     except OSError as error:
         reason = error.strerror or error
         raise MechanismError(key, f"cannot read {file.name}: {reason}") from error
-    except (UnfitError, UsageError) as error:
+    except (entries.UnfitError, UsageError) as error:
         raise MechanismError(key, f"{file.name} {error}") from error
     except MemoryError as error:
         raise MechanismError(key, f"cannot read {file.name}: too large for this memory") from error
@@ -157,21 +144,21 @@ def guarded(
 def _real(matrix: Any) -> sparse.csr_array:
     """``matrix`` in double precision."""
     if matrix.dtype.kind == "c":
-        raise UnfitError(COMPLEX)
+        raise entries.UnfitError(entries.COMPLEX)
     if matrix.dtype.kind not in "fiu":
-        raise UnfitError(f"holds {matrix.dtype}, expected real numbers")
+        raise entries.UnfitError(f"holds {matrix.dtype}, expected real numbers")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise UnfitError(f"is not a square matrix: {matrix.shape}")
+        raise entries.UnfitError(f"is not a square matrix: {matrix.shape}")
     if not matrix.shape[0]:
-        raise UnfitError("is empty: 0 rows")
-    require_few(matrix.shape[0], matrix.size)
+        raise entries.UnfitError("is empty: 0 rows")
+    entries.require_few(matrix.shape[0], matrix.size)
     with np.errstate(over="ignore"):
         out = sparse.csr_array(matrix, dtype=np.float64)
     if not np.isfinite(out.data).all():
-        raise UnfitError("has entries that are not finite")
-    if np.abs(out.data).max(initial=0.0) > LARGEST:
-        raise UnfitError(f"has entries beyond {LARGEST:g}")
-    out.data = np.where(np.abs(out.data) < LEAST, 0.0, out.data)
+        raise entries.UnfitError("has entries that are not finite")
+    if np.abs(out.data).max(initial=0.0) > entries.LARGEST:
+        raise entries.UnfitError(f"has entries beyond {entries.LARGEST:g}")
+    out.data = np.where(np.abs(out.data) < entries.LEAST, 0.0, out.data)
     return out
 
 
@@ -270,7 +257,10 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
         places,
         len(held),
         tuple(
-            str(k) if labels is None else f"{labels[k] // LABEL}.{labels[k] % LABEL}" for k in null
+            str(k)
+            if labels is None
+            else f"{labels[k] // entries.LABEL}.{labels[k] % entries.LABEL}"
+            for k in null
         ),
     )
 
@@ -278,7 +268,7 @@ def _read(link: Any, space: str, path: str, digests: tuple[str | None, ...]) -> 
 # --- Files
 
 
-def _nodes(link: Any, key: str) -> list[Contents]:
+def _nodes(link: Any, key: str) -> list[entries.Contents]:
     """What the files about nodes hold; a CSV of another kind than all others."""
     found = []
     for file in map(Path, node_files(link)):
@@ -287,7 +277,7 @@ def _nodes(link: Any, key: str) -> list[Contents]:
     return found
 
 
-def _table(file: Path, key: str, length: float) -> Contents:
+def _table(file: Path, key: str, length: float) -> entries.Contents:
     """Places from a CSV of id, x, y, z; without units in its header in those of the matrices."""
     metre = DIMENSIONS["length"]
     axes = [CsvColumn(axis, (PLAIN, metre), optional=axis == "z") for axis in "xyz"]
@@ -297,12 +287,14 @@ def _table(file: Path, key: str, length: float) -> Contents:
     points = np.array([x, y, table.numbers.get("z", np.zeros(len(x)))]).T * own / length
     if any(node % 1 for node in ids):
         raise MechanismError(key, f"{file.name}: column id: expected whole numbers")
-    return Contents(places=places_of((int(n), x) for n, x in zip(ids, points, strict=True)))
+    return entries.Contents(
+        places=entries.places_of((int(n), x) for n, x in zip(ids, points, strict=True))
+    )
 
 
 def _matrices(
-    link: Any, path: str, contents: Sequence[Contents]
-) -> tuple[sparse.csr_array, sparse.csr_array, Ints | None, list[Contents]]:
+    link: Any, path: str, contents: Sequence[entries.Contents]
+) -> tuple[sparse.csr_array, sparse.csr_array, entries.Ints | None, list[entries.Contents]]:
     """K and M with their rows in one order, the labels of these, and all that their files hold."""
     keys = matrix_keys(link)
     parts = [split_variable(getattr(link, key)) for key in keys]
@@ -332,18 +324,18 @@ def _matrices(
     return K.matrix, M.matrix, labels, [each for each in held.values() if each]
 
 
-def _spread(A: Matrix, rows: Ints, n: int) -> Matrix:
+def _spread(A: entries.Matrix, rows: entries.Ints, n: int) -> entries.Matrix:
     """``A`` among ``n`` rows."""
     matrix = A.matrix.tocoo()
     at = (rows[matrix.row], rows[matrix.col])
-    return Matrix(sparse.coo_array((matrix.data, at), shape=(n, n)).tocsr())
+    return entries.Matrix(sparse.coo_array((matrix.data, at), shape=(n, n)).tocsr())
 
 
 # --- Nodes
 
 
 def _places(
-    link: Any, path: str, contents: Sequence[Contents], length: float
+    link: Any, path: str, contents: Sequence[entries.Contents], length: float
 ) -> dict[str, tuple[float, ...]]:
     """The place of each node, as the case or a file has it."""
     if all(node.position is not None for node in link.nodes.values()):
@@ -373,7 +365,7 @@ def _places(
 
 
 def _rows(
-    labels: Ints | None, node: Any, wanted: Sequence[int], key: str
+    labels: entries.Ints | None, node: Any, wanted: Sequence[int], key: str
 ) -> tuple[NDArray[np.intp], list[int]]:
     """The rows of the ``wanted`` freedoms of a node, and those of its others."""
     if labels is None:
@@ -383,12 +375,15 @@ def _rows(
         )
         raise MechanismError(key, message)
     node, turning = node if isinstance(node, tuple) else (node, None)
-    own = {int(labels[k] % LABEL): int(k) for k in np.flatnonzero(labels // LABEL == node)}
+    own = {
+        int(labels[k] % entries.LABEL): int(k)
+        for k in np.flatnonzero(labels // entries.LABEL == node)
+    }
     if turning is not None:
-        at = np.flatnonzero(labels // LABEL == turning)
-        own |= {3 + int(labels[k] % LABEL): int(k) for k in at}
+        at = np.flatnonzero(labels // entries.LABEL == turning)
+        own |= {3 + int(labels[k] % entries.LABEL): int(k) for k in at}
     if not own:
-        nodes = np.unique(labels // LABEL)
+        nodes = np.unique(labels // entries.LABEL)
         nodes = nodes[nodes > 0]
         last = nodes.max(initial=0)
         message = (

@@ -164,9 +164,9 @@ def joint_motion(joint: Any, values: Sequence[Scalar]) -> JointMotion:
             turn = 2.0 * math.pi / joint.lead
             return JointMotion(rotation(X, values[0] * turn), none, _columns((X, turn * X)))
         case "universal":
-            return _universal(joint, values)
+            return _successive([unit(axis, None) for axis in joint.axes], values)
         case "spherical":
-            return _spherical(values)
+            return _successive([X, Y, Z], values)
         case "fixed":
             return JointMotion(_eye(), none, np.zeros((6, 0), dtype=object))
     raise NotImplementedError(f"no motion is defined for joints of type {joint.type!r}")
@@ -182,23 +182,13 @@ def turned(motion: JointMotion) -> JointMotion:
     return JointMotion(back, lever, multiply(carried(back, lever), motion.freedoms) * -1.0)
 
 
-def _universal(joint: Any, values: Sequence[Scalar]) -> JointMotion:
-    """Rot(a, c1) Rot(b, c2): ω = Rot(b, c2)ᵀ a ċ1 + b ċ2."""
-    a, b = (unit(axis, None) for axis in joint.axes)
-    first, second = rotation(a, values[0]), rotation(b, values[1])
-    A = np.zeros((6, 2), dtype=object)
-    A[3:, 0], A[3:, 1] = multiply(second.T, a), b
-    return JointMotion(multiply(first, second), np.zeros(3, dtype=object), A)
-
-
-def _spherical(values: Sequence[Scalar]) -> JointMotion:
-    """Rx(c1) Ry(c2) Rz(c3): successive rotations about the follower's own axes."""
-    x, y, z = (rotation(axis, c) for axis, c in zip((X, Y, Z), values, strict=True))
-    A = np.zeros((6, 3), dtype=object)
-    A[3:, 0] = multiply(multiply(y, z).T, X)
-    A[3:, 1] = multiply(z.T, Y)
-    A[3:, 2] = Z
-    return JointMotion(multiply(x, multiply(y, z)), np.zeros(3, dtype=object), A)
+def _successive(axes: Sequence[Floats], values: Sequence[Scalar]) -> JointMotion:
+    """R = R_1 R_2 …, R_k = Rot(a_k, c_k): ω = Σ (R_{k+1} R_{k+2} …)ᵀ a_k ċ_k."""
+    R, A = _eye(), np.zeros((6, len(axes)), dtype=object)
+    for k, axis in reversed([*enumerate(axes)]):
+        A[3:, k] = multiply(R.T, axis)
+        R = multiply(rotation(axis, values[k]), R)
+    return JointMotion(R, np.zeros(3, dtype=object), A)
 
 
 def sliding_axis(joint: Any) -> Floats:

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from eigassign.arrays import Bools, Floats, Ints
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.series.algebra import matrix_product, multiply, power_taylor, reciprocal
+from eigassign.series.algebra import Truncated, matrix_product, multiply, power_taylor
 from eigassign.series.multi_index import LowerSet, first_of_each
 
 
@@ -42,7 +42,8 @@ def eigenvalue_series(
     """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) over the set ``half``."""
     numerator, denominator = quadratics(pencil, theta, space, half, vectors)
     if len(numerator) == 1:
-        return multiply(space, numerator[0], reciprocal(space, denominator[0]))[:, None]
+        inverse = Truncated(space).power(denominator[0], np.array([-1.0]))
+        return multiply(space, numerator[0], inverse)[:, None]
     root = inverse_root(space, denominator)
     return matrix_product(space, root, matrix_product(space, numerator, root))
 
@@ -117,22 +118,19 @@ def quadratics(
     plan = _plan(space, half, stored.tobytes())
     constant = project_at(pencil, theta[:, :1], rows)
     out = np.zeros((2, r, r, len(space)))
-    for i, j in _lower(r):
+    lower = [(i, j) for i in range(r) for j in range(i + 1)]
+    for i, j in lower:
         out[:, i, j, plan.constant.into] = _meet(constant, plan.constant, i, j, r)
     if len(stored):
         factors, varying = theta.T[stored], np.flatnonzero(present.any(axis=1))
         for part in project_terms(pencil, rows[: plan.low * r], rows, varying):
-            for i, j in _lower(r):
+            for i, j in lower:
                 met = _weighted(factors[:, part.terms], part.values, plan.varying, i, j, r)
                 sums = met[:, plan.left, plan.right]
                 out[part.matrices, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
-    for i, j in _lower(r):
+    for i, j in lower:
         out[:, j, i] = out[:, i, j]
     return out[0], out[1]
-
-
-def _lower(r: int) -> list[tuple[int, int]]:
-    return [(i, j) for i in range(r) for j in range(i + 1)]
 
 
 def _weighted(factors: Floats, projected: Floats, p: _Products, i: int, j: int, r: int) -> Floats:

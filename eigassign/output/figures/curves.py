@@ -224,7 +224,7 @@ def _distance(target: TargetStudy, time_s: Floats) -> Panel:
         Curve(target.initial_hz, _BEFORE, x=x),
         Curve(target.exact_hz, _AFTER, x=x),
     )
-    return Panel(f"{asked.axis} [Hz]", marks, 1.4)
+    return Panel("distance of the modes [Hz]", marks, 1.4)
 
 
 def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:

@@ -14,9 +14,9 @@ from functools import cached_property
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from eigassign.arrays import Floats
+
 Dash = str  # solid | dashed | dotted | dash-dotted | fine
 DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted", "dash-dotted")
 

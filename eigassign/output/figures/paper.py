@@ -17,19 +17,6 @@ import numpy as np
 
 from eigassign.arrays import Floats
 from eigassign.output.figures import graph
-from eigassign.output.figures.graph import (
-    BLACK,
-    GREY,
-    Curve,
-    FigurePlan,
-    Graph,
-    Heat,
-    Look,
-    Panel,
-    Rule,
-    Shade,
-    short,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,10 +32,10 @@ _DASHES: dict[str, Any] = {
 }
 STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
-    "axes.edgecolor": GREY,
+    "axes.edgecolor": graph.GREY,
     "axes.formatter.useoffset": False,  # a number on an axis is the number itself
     "axes.grid": True,
-    "axes.labelcolor": BLACK,
+    "axes.labelcolor": graph.BLACK,
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.xmargin": 0.0,
@@ -66,12 +53,12 @@ STYLE: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "patch.linewidth": 0.8,
     "svg.hashsalt": "eigassign",  # else the names inside an SVG are random
-    "text.color": BLACK,
+    "text.color": graph.BLACK,
     "text.parse_math": False,  # names of the user's may hold any character
-    "xtick.color": GREY,
-    "xtick.labelcolor": BLACK,
-    "ytick.color": GREY,
-    "ytick.labelcolor": BLACK,
+    "xtick.color": graph.GREY,
+    "xtick.labelcolor": graph.BLACK,
+    "ytick.color": graph.GREY,
+    "ytick.labelcolor": graph.BLACK,
 }
 # the date, and who wrote the file, in the words of each format
 _METADATA: dict[str, dict[str, str | None]] = {
@@ -81,7 +68,9 @@ _METADATA: dict[str, dict[str, str | None]] = {
 }
 
 
-def render(plans: Sequence[FigurePlan], formats: Sequence[str] = FORMATS[:1]) -> dict[str, bytes]:
+def render(
+    plans: Sequence[graph.FigurePlan], formats: Sequence[str] = FORMATS[:1]
+) -> dict[str, bytes]:
     """Files of each figure in each format of `FORMATS` asked for, by name."""
     if not plans or not formats:
         return {}
@@ -90,7 +79,7 @@ def render(plans: Sequence[FigurePlan], formats: Sequence[str] = FORMATS[:1]) ->
         return {f"{name}.{kind}": encoded(one, kind) for name, one in drawn for kind in formats}
 
 
-def draw(plan: FigurePlan) -> Figure:
+def draw(plan: graph.FigurePlan) -> Figure:
     """The figure of a plan, in `STYLE`."""
     with applied():
         return _graph(plan.shows)
@@ -123,7 +112,7 @@ BOTTOM, GAP = 0.55, 0.15  # inches below the panels, and between them
 ROW, LETTER = 0.18, 0.075  # inches of a line of the legend, and of a letter
 
 
-def _graph(shown: Graph) -> Figure:
+def _graph(shown: graph.Graph) -> Figure:
     """Placed in inches: matplotlib's own layouts measure all letters twice, a third of the time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -139,7 +128,7 @@ def _graph(shown: Graph) -> Figure:
     figure = Figure((graph.WIDTH, tall))
     FigureCanvasAgg(figure)
     place = {"x": 0.1 / graph.WIDTH, "y": 1.0 - 0.1 / tall, "ha": "left", "va": "top"}
-    figure.suptitle(short(shown.title, 88), **place)  # more letters seldom fit
+    figure.suptitle(graph.short(shown.title, 88), **place)  # more letters seldom fit
     panels = _placed(figure, shown, tall - above)
     if shown.x_limits is not None:
         panels[0].set_xlim(shown.x_limits)
@@ -164,10 +153,10 @@ def _graph(shown: Graph) -> Figure:
     return figure
 
 
-def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
+def _placed(figure: Figure, shown: graph.Graph, top: float) -> list[Axes]:
     """Axes one below the other from ``top`` inches, with room for names at their sides."""
     width, tall = figure.get_size_inches()
-    names = [short(name) for panel in shown.panels for name in panel.names]
+    names = [graph.short(name) for panel in shown.panels for name in panel.names]
     ends = [c.end for panel in shown.panels for c in panel.curves if not shown.sheet]
     left = max(graph.LEFT, 0.2 + LETTER * max(map(len, names), default=0))
     wide = width - left - graph.RIGHT - LETTER * max(map(len, ends), default=0)
@@ -190,28 +179,28 @@ def _placed(figure: Figure, shown: Graph, top: float) -> list[Axes]:
     return found
 
 
-def _ordinate(axes: Axes, panel: Panel) -> None:
+def _ordinate(axes: Axes, panel: graph.Panel) -> None:
     axes.set_ylabel(panel.label)
     if panel.logarithmic:
         _logarithmic(axes, "y", panel.limits, cut=panel.cut)
         return
     axes.set_ylim(panel.limits)
     if panel.names:
-        axes.set_yticks(-np.arange(len(panel.names)), [short(name) for name in panel.names])
+        axes.set_yticks(-np.arange(len(panel.names)), [graph.short(name) for name in panel.names])
     axes.yaxis.set_offset_position("right")  # a power of ten, away from the legend
 
 
-def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[Any]:
+def _drawn(axes: Axes, panel: graph.Panel, shown: graph.Graph) -> list[Any]:
     """Draw all marks; the entries of the legend."""
     from matplotlib.lines import Line2D
 
     entries = [Line2D([], [], **_line(look), label=name) for name, look in panel.key]
     for at, mark in enumerate(panel.marks):
-        if isinstance(mark, Curve):
+        if isinstance(mark, graph.Curve):
             handle = _curve(axes, panel, mark, shown, 2.0 + 1e-3 * at)
-        elif isinstance(mark, Shade):
+        elif isinstance(mark, graph.Shade):
             handle = _shade(axes, panel, mark, shown.x)
-        elif isinstance(mark, Heat):
+        elif isinstance(mark, graph.Heat):
             drawn = axes.pcolormesh(shown.x, mark.y, mark.z, shading="nearest", rasterized=True)
             axes.figure.colorbar(drawn, ax=axes, label=mark.key, pad=0.02)
         else:
@@ -226,7 +215,7 @@ def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[Any]:
     return entries
 
 
-def _line(look: Look) -> dict[str, Any]:
+def _line(look: graph.Look) -> dict[str, Any]:
     """The look in matplotlib's words."""
     return {
         "color": look.colour,
@@ -239,7 +228,9 @@ def _line(look: Look) -> dict[str, Any]:
     }
 
 
-def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -> Any:
+def _curve(
+    axes: Axes, panel: graph.Panel, curve: graph.Curve, shown: graph.Graph, above: float
+) -> Any:
     """A single point of a line is a dot."""
     at, look = shown.x if curve.x is None else curve.x, _line(curve.look)
     if at.size == 1 and not curve.look.marker:
@@ -252,26 +243,26 @@ def _curve(axes: Axes, panel: Panel, curve: Curve, shown: Graph, above: float) -
     if shown.sheet and curve.end:
         axes.annotate(curve.end, (at[-1], curve.y[-1]), (3.0, 0.0), textcoords="offset points")
     return axes.plot(
-        at, panel.shown(curve), **look, label=short(curve.label, 60), zorder=above,
+        at, panel.shown(curve), **look, label=graph.short(curve.label, 60), zorder=above,
         clip_on=(panel.within is not None or not curve.look.marker) and not shown.sheet,
     )[0]  # fmt: skip
 
 
-def _shade(axes: Axes, panel: Panel, shade: Shade, x: Floats) -> Any:
+def _shade(axes: Axes, panel: graph.Panel, shade: graph.Shade, x: Floats) -> Any:
     x = x if shade.x is None else shade.x
     low, high = panel.edges(shade, x)
     return axes.fill_between(
         x, low, high, color=shade.colour, alpha=shade.opacity, linewidth=0.0,
-        label=short(shade.label, 60),
+        label=graph.short(shade.label, 60),
     )  # fmt: skip
 
 
-def _rule(axes: Axes, rule: Rule) -> Any:
+def _rule(axes: Axes, rule: graph.Rule) -> Any:
     look = {key: value for key, value in _line(rule.look).items() if not key.startswith("marker")}
     line = (axes.axvline if rule.upright else axes.axhline)(rule.at, **look, label=rule.label)
     if rule.note:
         axes.annotate(
-            short(rule.note, 60), (1.0, rule.at), (-4.0, 2.0), textcoords="offset points",
+            graph.short(rule.note, 60), (1.0, rule.at), (-4.0, 2.0), textcoords="offset points",
             ha="right", va="bottom", xycoords=("axes fraction", "data"), size=8.0,
         )  # fmt: skip
     return line

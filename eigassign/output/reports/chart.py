@@ -31,13 +31,6 @@ SECTIONS = {"fails": "What fails, and what serves instead", "write": "What to wr
             "reach": "How far each method goes", "scenes": "Scenes × methods"}  # fmt: skip
 
 
-def chart_figures(made: Chart | Matrix) -> tuple[FigurePlan, ...]:
-    """Error against time; where something varies, against the size of the box; none of several."""
-    if isinstance(made, Matrix):
-        return ()
-    return (_plane(made), *((_boxes(made),) if made.boxes else ()))
-
-
 def _figure(
     name: str, heading: str, caption: str, label: str, panels: Sequence[Panel], section: str
 ) -> FigurePlan:
@@ -172,7 +165,9 @@ def write_chart(
     """
     name, tone = type(made).__name__.lower(), "fair" if made.findings else "good"
     data = f"{dumps(results_document(made, may_lack=True))}\n".encode()
-    numbers, plans = (f"{name}.json", data), chart_figures(made)
+    numbers, plans = (f"{name}.json", data), list[FigurePlan]()
+    if isinstance(made, Chart):
+        plans = [_plane(made), *([_boxes(made)] if made.boxes else [])]
     report.write_page(
         made, chart_tables(made), plans, folder, formats, kind, numbers,
         line=made.headline, tone=tone, headings=SECTIONS,

@@ -280,25 +280,15 @@ def page(
     )
 
 
-@dataclass(frozen=True)
-class Section:
-    """A part of a page."""
-
-    key: str
-    heading: str
-    tables: tuple[Table, ...]
-    figures: tuple[Shown, ...]
-
-
 def _sections(
     tables: Sequence[Table], figures: Sequence[Shown], headings: Mapping[str, str]
-) -> Iterator[Section]:
+) -> Iterator[dict[str, Any]]:
     """The sections that there is something in; what is in none of them is the appendix's."""
     for key, heading in {**headings, "appendix": "Appendix"}.items():
         own = tuple(table for table in tables if table.section == key)
         drawn = tuple(one for one in figures if one.plan.section == key)
         if own or drawn:
-            yield Section(key, heading, own, drawn)
+            yield {"key": key, "heading": heading, "tables": own, "figures": drawn}
 
 
 @cache

@@ -135,11 +135,6 @@ def is_untouched(folder: Path) -> bool:
     return is_whole(folder, record)
 
 
-def relative_path(path: Path, folder: Path) -> str:
-    """`seen_from`, links of ``path`` followed."""
-    return seen_from(folder, os.path.realpath(path))
-
-
 def _contents(folder: Path) -> set[str]:
     """Paths of all files, links and empty folders below ``folder``."""
     found = set()
@@ -173,7 +168,7 @@ def run_folder(
     (checked on entry already) or cannot be written.
     """
     target = Path(os.path.realpath(target))
-    run = RunOf(relative_path(case_path, target), key)
+    run = RunOf(seen_from(target, os.path.realpath(case_path)), key)
     with _storage_errors(target):
         settle_killed(target.parent)
         require_replaceable(target, run, force=force, case_path=case_path)
