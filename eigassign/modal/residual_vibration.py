@@ -2,24 +2,27 @@
 
 The drives are held by their stiffness or locked; x = [u; deflections of held drives] obeys
 
-    M(q) ẍ + C ẋ + K(q) x = −f(q, q̇, q̈),      C = M Φ diag(2ζω) ΦᵀM,
+    M(q) ẍ + (C + D) ẋ + K(q) x = −f(q, q̇, q̈),      D = M Φ diag(2ζω) ΦᵀM,
 
-f being the forces of inertia of the rigid motion (`mechanism.assembly.dynamics.inertia_forces`),
-Φ and ω the modes of the pose and ζ as the case states it, of loss factors φᵀK_lossφ/2λ. Velocity
-terms of the vibration itself are left out. Nothing vibrates before the motion; where q̇ jumps,
-M Δẋ = −f(q, 0, Δq̇).
+f being the forces of inertia of the rigid motion (`mechanism.assembly.dynamics.inertia_forces`), C
+Ṁ and the gyroscopic terms (`velocity_terms`), by which a vibration keeps its momentum as the pose
+changes, Φ and ω the modes of the pose and ζ as the case states it, of loss factors φᵀK_lossφ/2λ.
+K_v is left out, which without what the forces stress is wrong. Nothing vibrates before the motion;
+where q̇ jumps, M Δẋ = −f(q, 0, Δq̇).
 
 One basis V for the whole path, modes of some poses and what f does at rest at others, makes of it
 few equations. In τ = t/T, dots being derivatives in τ, f = f_0(τ)/T², so that one preparation
 serves all durations T of the same path and law. What f does at rest is apart,
 
-    x = z − w/T²,   w = K_r⁻¹ f_0,      M_r z̈ + T C_r ż + T² K_r z = (M_r ẅ + T C_r ẇ)/T²,
+    x = z − w/T²,   w = K_r⁻¹ f_0,
+    M_r z̈ + (C_r + T D_r) ż + T² K_r z = (M_r ẅ + (C_r + T D_r) ẇ)/T²,
 
 w by splines between the breaks of the motion. z is in the p slowest modes of each pose, others
 follow at rest: in steps that are long beside their periods, each step would ring them. Over a step
 of τ the pose rests, as it is in its middle, the modes z = Φ η part, and each is solved exactly. The
 next step takes over η and η̇: of all modes by R = Φ₊ᵀ M₊ Φ = exp(hA), of slow ones s beside fast
-ones f by exp(hA_ss) = R_ss − R_sf R_fs/2. That errs by the square of the step.
+ones f by exp(hA_ss) = R_ss − R_sf R_fs/2. At both ends of a step C changes η̇ by exp(−h ΦᵀC_rΦ/2).
+That errs by the square of the step.
 
 After the stop the pose rests, so that each mode vibrates freely, for good, with Z_i from η and η̇:
 
@@ -36,8 +39,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
+from scipy.linalg import expm
 
 from eigassign.mechanism.assembly.dynamics.inertia_forces import InertiaForces, inertia_forces
+from eigassign.mechanism.assembly.dynamics.velocity_terms import VelocityTerms, velocity_terms
 from eigassign.mechanism.forces import Forces
 from eigassign.mechanism.trajectory.trajectory import Trajectory
 from eigassign.modal.exact.dense import inverse_factor
@@ -53,6 +58,7 @@ Complex = NDArray[np.complex128]
 BESIDE = 1e-9  # of the duration: a break is looked at this much before and behind it
 SAME = 1e-9  # of the largest: what a vector of the basis has that no other has, squared
 LEAST_STEPS = 4  # between breaks, of a spline
+LEAST_TERMS = 4  # instants of C between breaks
 JUMP = 1e-6  # of the largest q̇: less is no blow
 PERIODS = 20  # of the lowest mode that are looked at
 PER_PERIOD = 40  # instants in one of the highest
@@ -72,7 +78,7 @@ class Sizes(NamedTuple):
     modes: int = 4  # of each pose in the basis, and at most of those that are followed
     span: float = 10.0  # times the lowest frequency: modes beyond it follow at rest
     poses: int = 3
-    loads: int = 9  # instants of f at rest
+    loads: int = 9  # instants of f at rest, and of C
     steps: int = 128
 
 
@@ -87,6 +93,7 @@ class Move:
     model: Model
     trajectory: Trajectory  # from rest to rest
     inertia: InertiaForces
+    terms: VelocityTerms
     tips: Forces
     groups: tuple[slice, ...]  # of the forces, of each node
     damping: Damping
@@ -108,17 +115,26 @@ class Move:
         blows = np.zeros((n, V.shape[1]))
         blows[blown] = np.linalg.solve(M[n:][blown], push[..., None])[..., 0]
         still, steps = self._at_rest(own, edges, blown, V, K[n:])
+        h, C = np.diff(edges)[:, None, None], self._velocities(own, edges, blown, V, sizes.loads)
+        half = np.tile(np.eye(phi.shape[2]), (n, 1, 1))  # over half a step; none after the stop
+        C = np.swapaxes(phi[:-1], 1, 2) @ C
+        half[:-1] = expm(-0.5 * h * (C @ phi[:-1]))
+        force = np.einsum("nrs,nks->nkr", inverse[:-1], still[:, 1:])
+        rates = np.stack([still[:, 1], still[:, 1] + 0.5 * h[:, 0] * still[:, 2:].sum(axis=1)], 1)
+        force[:, 1:] += np.einsum("nrs,nks->nkr", C, rates)
+        steps = np.einsum("nrs,nks->nkr", inverse, steps)
+        steps[:, 1] = np.einsum("nrs,ns->nr", half, steps[:, 1])
         return ReducedMove(
             groups=self.groups,
             edges=edges,
             omega=omega,
             zeta=self._ratios(x[:n], V, phi, omega),
             phi=phi,
-            turn=turn,
+            turn=np.stack([turn, half[1:] @ turn @ half[:-1]], axis=1),
             still=still,
-            force=np.einsum("nrs,nks->nkr", inverse[:-1], still[:, 1:]),
-            steps=np.einsum("nrs,nks->nkr", inverse, steps),
-            blows=np.einsum("nrs,ns->nr", inverse, blows),
+            force=force,
+            steps=steps,
+            blows=np.einsum("nrs,nst,nt->nr", half, inverse, blows),
             tip=self._tips(x[n:]) @ V,
         )
 
@@ -142,6 +158,18 @@ class Move:
             steps[first] += w[0], rate[0]
             steps[last] -= w[-1], rate[-1]
         return still, steps
+
+    def _velocities(self, y: Floats, edges: Floats, breaks: Ints, V: Floats, count: int) -> Floats:
+        """C_r in the middle of each step (n, r, r), by splines between breaks."""
+        found = []
+        for first, last in pairwise(breaks.tolist()):
+            start, end = edges[first] + BESIDE, edges[last] - BESIDE
+            tau = np.linspace(start, end, max(round((end - start) * count), LEAST_TERMS) + 1)
+            each = zip(*self._moving(y, tau), strict=True)
+            C = [V.T @ (self.terms.at(q, y, rate, push)[0] @ V) for q, rate, push in each]
+            own = edges[first : last + 1]
+            found.append(CubicSpline(tau, C)(0.5 * (own[:-1] + own[1:])))
+        return np.concatenate(found)
 
     def _edges(self, steps: int) -> tuple[Floats, Ints]:
         """τ of the ends of all steps (n,), and which of them are breaks or ends of the motion."""
@@ -250,8 +278,8 @@ def move(
     tips = unit_forces(model, nodes)
     ends = np.cumsum([0, *map(len, nodes.values())]).tolist()
     groups = tuple(slice(a, b) for a, b in pairwise(ends))
-    own = inertia_forces(model.poses.case, model.poses.parameters, model.motion)
-    return Move(model, trajectory, own, tips, groups, damping)
+    of = model.poses.case, model.poses.parameters, model.motion
+    return Move(model, trajectory, inertia_forces(*of), velocity_terms(*of), tips, groups, damping)
 
 
 # --- of one design, in its modes
@@ -314,11 +342,11 @@ class ReducedMove:
     omega: Floats  # (n + 1, p) in rad/s
     zeta: Floats
     phi: Floats  # (n + 1, r, p)
-    turn: Floats  # (n, p, p) from the modes of a step to those of the next
+    turn: Floats  # (n, 2, p, p) of η and of η̇ from the modes of a step to those of the next
     still: Floats  # (n, 4, r): w, ẇ and ẅ where a step begins, ẅ where it ends
     force: Floats  # (n, 3, p): ẇ, ẅ and ẅ of these in the modes
-    steps: Floats  # (n + 1, 2, p): by how much w and ẇ jump, in the modes
-    blows: Floats  # (n + 1, p): by how much η̇ jumps with q̇
+    steps: Floats  # (n + 1, 2, p): by how much w and ẇ jump, in the modes, after half a step of C
+    blows: Floats  # (n + 1, p): by how much η̇ jumps with q̇, the same
     tip: Floats  # (n + 1, m, r): Vᵀb where a step begins
 
     def residuals(self, durations: ArrayLike, last: ArrayLike = 0.0) -> Floats:
@@ -374,13 +402,13 @@ class ReducedMove:
         return Free(Z, s, self.tip[-1] @ self.phi[-1])
 
     def _states(self, T: Floats) -> Floats:
-        """η and η̇ of z, (n + 1, n_T, 2, p), where each step begins, after its jump."""
+        """η and η̇ of z, (n + 1, n_T, 2, p), where each step begins, after its jump and half C."""
         P, offset = self._stepped(T, np.diff(self.edges)[:, None])
         states = self.steps[:, None] / T[:, None, None] ** 2
         states[:, :, 1] += self.blows[:, None]
         for k, turn in enumerate(self.turn):
             moved = (P[k] * states[k, :, None]).sum(axis=2) + offset[k]
-            states[k + 1] += moved @ turn.T
+            states[k + 1] += np.einsum("krs,nks->nkr", turn, moved)
         return states
 
     def _stepped(self, T: Floats, sigma: Floats) -> tuple[Floats, Floats]:

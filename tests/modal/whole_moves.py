@@ -63,6 +63,16 @@ class Matter:
         f[self.model.pencil.n_u :] += self.driven * (q[0] - 2.0 * q[1] + q[2]) / h**2
         return f
 
+    def velocity(self, tau: float) -> Floats:
+        """2 Σ m motion (motion˙)ᵀ: Coriolis forces of what moves on a pose that changes."""
+        h, n = 1e-3 * self.T, self.model.n_dof
+        q = self.moving(tau * self.T + h * np.array([-1.0, 0.0, 1.0]), self.y).q
+        before, here, after = (self.seen(each, np.eye(n)) for each in q)
+        C = np.zeros((n, n))
+        for a, motion, c, mass in zip(before[1], here[1], after[1], here[2], strict=True):
+            C += mass * motion @ (c - a).T / h
+        return C
+
     def off(self, tau: float) -> float:
         """How far f is from that, by the energy of what it bends, relative to the largest."""
         own = inertia_forces(self.model.poses.case, self.model.poses.parameters, self.model.motion)
@@ -88,6 +98,7 @@ def left(matter: Matter, durations: Floats, forces: int = 61) -> Floats:
     few = np.linspace(0.002, 0.998, forces)
     # beyond 0.002 the quintic runs out as it began: 2e-4 of f
     f = CubicSpline(few, [matter.force(each) * matter.T**2 for each in few])(tau)
+    turning = CubicSpline(few, [matter.velocity(each) * matter.T for each in few])(tau)
     T, n = durations[:, None], model.n_dof
     h = T / STEPS
     x, v = np.zeros((2, len(T), n))
@@ -97,8 +108,9 @@ def left(matter: Matter, durations: Floats, forces: int = 61) -> Floats:
         lam, phi = eigh(K, M)
         C = (M @ phi) * (2.0 * ZETA * np.sqrt(lam)) @ (M @ phi).T
         x, v = x + h * v + 0.25 * h**2 * a, v + 0.5 * h * a
+        C = C + turning[k] / T[..., None]
         A = M + 0.5 * h[..., None] * C + 0.25 * h[..., None] ** 2 * K
-        a = np.linalg.solve(A, (-f[k] / T**2 - v @ C - x @ K)[..., None])[..., 0]
+        a = np.linalg.solve(A, (-f[k] / T**2 - x @ K)[..., None] - C @ v[..., None])[..., 0]
         x, v = x + 0.25 * h**2 * a, v + 0.5 * h * a
     omega = np.sqrt(lam)
     s = omega * (-ZETA + 1j * np.sqrt(1.0 - ZETA**2))
