@@ -22,7 +22,7 @@ vibration; 6.1 % with half the period of each instant, 37 % or more with that of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any, NamedTuple
@@ -275,19 +275,16 @@ def shaped_along(
 # --- Lines for controllers
 
 
-def klipper_lines(shapers: Mapping[str, Shaper]) -> str:
-    """Section [input_shaper] of printer.cfg of a shaper per axis x, y, z (z: newer releases).
+def klipper_lines(shaper: Shaper, axes: Iterable[str] = "xy") -> str:
+    """Section [input_shaper] of printer.cfg, for axes x, y and z (in newer releases).
 
-    Raises UsageError for another axis and a shaper that Klipper does not know.
+    Raises UsageError for a shaper that Klipper does not know.
     """
-    lines = ["[input_shaper]"]
-    for axis, own in shapers.items():
-        if axis not in ("x", "y", "z") or own.name not in KLIPPER:
-            has = f"axes x, y, z and {', '.join(KLIPPER)}"
-            raise UsageError(f"Klipper has {has}, not {axis} with {own.name}")
-        lines += [f"shaper_type_{axis}: {own.name}", f"shaper_freq_{axis}: {own.hz[0]:.4f}"]
-        lines += [f"damping_ratio_{axis}: {own.zeta[0]:.6f}"]
-    return "\n".join(lines) + "\n"
+    if shaper.name not in KLIPPER:
+        raise UsageError(f"Klipper has {', '.join(KLIPPER)}, not {shaper.name}")
+    lines = "shaper_type_{0}: {1}\nshaper_freq_{0}: {2:.4f}\ndamping_ratio_{0}: {3:.6f}\n"
+    own = shaper.name, shaper.hz[0], shaper.zeta[0]
+    return "[input_shaper]\n" + "".join(lines.format(axis, *own) for axis in axes)
 
 
 def reprap_line(shaper: Shaper) -> str:

@@ -15,6 +15,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.units import SI, handy_unit
 from eigassign.errors import EigassignError, TrajectoryError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study import results
 from eigassign.study.checks import Accuracy, MotionStudy, study_motion
 from eigassign.study.design.account import VerifiedAssignment, assignment_row, limit_notes
 from eigassign.study.design.answer import solver_row
@@ -22,23 +23,6 @@ from eigassign.study.design.judgement import far_off, judged_modes, mode_rows
 from eigassign.study.design.lists import cost, design_rows
 from eigassign.study.given import given
 from eigassign.study.pictures import draw_poses, rest_pose
-from eigassign.study.results import (
-    WEIGHED,
-    CaseRow,
-    ClearanceRow,
-    DriveLoad,
-    DriveRow,
-    MassRow,
-    ModeRow,
-    Motion,
-    ResponseRow,
-    RunResults,
-    StaticRow,
-    TargetStudy,
-    TrajectoryRow,
-    counted_of,
-    over_all,
-)
 from eigassign.study.scene import ModeStudies, Scene, reach_warnings
 
 ROUND_OFF = 1e-13  # of the weight, or of the largest load: what a level direction leaves of it
@@ -49,17 +33,17 @@ def collect_results(
     studies: ModeStudies,
     accuracy: Accuracy,
     assigned: VerifiedAssignment | None,
-    moving: tuple[Motion, ...],
+    moving: tuple[results.Motion, ...],
     timing_s: Mapping[str, float],
-    responses: tuple[ResponseRow, ...] = (),
-) -> RunResults:
+    responses: tuple[results.ResponseRow, ...] = (),
+) -> results.RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     along = [(s.over_time.worst["taylor"], s.mode) for s in studies.rows if s.over_time is not None]
     reach, n, weight = reach_warnings(scene, along), len(file.coordinates), accuracy.weight
     warnings = [*scene.warnings, *reach, *weight.warnings]
     notes = [*scene.notes, *studies.notes, *accuracy.notes]
-    answer, targets = dict[str, Any](), tuple[TargetStudy, ...]()
+    answer, targets = dict[str, Any](), tuple[results.TargetStudy, ...]()
     if trajectory is None:
         poses = rest_pose(file, scene.model, scene.q0, scene.initial)
     else:
@@ -80,8 +64,8 @@ def collect_results(
             warnings += filter(None, [motion.warning])
             notes += filter(None, [motion.note])
         notes += assigned.meaning.notes
-    return RunResults(
-        case=CaseRow.of(file),
+    return results.RunResults(
+        case=results.CaseRow.of(file),
         given=given(file, trajectory),
         reduced=scene.model.is_reduced,
         q_names=tuple(file.coordinates),
@@ -107,7 +91,7 @@ SMOOTH = 100  # samples of a trajectory: a curve through more has no kinks to be
 
 def between_samples(
     scene: Scene, y: Floats, count: int
-) -> dict[str, tuple[Floats, tuple[ModeRow, ...]]]:
+) -> dict[str, tuple[Floats, tuple[results.ModeRow, ...]]]:
     """The lowest ``count`` modes at many instants, by trajectory, for pictures; none if dear."""
     if not scene.model.pencil.is_dense or len(scene.path.time_s) > SMOOTH * len(scene.path.parts):
         return {}
@@ -119,7 +103,7 @@ def between_samples(
     return {
         part.name: (
             fine.time_s[rows],
-            tuple(ModeRow(k + 1, *(hz[rows, k] for hz in both)) for k in range(count)),
+            tuple(results.ModeRow(k + 1, *(hz[rows, k] for hz in both)) for k in range(count)),
         )
         for part, rows in zip(fine.parts, fine.rows, strict=True)
     }
@@ -145,7 +129,7 @@ def _answer(
         "solver": None if answer.one_shot is None else solver_row(answer.one_shot),
         "assignment": row,
         "meaning": assigned.meaning,
-        "mass": MassRow(
+        "mass": results.MassRow(
             *(mass(scene.initial), mass(answer.y), *asked, name), handy_unit(scene.file.mass_unit)
         ),
         "orders": tuple(dict.fromkeys(_orders(scene.file))),
@@ -165,7 +149,9 @@ def _orders(file: CaseFile) -> Iterator[tuple[float, float, float]]:
         yield from ((times or 1, f, margin) for f in each if times or SI("Hz", f).answered == "rpm")
 
 
-def _checked(target: TargetStudy, found: Sequence[ClearanceRow]) -> TargetStudy:
+def _checked(
+    target: results.TargetStudy, found: Sequence[results.ClearanceRow]
+) -> results.TargetStudy:
     """A target with the room of its band as it was checked, between the samples too."""
     own = [one.room for one in found if one.clear and one.label.startswith(target.label)]
     if not own or target.room is None or not target.satisfied:
@@ -173,7 +159,7 @@ def _checked(target: TargetStudy, found: Sequence[ClearanceRow]) -> TargetStudy:
     return replace(target, room=min(target.room, *own))
 
 
-def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
+def _drives(scene: Scene, y: Floats) -> tuple[results.DriveRow, ...]:
     """What every drive exerts before and after; none where there is no weight and no motion."""
     file, path, g = scene.file, scene.path, scene.file.mechanism.gravity
     fine, curves = path.finely, [scene.model.drives.curves(path, one) for one in (scene.initial, y)]
@@ -188,45 +174,45 @@ def _drives(scene: Scene, y: Floats) -> tuple[DriveRow, ...]:
     )
     weights = time_weights(fine)
     weights = weights / weights.sum()
-    of = WEIGHED if isinstance(g, tuple) else "the motion alone (gravity: none)"
+    of = results.WEIGHED if isinstance(g, tuple) else "the motion alone (gravity: none)"
     if g is None:
         of = "the motion alone (gravity is not stated)"
     if not isinstance(g, tuple) and not any(curve.any() for curve in along):
         return ()
 
-    def load(tau: Floats) -> DriveLoad:
+    def load(tau: Floats) -> results.DriveLoad:
         k = int(np.abs(tau).argmax())
         where = fine.where(k) if tau[k] else ""
-        return DriveLoad(abs(float(tau[k])), float(np.sqrt(weights @ tau**2)), where)
+        return results.DriveLoad(abs(float(tau[k])), float(np.sqrt(weights @ tau**2)), where)
 
     def limit(name: str) -> float | None:
         return file.design.torque[name].max if name in file.design.torque else None
 
     return tuple(
-        DriveRow(name, unit, limit(name), before, after, of, load(tau), load(tau_y))
+        results.DriveRow(name, unit, limit(name), before, after, of, load(tau), load(tau_y))
         for name, unit, tau, tau_y, before, after in zip(
             *(file.coordinates, file.drive_units), *(c.T for c in (*along, *curves)), strict=True
         )
     )
 
 
-def _statics(scene: Scene, y: Floats) -> Iterator[StaticRow]:
+def _statics(scene: Scene, y: Floats) -> Iterator[results.StaticRow]:
     for one in scene.statics:
         curves = np.full((2, len(scene.path.time_s)), np.nan)
         curves[:, one.rows] = [one.curve_of(each) for each in (scene.initial, y)]
         limit = next(edge for edge in one.allowed if np.isfinite(edge))
-        yield StaticRow(one.label, one.unit, limit, *curves)
+        yield results.StaticRow(one.label, one.unit, limit, *curves)
 
 
 def _trajectories(
-    file: CaseFile, path: Trajectories | None, targets: tuple[TargetStudy, ...]
-) -> Iterator[TrajectoryRow]:
+    file: CaseFile, path: Trajectories | None, targets: tuple[results.TargetStudy, ...]
+) -> Iterator[results.TrajectoryRow]:
     parts = () if path is None else zip(path.parts, path.rows, strict=True)
     for k, (part, rows) in enumerate(parts):
         places = getattr(file.trajectories[k][2], "waypoints", ())
-        along = [one for target in counted_of(targets) for one in target.along]
+        along = [one for target in results.counted_of(targets) for one in target.along]
         errors = [(one.error, 1.0) for one in along if one.name == part.name]
-        yield TrajectoryRow(
+        yield results.TrajectoryRow(
             name=part.name,
             rows=rows,
             duration_s=float(np.ptp(part.trajectory.time_s)),
@@ -234,7 +220,7 @@ def _trajectories(
             tip=part.trajectory.tip,
             tip_unit=SI("m", *chain.from_iterable(places)),
             loads={path: load.along[k] for path, load in file.loads.items()} or None,
-            error=over_all(errors) if errors else None,
+            error=results.over_all(errors) if errors else None,
         )
 
 

@@ -19,18 +19,8 @@ from eigassign.assignment.requirements.residual import Residual
 from eigassign.errors import UsageError
 from eigassign.mechanism.trajectory.motion import Motion, Moving, known_motion, sampled_motion
 from eigassign.mechanism.trajectory.trajectory import Trajectory
+from eigassign.modal import shapers as input_shapers
 from eigassign.modal.residual_vibration import FINER, Move, ReducedMove
-from eigassign.modal.shapers import (
-    SHAPERS,
-    ModeOnPath,
-    Shaper,
-    best_designs,
-    excited_modes,
-    klipper_lines,
-    reprap_line,
-    shaped,
-    shaped_along,
-)
 from eigassign.study.results import MoveRow, ShaperRow
 from eigassign.study.scene import Scene
 
@@ -101,24 +91,24 @@ def _trace(solved: ReducedMove, T: float) -> tuple[Floats, Floats]:
     return time_s, ways[:, 0] if ways.shape[1] == 1 else np.linalg.norm(ways, axis=1)
 
 
-def _modes(solved: ReducedMove, T: float) -> tuple[ModeOnPath, ...]:
+def _modes(solved: ReducedMove, T: float) -> tuple[input_shapers.ModeOnPath, ...]:
     """The modes that the move excites, by the largest that they leave of times about T."""
     free = solved.free(T * np.linspace(0.8, 1.25, 60))
     weights = np.abs(free.Z).max(axis=0) * np.linalg.norm(free.tip, axis=0)
     if not weights.any():
         return ()
-    found = excited_modes(solved.omega / (2.0 * np.pi), solved.zeta, weights)
+    found = input_shapers.excited_modes(solved.omega / (2.0 * np.pi), solved.zeta, weights)
     return tuple(sorted(found, key=lambda mode: -float(mode.weight.max()))[:MOST])
 
 
-def _made(modes: tuple[ModeOnPath, ...]) -> Iterator[Shaper]:
+def _made(modes: tuple[input_shapers.ModeOnPath, ...]) -> Iterator[input_shapers.Shaper]:
     if modes:
         most = max(float(mode.zeta.max()) for mode in modes)
-        names = [name for name in NAMES if most < SHAPERS[name]]
-        yield from (design.shaper for design in best_designs(modes, names, SPREAD))
+        names = [name for name in NAMES if most < input_shapers.SHAPERS[name]]
+        yield from (design.shaper for design in input_shapers.best_designs(modes, names, SPREAD))
 
 
-def _shaped(move: Move, shaper: Shaper, y: Floats, T: float) -> ShaperRow:
+def _shaped(move: Move, shaper: input_shapers.Shaper, y: Floats, T: float) -> ShaperRow:
     """What a shaper leaves of the move, integrated along its own command."""
     motion, first = move.trajectory.motion, float(move.trajectory.time_s[0])
     stretch = float(np.ptp(move.trajectory.time_s)) / T
@@ -127,7 +117,7 @@ def _shaped(move: Move, shaper: Shaper, y: Floats, T: float) -> ShaperRow:
         found = motion.moving(first + stretch * np.asarray(t), y)
         return Moving(found.q, stretch * found.rate, stretch**2 * found.acceleration)
 
-    whole, total = shaped(shaper, command, T)
+    whole, total = input_shapers.shaped(shaper, command, T)
     corners = [0.0, T, *((np.asarray(motion.breaks_s) - first) / stretch)]
     every = np.unique(np.round(np.add.outer(shaper.times_s, corners).ravel(), 12))
     inner = every[(every > 0.0) & (every < total)]
@@ -141,7 +131,7 @@ def _shaped(move: Move, shaper: Shaper, y: Floats, T: float) -> ShaperRow:
 
 
 def _along(
-    move: Move, modes: tuple[ModeOnPath, ...], y: Floats, T: float
+    move: Move, modes: tuple[input_shapers.ModeOnPath, ...], y: Floats, T: float
 ) -> tuple[Floats, Floats] | None:
     """Times and q of a ZV that changes with the frequency along the path, unless that is one."""
     if not modes or np.ptp(modes[0].hz) <= CHANGES * modes[0].hz.min():
@@ -150,11 +140,11 @@ def _along(
     first, last = move.trajectory.time_s[[0, -1]]
     own = np.linspace(float(first), float(last), len(t))
     q = move.trajectory.motion.poses(own, y)
-    return shaped_along(t, q, modes[0].hz, modes[0].zeta)
+    return input_shapers.shaped_along(t, q, modes[0].hz, modes[0].zeta)
 
 
 def _over_time(
-    move: Move, mode: ModeOnPath, y: Floats, T: float, times: Floats, q: Floats
+    move: Move, mode: input_shapers.ModeOnPath, y: Floats, T: float, times: Floats, q: Floats
 ) -> ShaperRow:
     left = _left(move, sampled_motion(times, q), y, float(times[-1]))
     hz = "{:.4g} … {:.4g}".format(*mode.hz_range)
@@ -167,10 +157,10 @@ def _left(move: Move, motion: Motion, y: Floats, total: float) -> float:
     return float(other.at(y).residuals(ends[1:])[0, 0])
 
 
-def _lines(shaper: Shaper, row: ShaperRow) -> Iterator[str]:
+def _lines(shaper: input_shapers.Shaper, row: ShaperRow) -> Iterator[str]:
     """Yield what controllers take of a shaper; nothing of what none of them knows."""
     said = f"{row.name}: {1e3 * row.delay:.3g} ms longer, leaves {1e3 * row.residual:.3g} mm"
     with suppress(UsageError):
-        yield f"# {said}\n{klipper_lines({'x': shaper, 'y': shaper})}"
+        yield f"# {said}\n{input_shapers.klipper_lines(shaper)}"
     with suppress(UsageError):
-        yield f"; {said}\n{reprap_line(shaper)}\n"
+        yield f"; {said}\n{input_shapers.reprap_line(shaper)}\n"

@@ -19,6 +19,7 @@ from eigassign.case.units import handy
 from eigassign.errors import LostModeError
 from eigassign.facts import capital, priced
 from eigassign.modal.residual_vibration import FINER
+from eigassign.study import results
 from eigassign.study.checks import (
     Accuracy,
     MotionStudy,
@@ -35,19 +36,6 @@ from eigassign.study.design.followed import Rest, followers
 from eigassign.study.design.judgement import Facts, SolvedDesigns, judged_modes, verdict
 from eigassign.study.design.lists import KEEP, cost
 from eigassign.study.design.search.optimum import Found
-from eigassign.study.results import (
-    AssignmentRow,
-    CatalogueRow,
-    CombinationRow,
-    LimitRow,
-    LocalOptimum,
-    Meaning,
-    OptimalityRow,
-    RobustRow,
-    TargetStudy,
-    ViolationRow,
-    worst_violation,
-)
 from eigassign.study.scene import Scene
 
 EQUAL = 1e-9  # of F: combinations apart by less differ by round-off
@@ -61,20 +49,20 @@ class VerifiedAssignment(NamedTuple):
     """An answer with exact frequencies before and after, and what it means."""
 
     answer: Answer
-    targets: tuple[TargetStudy, ...]
+    targets: tuple[results.TargetStudy, ...]
     solved: SolvedDesigns
-    meaning: Meaning
-    bound: OptimalityRow | None = None  # what is proved of the optimum
+    meaning: results.Meaning
+    bound: results.OptimalityRow | None = None  # what is proved of the optimum
 
 
 def assignment_row(
     scene: Scene, own: VerifiedAssignment, accuracy: Accuracy, motion: MotionStudy | None
-) -> AssignmentRow:
+) -> results.AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers."""
     keys, answer, targets = scene.file.assignment, own.answer, own.targets
     found, limits = answer.found, tuple(_limits(scene, answer.y))
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
-    worst = worst_violation(targets, limits)
+    worst = results.worst_violation(targets, limits)
     merits = _merits(answer, targets, worst)
     of_model = model_errors(scene, accuracy.mesh, answer.y, {m for t in targets for m in t.numbers})
     raised = max(of_model.values(), default=0.0)
@@ -114,7 +102,7 @@ def assignment_row(
             is_optimal=aim is None or first_order,
         )
     )
-    return AssignmentRow(
+    return results.AssignmentRow(
         method=keys.method,
         objective=keys.named_objective,
         objective_initial=merits[0][1],
@@ -137,7 +125,9 @@ def assignment_row(
 
 def _searched(scene: Scene, found: Found) -> dict[str, Any]:
     """The fields that a search has."""
-    optima = (LocalOptimum(one.y, one.objective, one.seen.violation) for one in found.optima)
+    optima = (
+        results.LocalOptimum(one.y, one.objective, one.seen.violation) for one in found.optima
+    )
     return {
         "steps": found.best.steps,
         "starts": found.starts,
@@ -226,9 +216,9 @@ def _unproved(scene: Scene, own: VerifiedAssignment, largest: float) -> Iterator
 
 
 def _deviated(
-    robust: RobustRow | None,
-    targets: Sequence[TargetStudy],
-    limits: Sequence[LimitRow],
+    robust: results.RobustRow | None,
+    targets: Sequence[results.TargetStudy],
+    limits: Sequence[results.LimitRow],
     largest: float,
 ) -> Iterator[str]:
     """Say what the design itself meets, and some deviation does not; or too many of all do not."""
@@ -246,7 +236,7 @@ def _deviated(
 
 
 def _missed_between(
-    scene: Scene, designs: Sequence[Floats], targets: Sequence[TargetStudy], accepted: float
+    scene: Scene, designs: Sequence[Floats], targets: Sequence[results.TargetStudy], accepted: float
 ) -> Iterator[str]:
     """Targets missed between samples, by how much, of the answer (first) or its deviations."""
     y, own = designs[0], followers(scene, scene.wanted)
@@ -277,7 +267,7 @@ def _too_stiff(scene: Scene, y: Floats) -> Iterator[str]:
             yield f"{one.label}: missed by {_percent(missed)} with twice the elements"
 
 
-def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
+def _limits(scene: Scene, y: Floats) -> Iterator[results.LimitRow]:
     """The limits of quantities at the initial design and at y."""
     lower, upper = scene.bounds
     for one in scene.limits:
@@ -287,7 +277,7 @@ def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
         kept = misses[1] == 0.0
         least = None if kept else extreme(scene, one, y)
         low, high = one.allowed
-        yield LimitRow(
+        yield results.LimitRow(
             name=one.name,
             words=one.asked_words,
             unit=one.unit,
@@ -353,9 +343,9 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
+def _catalogue(scene: Scene, found: Found) -> results.CatalogueRow | None:
     """The best combinations of the catalogues, with what each is worth."""
-    own, best = scene.file.design.catalogues, list[CombinationRow]()
+    own, best = scene.file.design.catalogues, list[results.CombinationRow]()
     if not own:
         return None
     for one in found.outcomes[:KEEP]:
@@ -363,7 +353,7 @@ def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
         curves = one.variant.requirements.curves(one.best.seen)
         errors = (float(each.outside(hz, hz).max()) for each, hz, _ in curves if each.is_goal)
         best.append(
-            CombinationRow(
+            results.CombinationRow(
                 choices={catalogue.name: catalogue.choices[k] for catalogue, k in rows},
                 design=y,
                 objective=one.best.objective,
@@ -374,11 +364,11 @@ def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
             )
         )
     gap = 0.0 if _is_settled(found) else None
-    return CatalogueRow(found.choices - found.untried, gap, tuple(best))
+    return results.CatalogueRow(found.choices - found.untried, gap, tuple(best))
 
 
 def _merits(
-    answer: Answer, targets: Sequence[TargetStudy], worst: ViolationRow | None
+    answer: Answer, targets: Sequence[results.TargetStudy], worst: results.ViolationRow | None
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Violation and objective of the initial design and of the answer."""
     if answer.found is not None:
@@ -395,20 +385,24 @@ def _merits(
 
 
 def _optimality(
-    answer: Answer, conflict: Conflict | None, bound: OptimalityRow | None
-) -> OptimalityRow:
+    answer: Answer, conflict: Conflict | None, bound: results.OptimalityRow | None
+) -> results.OptimalityRow:
     """How good the optimum is known to be."""
     found = answer.found
     if found is None:
-        return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
+        return results.OptimalityRow(
+            "local", None, None, "the optimum of the linearised problem only"
+        )
     best = found.best
     if conflict is not None and conflict.is_linear:
-        return OptimalityRow("proved", best.stationarity, None, "no design meets all limits")
+        return results.OptimalityRow(
+            "proved", best.stationarity, None, "no design meets all limits"
+        )
     if found.are_listed:
         return _of_choices(found, conflict is None)
     if bound is not None and bound.kind == "proved":
         return bound
-    row = OptimalityRow("local", best.stationarity, None, "")
+    row = results.OptimalityRow("local", best.stationarity, None, "")
     row = row if bound is None or bound.kind == "local" else bound
     words = _of_starts(found) + ("" if bound is None else f"; {bound.words}")
     if found.untried:
@@ -432,7 +426,7 @@ def _of_starts(found: Found) -> str:
     return f"the {which} from {counted(tally.starts, 'start')}{further}"
 
 
-def _of_choices(found: Found, can_be_met: bool) -> OptimalityRow:
+def _of_choices(found: Found, can_be_met: bool) -> results.OptimalityRow:
     """What is known of the choices from catalogues, searched to the end or as far as solves go."""
     best, among = found.best, f"{found.choices} combinations of the catalogues"
     if found.task.bands:
@@ -445,16 +439,18 @@ def _of_choices(found: Found, can_be_met: bool) -> OptimalityRow:
         most, others = best.objective + EQUAL * abs(best.objective), found.outcomes[1:]
         if equal := sum(o.missed <= MET and o.best.objective <= most for o in others):
             words += f"; {equal} more of the best are as good"
-        return OptimalityRow("proved", best.stationarity, 0.0, words)
+        return results.OptimalityRow("proved", best.stationarity, 0.0, words)
     words = f"the best found of {among}"
     if found.ended is not None:
-        return OptimalityRow("local", best.stationarity, None, f"{words}; {found.ended.value}")
+        return results.OptimalityRow(
+            "local", best.stationarity, None, f"{words}; {found.ended.value}"
+        )
     if not found.is_discrete:
         starts = counted(found.starts, "start")
         words += f", the other parameters of {len(found.outcomes)} from {starts}"
     words += f"; {found.untried} were not searched" * bool(found.untried)
     words += "; others may " + ("be better" if can_be_met else "miss the limits by less")
-    return OptimalityRow("local", best.stationarity, None, words)
+    return results.OptimalityRow("local", best.stationarity, None, words)
 
 
 def _is_settled(found: Found) -> bool:
@@ -486,7 +482,7 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveLimit]:
 
 
 def limit_notes(
-    answer: Answer, row: AssignmentRow, targets: Sequence[TargetStudy]
+    answer: Answer, row: results.AssignmentRow, targets: Sequence[results.TargetStudy]
 ) -> Iterator[str]:
     """What holds the answer back, and what the one shot's program does not depend on."""
     missed = {target.label for target in targets if not target.satisfied}
