@@ -33,17 +33,10 @@ def scene(
     material: Tree = STEEL,
     **more: Any,
 ) -> Model:
-    mechanism = {
-        "space": space,
-        "gravity": DOWN[space] if gravity is None else gravity,
-        "materials": {"m": material},
-        "sections": {"s": section},
-        "links": links,
-        "joints": joints,
-        "bodies": bodies,
-        **more,
-    }
-    return ea.Case(case_of({"mechanism": mechanism, "coordinates": coordinates})).model()
+    pull = DOWN[space] if gravity is None else gravity
+    own = {"space": space, "gravity": pull, "bodies": bodies, **more}
+    tree = linkage(links, joints, coordinates, section=section, material=material, **own)
+    return ea.Case(case_of(tree)).model()
 
 
 def hertz(model: Model, q: Any, count: int) -> np.ndarray:
