@@ -17,7 +17,6 @@ import yaml
 import eigassign as ea
 
 DEVELOPMENT = range(48)
-CONFIRMATION = range(1000, 1048)
 
 Random = np.random.Generator
 Tree = dict[str, Any]

@@ -1,4 +1,4 @@
-"""Cases for tests, written as plain trees: the paper's arm, bars, and random planar chains."""
+"""Cases for tests, written as plain trees: the paper's arm, and bars."""
 
 import json
 from typing import Any
@@ -81,68 +81,3 @@ def bar(
     if root == "revolute":
         tree["coordinates"] = {"q1": {"joint": "root", "drive": drive}}
     return tree
-
-
-def random_chain(seed: int) -> tuple[Tree, np.ndarray]:
-    """A random planar tree of 1 to 5 links with every kind of joint and drive, and a pose q."""
-    rng = np.random.default_rng(seed)
-    n = int(rng.integers(1, 6))
-    tree: Tree = linkage(
-        {},
-        {},
-        sections={
-            "round": {"shape": "circle", "diameter": float(rng.uniform(0.01, 0.03))},
-            "flat": {
-                "shape": "rectangle",
-                "width": 0.02,
-                "height": float(rng.uniform(5e-3, 0.02)),
-            },
-            "pipe": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.004},
-            "bare": {"area": 3e-4, "bending_inertia": 8e-9},
-        },
-        materials={
-            "steel": {"youngs_modulus": 210e9, "density": 7850.0},
-            "alloy": {"youngs_modulus": 70e9, "density": 2700.0},
-        },
-        bodies={},
-    )
-    mechanism = tree["mechanism"]
-    for k in range(n):
-        _random_link(tree, k, rng)
-    if seed % 2:  # the order in the file means nothing
-        for where, key in ((tree, "coordinates"), (mechanism, "joints"), (mechanism, "links")):
-            where[key] = dict(reversed(where[key].items()))
-    return tree, rng.uniform(-3.0, 3.0, len(tree["coordinates"]))
-
-
-def _random_link(tree: Tree, k: int, rng: np.random.Generator) -> None:
-    mechanism, name = tree["mechanism"], f"l{k}"
-    mechanism["links"][name] = {
-        "length": float(rng.uniform(0.2, 0.8)),
-        "material": str(rng.choice(["steel", "alloy"])),
-        "section": str(rng.choice(["round", "flat", "pipe", "bare"])),
-        "elements": int(rng.integers(1, 4)),
-    }
-    grounded = k == 0 or rng.random() < 0.15
-    base = "ground" if grounded else f"l{rng.integers(k)}.{rng.choice(['start', 'end', 'end'])}"
-    kind = "revolute" if k == 0 or rng.random() < 0.8 else "fixed"
-    joint: Tree = {"type": kind, "base": base, "follower": f"{name}.start"}
-    if rng.random() < 0.6:
-        joint["angle"] = float(rng.uniform(-2.0, 2.0))
-    if grounded:
-        joint["position"] = rng.uniform(-1.0, 1.0, 2).tolist()
-    mechanism["joints"][f"j{k}"] = joint
-    if kind == "revolute":
-        drive: Any = ["free", "free", "locked", {"stiffness": float(10 ** rng.uniform(3, 5))}]
-        tree["coordinates"][f"q{k}"] = {
-            "joint": f"j{k}",
-            "angle": str(rng.choice(["relative", "absolute"])),
-            "drive": drive[rng.integers(4)],
-        }
-    for node in ("start", "end"):
-        if rng.random() < 0.5:
-            mechanism["bodies"][f"{name}_{node}"] = {
-                "at": f"{name}.{node}",
-                "mass": float(rng.uniform(0.0, 2.0)),
-                "inertia": float(rng.choice([0.0, 3e-3])),
-            }

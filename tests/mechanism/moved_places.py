@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from chains import case_of
-from redesigned_arms import CASES
+from redesigned_arms import CASES, TIPS
 from spatial_random import random_closed, random_open
 from yaml import safe_load
 
@@ -13,15 +13,6 @@ from eigassign import Case
 from eigassign.errors import CaseError
 
 Tree = dict[str, Any]
-TIPS: dict[str, Tree] = {
-    "five_bar": {"tip": "left_arm.end", "waypoints": [[0.05, 0.5], [0.1, 0.48], [0.15, 0.5]]},
-    "arm_6r": {
-        "tip": "hand.end",
-        "waypoints": [[0.75, -0.2, 0.6], [0.8, 0.1, 0.7], [0.7, 0.3, 0.65]],
-        "orientation": [0, "20 deg", 0],
-        "start": [-0.2, 0.9, -1.4, 0.2, -0.6, 0.4],
-    },
-}  # fmt: skip
 
 
 def shipped_tree(name: str) -> Tree:

@@ -1,6 +1,5 @@
 """Mechanisms whose tip follows a path while design parameters move it, and extrapolated slopes."""
 
-import re
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -8,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from chains import bar, case_of, two_link
+from yaml import safe_load
 
 from eigassign import Case
-from eigassign.case import parse
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -37,70 +36,59 @@ def two_link_lengths(branch: tuple[float, float] = (3.2, 5.2)) -> Case:
     return case_of(tree | {"design": {**lengths(a="upper"), "m": mass, **lengths(b="fore")}})
 
 
-def shipped(name: str, trajectory: str, design: str) -> Case:
-    """A shipped case with another trajectory and design."""
-    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
-    text = re.sub(r"^trajectory:.*?(?=^design:)", trajectory + "\n", text, flags=re.M | re.S)
-    text = re.sub(r"^design:.*?(?=^expansion:)", design + "\n", text, flags=re.M | re.S)
-    text = re.sub(r"^expansion:.*", "", text, flags=re.M | re.S)
-    return Case(parse(text.encode(), CASES / f"{name}.yaml"))
+def box(parameter: str, low: float, high: float) -> dict[str, Any]:
+    return {"parameter": parameter, "min": low, "max": high}
+
+
+def shipped(name: str, trajectory: dict[str, Any], **design: dict[str, Any]) -> Case:
+    """A shipped mechanism with another trajectory and design."""
+    tree = safe_load((CASES / f"{name}.yaml").read_text(encoding="utf-8"))
+    tree = {key: tree[key] for key in ("mechanism", "coordinates")}
+    return case_of(tree | {"trajectory": trajectory, "design": design})
+
+
+TIPS: dict[str, dict[str, Any]] = {
+    "five_bar": {"tip": "left_arm.end", "waypoints": [[0.05, 0.5], [0.1, 0.48], [0.15, 0.5]]},
+    "arm_6r": {
+        "tip": "hand.end",
+        "waypoints": [[0.75, -0.2, 0.6], [0.8, 0.1, 0.7], [0.7, 0.3, 0.65]],
+        "orientation": [0, "20 deg", 0],
+        "start": [-0.2, 0.9, -1.4, 0.2, -0.6, 0.4],
+    },
+}
+SIDES = {
+    "left": box("links.left_arm.length", 0.3, 0.4),
+    "right": box("links.right_crank.length", 0.2, 0.3),
+}
 
 
 def six_joints() -> Case:
     """The 6R arm, its hand held level, with the length of a beam and of a rigid link."""
     return shipped(
         "arm_6r",
-        "trajectory:\n"
-        "  tip: hand.end\n"
-        "  waypoints: [[0.75, -0.2, 0.6], [0.8, 0.1, 0.7], [0.7, 0.3, 0.65]]\n"
-        "  orientation: [0, 20 deg, 0]\n"
-        "  start: [-0.2, 0.9, -1.4, 0.2, -0.6, 0.4]\n"
-        "  samples: 12\n",
-        "design:\n"
-        "  upper: {parameter: links.upper_arm.length, min: 0.6, max: 0.8}\n"
-        "  wrist: {parameter: links.wrist.length, min: 0.05, max: 0.1}\n"
-        "  m: {parameter: bodies.payload.mass, min: 3, max: 6}\n",
+        TIPS["arm_6r"] | {"samples": 12},
+        upper=box("links.upper_arm.length", 0.6, 0.8),
+        wrist=box("links.wrist.length", 0.05, 0.1),
+        m=box("bodies.payload.mass", 3, 6),
     )
 
 
 def five_bar() -> Case:
     """Two cranks and two forearms that meet at the tool: lengths on both sides of the loop."""
-    return shipped(
-        "five_bar",
-        "trajectory:\n"
-        "  tip: left_arm.end\n"
-        "  waypoints: [[0.05, 0.5], [0.1, 0.48], [0.15, 0.5]]\n"
-        "  samples: 12\n",
-        "design:\n"
-        "  left: {parameter: links.left_arm.length, min: 0.3, max: 0.4}\n"
-        "  right: {parameter: links.right_crank.length, min: 0.2, max: 0.3}\n"
-        "  m: {parameter: bodies.tool.mass, min: 0.3, max: 0.5}\n",
-    )
+    mass = box("bodies.tool.mass", 0.3, 0.5)
+    return shipped("five_bar", TIPS["five_bar"] | {"samples": 12}, **SIDES, m=mass)
 
 
 def five_bar_in_joints() -> Case:
     """The same with its cranks' angles given: only what closes the loop follows the design."""
-    return shipped(
-        "five_bar",
-        "trajectory:\n  q: [[126 deg, 68 deg], [120 deg, 62 deg], [114 deg, 56 deg]]\n"
-        "  duration: 1 s\n",
-        "design:\n"
-        "  left: {parameter: links.left_arm.length, min: 0.3, max: 0.4}\n"
-        "  right: {parameter: links.right_crank.length, min: 0.2, max: 0.3}\n",
-    )
+    q = [["126 deg", "68 deg"], ["120 deg", "62 deg"], ["114 deg", "56 deg"]]
+    return shipped("five_bar", {"q": q, "duration": 1.0}, **SIDES)
 
 
 def slider_crank() -> Case:
     """One coordinate that moves the slider; the rod's length moves it the same way."""
-    return shipped(
-        "slider_crank",
-        "trajectory:\n"
-        "  tip: slider.start\n"
-        "  waypoints: [[0.54, 0], [0.45, 0]]\n"
-        "  start: [60 deg]\n"
-        "  samples: 12\n",
-        "design:\n  rod: {parameter: links.rod.length, min: 0.4, max: 0.5}\n",
-    )
+    path = {"tip": "slider.start", "waypoints": [[0.54, 0], [0.45, 0]], "start": ["60 deg"]}
+    return shipped("slider_crank", path | {"samples": 12}, rod=box("links.rod.length", 0.4, 0.5))
 
 
 def cart(path: list[list[float]], leaning: bool = False, **more: Any) -> Case:

@@ -4,8 +4,8 @@ import copy
 from typing import Any
 
 import numpy as np
+from spatial_cases import Tree, linkage
 
-Tree = dict[str, Any]
 STEEL = {"youngs_modulus": 200e9, "density": 7800.0, "poissons_ratio": 0.3}
 MASS, INERTIA = 1.3, 0.02  # of a rigid link
 TUBE = {"shape": "tube", "outer_diameter": 0.04, "inner_diameter": 0.034}
@@ -16,95 +16,75 @@ def straight(length: float, elements: int, section: str = "s", material: str = "
 
 
 def four_bar(drive: Any) -> Tree:
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": STEEL},
-            "sections": {"s": {"shape": "rectangle", "height": 0.004, "width": 0.02}},
-            "links": {
-                "crank": straight(0.12, 2), "coupler": straight(0.45, 4), "rocker": straight(0.4, 4)
-            },
-            "joints": {
-                "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
-                "B": {"type": "revolute", "base": "crank.end", "follower": "coupler.start"},
-                "D": {"type": "revolute", "base": "ground", "follower": "rocker.start",
-                      "position": [0.5, 0.0]},
-                "E": {"type": "revolute", "base": "coupler.end", "follower": "rocker.end"},
-            },
-            "assembly": {"guess": {"B": 1.0, "D": 2.0, "E": 0.0}},
+    return linkage(
+        {"crank": straight(0.12, 2), "coupler": straight(0.45, 4), "rocker": straight(0.4, 4)},
+        {
+            "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+            "B": {"type": "revolute", "base": "crank.end", "follower": "coupler.start"},
+            "D": {"type": "revolute", "base": "ground", "follower": "rocker.start",
+                  "position": [0.5, 0.0]},
+            "E": {"type": "revolute", "base": "coupler.end", "follower": "rocker.end"},
         },
-        "coordinates": {"th": {"joint": "A", "drive": drive}},
-    }  # fmt: skip
+        {"th": {"joint": "A", "drive": drive}},
+        section={"shape": "rectangle", "height": 0.004, "width": 0.02},
+        material=STEEL,
+        assembly={"guess": {"B": 1.0, "D": 2.0, "E": 0.0}},
+    )  # fmt: skip
 
 
 def slider_crank(drive: Any) -> Tree:
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": STEEL},
-            "sections": {"s": {"shape": "circle", "diameter": 0.012}},
-            "links": {
-                "crank": straight(0.15, 2), "rod": straight(0.45, 6),
-                "slider": {"type": "rigid", "mass": 0.5},
-            },
-            "joints": {
-                "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
-                "B": {"type": "revolute", "base": "crank.end", "follower": "rod.start"},
-                "P": {"type": "prismatic", "base": "ground", "follower": "slider.start",
-                      "axis": [1.0, 0.0]},
-                "E": {"type": "revolute", "base": "rod.end", "follower": "slider.start"},
-            },
-            "assembly": {"guess": {"P": 0.6}},
+    slider = {"type": "rigid", "mass": 0.5}
+    return linkage(
+        {"crank": straight(0.15, 2), "rod": straight(0.45, 6), "slider": slider},
+        {
+            "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+            "B": {"type": "revolute", "base": "crank.end", "follower": "rod.start"},
+            "P": {"type": "prismatic", "base": "ground", "follower": "slider.start",
+                  "axis": [1.0, 0.0]},
+            "E": {"type": "revolute", "base": "rod.end", "follower": "slider.start"},
         },
-        "coordinates": {"th": {"joint": "A", "drive": drive}},
-    }  # fmt: skip
+        {"th": {"joint": "A", "drive": drive}},
+        section={"shape": "circle", "diameter": 0.012},
+        material=STEEL,
+        assembly={"guess": {"P": 0.6}},
+    )  # fmt: skip
 
 
 def arm3r(drive: Any) -> Tree:
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33}},
-            "sections": {"s": TUBE},
-            "links": {"col": straight(0.3, 2), "up": straight(0.5, 4), "fo": straight(0.4, 4)},
-            "joints": {
-                "yaw": {"type": "revolute", "base": "ground", "follower": "col.start",
-                        "axis": [1.0, 0.0, 0.0], "orientation": [0.0, -np.pi / 2, 0.0]},
-                "pitch": {"type": "revolute", "base": "col.end", "follower": "up.start",
-                          "axis": [0.0, -1.0, 0.0], "orientation": [0.0, np.pi / 2, 0.0]},
-                "elbow": {"type": "revolute", "base": "up.end", "follower": "fo.start",
-                          "axis": [0.0, -1.0, 0.0]},
-            },
-            "bodies": {"tip": {"at": "fo.end", "mass": 1.0}},
+    return linkage(
+        {"col": straight(0.3, 2), "up": straight(0.5, 4), "fo": straight(0.4, 4)},
+        {
+            "yaw": {"type": "revolute", "base": "ground", "follower": "col.start",
+                    "axis": [1.0, 0.0, 0.0], "orientation": [0.0, -np.pi / 2, 0.0]},
+            "pitch": {"type": "revolute", "base": "col.end", "follower": "up.start",
+                      "axis": [0.0, -1.0, 0.0], "orientation": [0.0, np.pi / 2, 0.0]},
+            "elbow": {"type": "revolute", "base": "up.end", "follower": "fo.start",
+                      "axis": [0.0, -1.0, 0.0]},
         },
-        "coordinates": {n: {"joint": n, "drive": drive} for n in ("yaw", "pitch", "elbow")},
-    }  # fmt: skip
+        {n: {"joint": n, "drive": drive} for n in ("yaw", "pitch", "elbow")},
+        section=TUBE,
+        material={"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33},
+        space="spatial",
+        bodies={"tip": {"at": "fo.end", "mass": 1.0}},
+    )  # fmt: skip
 
 
 def gantry(drive: Any) -> Tree:
-    return {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0}},
-            "sections": {"s": {"shape": "rectangle", "height": 0.05, "width": 0.05}},
-            "links": {
-                "left": straight(0.8, 6), "girder": straight(1.6, 12), "right": straight(0.8, 6),
-                "trolley": {"type": "rigid", "mass": 3.0},
-            },
-            "joints": {
-                "f1": {"type": "fixed", "base": "ground", "follower": "left.start",
-                       "angle": np.pi / 2},
-                "f2": {"type": "fixed", "base": "left.end", "follower": "girder.start",
-                       "angle": -np.pi / 2},
-                "f3": {"type": "fixed", "base": "girder.end", "follower": "right.start",
-                       "angle": -np.pi / 2},
-                "f4": {"type": "fixed", "base": "ground", "follower": "right.end",
-                       "position": [1.6, 0.0], "angle": -np.pi / 2},
-                "car": {"type": "carriage", "base": "girder", "follower": "trolley.start"},
-            },
+    legs, trolley = straight(0.8, 6), {"type": "rigid", "mass": 3.0}
+    corner = {"type": "fixed", "angle": -np.pi / 2}
+    return linkage(
+        {"left": legs, "girder": straight(1.6, 12), "right": {**legs}, "trolley": trolley},
+        {
+            "f1": {**corner, "base": "ground", "follower": "left.start", "angle": np.pi / 2},
+            "f2": {**corner, "base": "left.end", "follower": "girder.start"},
+            "f3": {**corner, "base": "girder.end", "follower": "right.start"},
+            "f4": {**corner, "base": "ground", "follower": "right.end", "position": [1.6, 0.0]},
+            "car": {"type": "carriage", "base": "girder", "follower": "trolley.start"},
         },
-        "coordinates": {"x": {"joint": "car", "drive": drive}},
-    }  # fmt: skip
+        {"x": {"joint": "car", "drive": drive}},
+        section={"shape": "rectangle", "height": 0.05, "width": 0.05},
+        material={"youngs_modulus": 210e9, "density": 7850.0},
+    )
 
 
 def slotted_lever(drive: Any) -> Tree:
@@ -126,21 +106,18 @@ def slotted_lever(drive: Any) -> Tree:
 
 def ball_screw(orientation: list[float]) -> Tree:
     """A screw shaft with a travelling nut that carries a table's arm."""
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {"shaft": straight(1.0, 4), "arm": straight(0.2, 2)},
-            "joints": {
-                "bearing": {"type": "fixed", "base": "ground", "follower": "shaft.start"},
-                "nut": {"type": "nut", "base": "shaft", "follower": "arm.start", "lead": 0.05,
-                        "orientation": orientation},
-            },
-            "bodies": {"table": {"at": "arm.end", "mass": 2.0, "inertia": [0.01, 0.02, 0.02]}},
+    nut = {"type": "nut", "base": "shaft", "follower": "arm.start", "lead": 0.05}
+    return linkage(
+        {"shaft": straight(1.0, 4), "arm": straight(0.2, 2)},
+        {
+            "bearing": {"type": "fixed", "base": "ground", "follower": "shaft.start"},
+            "nut": {**nut, "orientation": orientation},
         },
-        "coordinates": {"s": {"joint": "nut", "drive": {"stiffness": 1e7}}},
-    }  # fmt: skip
+        {"s": {"joint": "nut", "drive": {"stiffness": 1e7}}},
+        material={"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3},
+        space="spatial",
+        bodies={"table": {"at": "arm.end", "mass": 2.0, "inertia": [0.01, 0.02, 0.02]}},
+    )
 
 
 def rigid(tree: Tree, *links: str) -> Tree:

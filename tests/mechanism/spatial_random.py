@@ -397,8 +397,10 @@ def _release(tree: Tree, rng: Random, values: dict[str, float], size: int) -> bo
             tree.clear()
             tree.update(trial)
             values.clear()
-            values.update(left)
-            renumber(tree, values)
+            new = {n: f"q{k}" for k, n in enumerate(left)}
+            values.update({new[n]: v for n, v in left.items()})
+            tree["coordinates"] = {new[n]: d for n, d in tree["coordinates"].items()}
+            tree["mechanism"]["assembly"]["at"] = dict(values)
             return True
     return False
 
@@ -409,15 +411,6 @@ def rides_well(tree: Tree, pose: Pose) -> bool:
     riders = {n: j for n, j in m["joints"].items() if j["type"] in ("carriage", "nut")}
     shares = [pose.values[n][0] / m["links"][j["base"]]["length"] for n, j in riders.items()]
     return all(0.15 < share < 0.85 for share in shares)
-
-
-def renumber(tree: Tree, values: dict[str, float]) -> None:
-    new = {n: f"q{k}" for k, n in enumerate(values)}
-    tree["coordinates"] = {new[n]: d for n, d in tree["coordinates"].items()}
-    tree["mechanism"]["assembly"]["at"] = {new[n]: v for n, v in values.items()}
-    renamed = {new[n]: v for n, v in values.items()}
-    values.clear()
-    values.update(renamed)
 
 
 def _nearby(

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import case_of
+from spatial_cases import case_of, linkage
+from spatial_examples import straight
 from spatial_oracle import Tree, solve_pose
 from spatial_random import add_springs, random_closed, random_open
 from weight_comparison import agree_under_weight, direction
@@ -19,15 +20,12 @@ from eigassign.modal import buckling, weight_changes
 
 def arm(space: str, density: float, lengths: Tree, **more: Any) -> Tree:
     """Square bars of 10 mm under their weight."""
-    bar = {"material": "m", "section": "s", "elements": 4}
-    m = {
-        "space": space,
-        "gravity": [0.0, -9.81, 0.0][: 2 if space == "planar" else 3],
-        "materials": {"m": {"youngs_modulus": 70e9, "density": density, "poissons_ratio": 0.3}},
-        "sections": {"s": {"shape": "rectangle", "width": 0.01, "height": 0.01}},
-        "links": {name: {**bar, "length": length} for name, length in lengths.items()},
-    }
-    return {"mechanism": m | more, "coordinates": {}}
+    links = {name: straight(length, 4) for name, length in lengths.items()}
+    gravity = [0.0, -9.81, 0.0][: 2 if space == "planar" else 3]
+    metal = {"youngs_modulus": 70e9, "density": density, "poissons_ratio": 0.3}
+    square = {"shape": "rectangle", "width": 0.01, "height": 0.01}
+    own = {"space": space, "gravity": gravity, "section": square, "material": metal}
+    return linkage(links, **own, **more)
 
 
 def on_a_post(tree: Tree, q: Any) -> Tree:

@@ -39,40 +39,6 @@ def drawn(draw: tuple[Any, ...]) -> tuple[Tree, np.ndarray]:
     return tree, q
 
 
-# --- the oracle itself
-
-
-def test_the_oracle_knows_the_pendulum_on_a_free_joint() -> None:
-    """A rigid rod of mass m and inertia J about its middle, hanging: λ = m g (L/2)/(J + m L²/4)."""
-    rod = {"type": "rigid", "length": 0.8, "center": [0.4, 0.0], "mass": 2.0, "inertia": 0.15}
-    tree = one_link(rod, {"type": "revolute", "angle": -np.pi / 2}, "free")
-    found = weigh(tree, [0.0], [0.0, -9.81])
-    expected = 2.0 * 9.81 * 0.4 / (0.15 + 2.0 * 0.4**2)
-    np.testing.assert_allclose(found.spectrum(1), [expected], rtol=1e-12)
-
-
-def test_the_oracle_knows_the_column_that_buckles() -> None:
-    """λ vanishes at the tip load π²EI/4L² of a clamped column."""
-    tree = one_link(straight(2.0, 8), {"type": "fixed", "angle": np.pi / 2}, None)
-    tree["mechanism"]["materials"]["m"]["density"] = 1e-6
-    EI = 200e9 * 0.02 * 0.004**3 / 12
-    tree["mechanism"]["bodies"] = {"load": {"at": "l.end", "mass": 3.0}}
-    critical = np.pi**2 * EI / (4 * 2.0**2)
-    found = weigh(tree, [], [0.0, -critical / 3.0])
-    assert abs(found.spectrum(1)[0]) < 1e-4 * found.spectrum(1, 0.0)[0]
-
-
-def one_link(link: Tree, joint: Tree, drive: Any) -> Tree:
-    tree = copy.deepcopy(four_bar("free"))
-    m = {k: v for k, v in tree["mechanism"].items() if k != "assembly"}
-    m |= {"links": {"l": link}, "joints": {"A": {**joint, "base": "ground", "follower": "l.start"}}}
-    coordinates = {} if drive is None else {"q": {"joint": "A", "drive": drive}}
-    return {"mechanism": m, "coordinates": coordinates}
-
-
-# --- the package
-
-
 def agree(tree: Tree, q: Any, seed: int) -> None:
     """The pencil and the nonlinear potential, and K_g in symbols and in numbers."""
     agree_under_weight(tree, q, direction(tree, seed))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from calibration import Floats
-from chains import model_of
+from chains import bar, model_of
 from spatial_random import last_node, random_closed, random_open
 
 import eigassign as ea
@@ -188,26 +188,14 @@ def test_without_damping_it_is_what_the_mechanism_does_beside_resonances() -> No
 @pytest.mark.parametrize("losses", ["ratios", "factors"])
 def test_of_many_modes_those_far_above_are_at_rest(losses: str) -> None:
     """A fine mesh, of which 64 of 120 modes are solved: the others lie 30 times as high."""
-    steel = {"youngs_modulus": 210e9, "density": 7850}
-    tree: Any = {
-        "title": "arm",
-        "mechanism": {
-            "space": "planar",
-            "materials": {"steel": steel},
-            "sections": {"rod": {"shape": "circle", "diameter": 0.03}},
-            "links": {
-                "arm": {"length": 1.0, "material": "steel", "section": "rod", "elements": 60}
-            },
-            "joints": {"root": {"type": "revolute", "base": "ground", "follower": "arm.start"}},
-        },
-        "coordinates": {"q": {"joint": "root", "drive": {"stiffness": 2e4}}},
-    }
+    rod, drive = {"shape": "circle", "diameter": 0.03}, {"stiffness": 2e4}
+    tree = bar(60, 1.0, 210e9, 7850, rod, "revolute", drive)
     if losses == "factors":
-        steel["loss_factor"] = tree["coordinates"]["q"]["drive"]["loss_factor"] = 0.02
+        tree["mechanism"]["materials"]["m"]["loss_factor"] = drive["loss_factor"] = 0.02
     else:
         tree["damping"] = 0.01
     model = model_of(tree)
-    own, x = unit_forces(model, {"arm.end": [[0.0, 1.0]]}), model.x([0.3], [])
+    own, x = unit_forces(model, {"bar.end": [[0.0, 1.0]]}), model.x([0.3], [])
     omega = 2.0 * np.pi * np.linspace(5.0, 200.0, 50)[None]
     few = modal_response(model, dampings(model)[0], own, x, float(omega.max()))
     every = modal_response(model, dampings(model)[0], own, x, 1e9)

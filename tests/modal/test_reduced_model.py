@@ -5,8 +5,9 @@ from typing import Any
 import large as held
 import numpy as np
 import pytest
-from chains import model_of, random_chain, two_link
+from chains import model_of, two_link
 from large import DRIVES, HELD, large
+from spatial_random import random_open
 
 from eigassign import load_case
 from eigassign.mechanism import Pencil
@@ -145,7 +146,7 @@ def test_the_sparse_path_gives_the_same_model_as_the_dense_one():
 
 @pytest.mark.parametrize("seed", [3, 7, 19])
 def test_chunks_do_not_show(seed):
-    tree, q0 = random_chain(seed)
+    tree, q0 = random_open(seed, "planar")
     model = model_of(tree)
     reduced = reduce(model.pencil, q0, [], (1,), 2)
     q = q0 + np.random.default_rng(seed).uniform(-0.3, 0.3, (7, len(q0)))

@@ -44,34 +44,6 @@ def test_a_hit_is_bit_for_bit_what_was_stored(cache):
     assert bits(cache.load(KEY)) == bits(ARRAYS)
 
 
-def flipped(path: Path) -> bytes:
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 4
-    return bytes(data)
-
-
-def empty(path: Path) -> bytes:
-    return b""
-
-
-def of_another_key(path: Path) -> bytes:
-    other = Cache(path.parent.parent)
-    other.store(key("another"), ARRAYS)
-    return (other.directory / f"{key('another')}.h5").read_bytes()
-
-
-@pytest.mark.parametrize("damage", [flipped, empty, of_another_key])
-def test_a_damaged_file_is_set_aside_with_a_warning_and_can_be_rebuilt(
-    cache, stored, damage, caplog
-):
-    stored.write_bytes(damage(stored))
-    assert cache.load(KEY) is None
-    assert "damaged cache file" in caplog.text
-    assert [p.name for p in cache.directory.iterdir()] == [f"{KEY}.h5.damaged"]
-    cache.store(KEY, ARRAYS)
-    assert bits(cache.load(KEY)) == bits(ARRAYS)
-
-
 def test_every_single_flipped_bit_is_noticed(cache, stored, caplog):
     caplog.set_level(logging.CRITICAL)
     rng, whole = np.random.default_rng(1), stored.read_bytes()

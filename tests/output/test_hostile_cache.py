@@ -38,20 +38,31 @@ def terabyte(path: Path) -> None:
         file.truncate(10**12)
 
 
-PLACED = [pipe, folder, endless_link, device, terabyte]
+def empty(path: Path) -> None:
+    path.touch()
+
+
+def of_another_key(path: Path) -> None:
+    other = Cache(path.parents[1] / "other")
+    other.store(64 * "1", ARRAYS)
+    path.write_bytes((other.directory / f"{64 * '1'}.h5").read_bytes())
+
+
+PLACED = [pipe, folder, endless_link, device, terabyte, empty, of_another_key]
 
 
 @pytest.mark.parametrize("place", PLACED, ids=lambda place: place.__name__)
 def test_what_is_no_file_of_the_cache_is_set_aside_with_one_warning(
     place: Callable[[Path], None], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = tmp_path / f"{KEY}.h5"
-    place(path)
-    cache = Cache(tmp_path)
+    cache = Cache(tmp_path / "cache")
+    cache.directory.mkdir()
+    place(cache.directory / f"{KEY}.h5")
     with caplog.at_level(logging.WARNING):
         assert cache.load(KEY) is None
     assert len(caplog.records) == 1
     assert "set aside" in caplog.text
+    assert [p.name for p in cache.directory.iterdir()] == [f"{KEY}.h5.damaged"]
     cache.store(KEY, ARRAYS)
     found = cache.load(KEY)
     np.testing.assert_array_equal(found["numbers"], ARRAYS["numbers"])

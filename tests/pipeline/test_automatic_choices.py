@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from run_cases import changed, written
 
 from eigassign import load_case
 from eigassign.errors import AccuracyError
@@ -17,18 +18,9 @@ CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 
 
 def automatic(tmp_path: Path, accuracy: str, *changes: tuple[str, str]) -> Path:
-    text = CASE.read_text(encoding="utf-8")
-    for old, new in (
-        ("elements: 4", "elements: auto"),
-        ("elements: 3", "elements: auto"),
-        ("  order: 4", f"  order: auto\n  accuracy: {accuracy}"),
-        *changes,
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    path = tmp_path / "auto.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
+    auto = ("elements: 4", "elements: auto"), ("elements: 3", "elements: auto")
+    order = "  order: 4", f"  order: auto\n  accuracy: {accuracy}"
+    return written(tmp_path, changed(*auto, order, *changes))
 
 
 @pytest.mark.parametrize(("accuracy", "limit"), [("1 %", 1e-2), ("0.2 %", 2e-3)])

@@ -120,7 +120,9 @@ def worst_on_the_ellipsoid(
     return margins(case, path, at(z))[np.arange(count), np.arange(count)]
 
 
-def held(name: str, seed: int) -> None:
+@pytest.mark.slow  # ten seconds each
+@pytest.mark.parametrize(("name", "seed"), ALL)
+def test_limits_hold_as_often_as_was_asked_at_the_least_cost(name: str, seed: int) -> None:
     case, values, covariance = random_case(name, seed)
     results = solve_case(case).results
     row, wanted = results.assignment, case.file.assignment.probability
@@ -157,9 +159,3 @@ def held(name: str, seed: int) -> None:
         assert ours <= best + 0.01 * np.abs(prices) @ (upper - lower)
     else:
         assert best == np.inf or row.verdict == "do_not_use"
-
-
-@pytest.mark.slow  # ten seconds each
-@pytest.mark.parametrize(("name", "seed"), ALL)
-def test_limits_hold_as_often_as_was_asked_at_the_least_cost(name: str, seed: int) -> None:
-    held(name, seed)

@@ -152,22 +152,6 @@ def test_the_errors_of_each_trajectory_are_those_of_its_own_samples(pair: Result
     assert target.error.exact.rms_relative == pytest.approx(total, rel=1e-12)
 
 
-def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
-    pair: Result, tmp_path: Path
-) -> None:
-    targets = TARGETS.replace("Hz}", "Hz, trajectory: pick}")
-    targets += "  - {mode: 1, frequency: 194 Hz, trajectory: return}\n"
-    split = solved(tmp_path, pair_of(targets))
-    np.testing.assert_allclose(list(split.design.values()), list(pair.design.values()), rtol=1e-10)
-    one, two = pair.results.error, split.results.error
-    assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
-    assert [t.asked.trajectory for t in split.results.targets] == ["pick", "return"]
-    np.testing.assert_array_equal(
-        np.concatenate([t.initial_hz for t in split.results.targets]),
-        pair.results.targets[0].initial_hz,
-    )
-
-
 def test_targets_of_trajectories_with_other_numbers_of_samples_are_each_solved_on_its_own(
     tmp_path: Path,
 ) -> None:

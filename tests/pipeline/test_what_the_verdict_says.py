@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from spatial_cases import linkage
+from spatial_examples import straight
 from two_elastic_links import ALLOY, TWO_LINKS
 
 import eigassign as ea
@@ -122,23 +124,17 @@ def one_link(**more: Any) -> Result:
         {"name": f"L{k}", "q": [[0.0], [0.5], [1.0]], "duration": 1, "set": {"bodies.tool.mass": m}}
         for k, m in enumerate((1.0, 1.1, 1.2, 1.3, 1.4))
     ]
-    mechanism = {
-        "space": "planar",
-        "materials": {"alloy": ALLOY},
-        "sections": {"rod": {"shape": "circle", "diameter": 0.03}},
-        "links": {"a": {"length": 0.6, "material": "alloy", "section": "rod", "elements": 3}},
-        "joints": {"shoulder": {"type": "revolute", "base": "ground", "follower": "a.start"}},
-        "bodies": {"tool": {"at": "a.end", "mass": 1.0}},
-    }
+    tree = linkage(
+        {"a": straight(0.6, 3)},
+        {"shoulder": {"type": "revolute", "base": "ground", "follower": "a.start"}},
+        {"q1": {"joint": "shoulder", "drive": {"stiffness": 5000}}},
+        section={"shape": "circle", "diameter": 0.03},
+        material=ALLOY,
+        bodies={"tool": {"at": "a.end", "mass": 1.0}},
+    )
     k = {"parameter": "coordinates.q1.drive.stiffness", "min": 500, "max": 6000, **more}
-    case = {
-        "title": "one link, five loads",
-        "mechanism": mechanism,
-        "coordinates": {"q1": {"joint": "shoulder", "drive": {"stiffness": 5000}}},
-        "trajectory": motions,
-        "design": {"k": k},
-    }
-    return solve_case(ea.load_case({**case, "targets": [{"keep_out": [8, 13.2]}]}))
+    tree |= {"title": "one link, five loads", "trajectory": motions, "design": {"k": k}}
+    return solve_case(ea.load_case({**tree, "targets": [{"keep_out": [8, 13.2]}]}))
 
 
 def test_a_band_that_all_loads_pass_below_is_not_called_infeasible() -> None:

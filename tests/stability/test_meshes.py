@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from calibration import Drawn
 from chains import Tree, case_of
+from spatial_cases import linkage
 from weighed_draws import DRAWS, hung
 
 from eigassign.case import CaseFile
@@ -25,14 +26,9 @@ Generator = np.random.Generator
 def drawn_tapers(rng: Generator) -> Tree:
     """One or two beams of 1 to 5 elements, their ends up to twentyfold apart, some with bodies."""
     n, space = int(rng.integers(1, 6)), str(rng.choice(["planar", "spatial"]))
-    mechanism: Tree = {
-        "space": space,
-        "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33}},
-        "sections": {},
-        "links": {},
-        "joints": {},
-        "bodies": {},
-    }
+    metal = {"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33}
+    tree = linkage({}, {}, material=metal, sections={}, space=space, bodies={})
+    mechanism = tree["mechanism"]
     for k in range(int(rng.integers(1, 3))):
         length = float(rng.uniform(0.2, 1.0))
         sections = _ends(rng, length / 10 ** rng.uniform(0.5, 1.5))
@@ -51,7 +47,7 @@ def drawn_tapers(rng: Generator) -> Tree:
                 "at": f"l{k}.end",
                 "mass": float(10 ** rng.uniform(-2, 1)),
             }
-    return {"mechanism": mechanism, "coordinates": {}}
+    return tree
 
 
 def _ends(rng: Generator, thick: float) -> tuple[Tree, Tree]:

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 from chains import Tree, model_of
+from spatial_cases import linkage
 
 from eigassign.errors import EigassignError
 from eigassign.modal import rounding_error
@@ -21,26 +22,15 @@ Random = np.random.Generator
 def stiff_chain(rng: Random, factor: float) -> Tree:
     """One to three round beams of 3 to 250 elements, in a plane or in space, and two springs."""
     spatial, n = bool(rng.random() < 0.3), int(rng.integers(1, 4))
-    m: Tree = {
-        "space": "spatial" if spatial else "planar",
-        "materials": {
-            "a": {
-                "youngs_modulus": 70e9 * factor,
-                "density": 2700.0 * factor,
-                "poissons_ratio": 0.3,
-            }
-        },
-        "sections": {},
-        "links": {},
-        "joints": {},
-        "springs": {},
-    }
-    coordinates: Tree = {}
+    metal = {"youngs_modulus": 70e9 * factor, "density": 2700.0 * factor, "poissons_ratio": 0.3}
+    own = {"sections": {}, "space": "spatial" if spatial else "planar", "springs": {}}
+    tree = linkage({}, {}, material=metal, **own)
+    m, coordinates = tree["mechanism"], tree["coordinates"]
     for k in range(n):
         m["sections"][f"s{k}"] = {"shape": "circle", "diameter": float(10 ** rng.uniform(-3, -1.3))}
         m["links"][f"l{k}"] = {
             "length": float(rng.uniform(0.2, 1.5)),
-            "material": "a",
+            "material": "m",
             "section": f"s{k}",
             "elements": round(10 ** rng.uniform(0.5, 1.7 if spatial else 2.4)),
         }
@@ -61,7 +51,7 @@ def stiff_chain(rng: Random, factor: float) -> Tree:
             "between": both,
             **{key: float(10 ** rng.uniform(0, 15.5)) * factor for key in keys[rng.integers(3)]},
         }
-    return {"mechanism": m, "coordinates": coordinates}
+    return tree
 
 
 def spread_and_stated(seed: int) -> tuple[float, float] | None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from calibration import Drawn, Floats, draw
+from calibration import Drawn, Floats
 from scipy import linalg
 from wide_draws import FAMILIES
 
@@ -13,7 +13,7 @@ from eigassign.errors import EigassignError
 from eigassign.modal import Model
 from eigassign.study import build_model
 
-DRAWS = (draw, *FAMILIES.values())
+DRAWS = tuple(FAMILIES.values())
 SHARES = (1e-3, 0.03, 0.2, 0.5, 0.8, 0.95)  # of the load that buckles the weakest of all samples
 
 

@@ -1,6 +1,6 @@
-"""Random spatial trees, mechanisms with loops, and arms whose bending modes nearly coincide.
+"""Random trees, mechanisms with loops, and arms whose bending modes nearly coincide.
 
-As ``calibration.draw`` for planar trees: a mechanism, a design box, and poses around one point.
+Of each a mechanism, a design box, and poses around one point.
 """
 
 from collections.abc import Callable
@@ -18,6 +18,12 @@ SLIDE = 0.1  # m: a sliding joint is drawn within this of its place at q0
 LOOP_SPAN = 0.5  # rad: a loop seldom closes over more
 LENGTHS = 0.05  # a loop's links are drawn within this share of their lengths
 EQUAL = (0.0, 1e-8, 1e-5, 1e-3, 1e-2, 5e-2)  # by how much height and width of a section differ
+
+
+def planar_tree(seed: int, samples: int) -> Drawn | None:
+    """One to four links in a plane."""
+    tree, q0 = random_open(seed, "planar")
+    return _drawn(tree, q0, seed, samples, SPAN, 0.5)
 
 
 def spatial_tree(seed: int, samples: int) -> Drawn | None:
@@ -63,6 +69,7 @@ def hanging_arm(seed: int) -> tuple[Tree, Floats]:
 
 
 FAMILIES: dict[str, Callable[[int, int], Drawn | None]] = {
+    "planar trees": planar_tree,
     "spatial trees": spatial_tree,
     "planar loops": planar_loop,
     "spatial loops": spatial_loop,

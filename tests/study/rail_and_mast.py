@@ -4,6 +4,7 @@ import copy
 from typing import Any
 
 from chains import Tree, case_of
+from spatial_cases import linkage
 
 from eigassign import Case
 
@@ -14,34 +15,27 @@ OUT = {"points": [[0.2], [0.9]], "duration": 1.0, "samples": 31}
 
 def tree(targets: list[Tree] | None = None, coupled: float = 0.0, **more: Any) -> Tree:
     """Both on the ground, or at the end of a foot of that length in m."""
-    found: Tree = {
-        "mechanism": {
-            "space": "planar",
-            "materials": {"steel": {"youngs_modulus": 210e9, "density": 7800.0}},
-            "sections": {
-                name: {"shape": "rectangle", "width": 0.02, "height": 0.03}
-                for name in ("rail", "mast")
-            },
-            "links": {
-                "rail": {"length": 1.0, "material": "steel", "section": "rail", "elements": 6},
-                "mast": {"length": 0.7, "material": "steel", "section": "mast", "elements": 3},
-                "carriage": {"type": "rigid", "mass": 1.0},
-            },
-            "joints": {
-                "rail_foot": {"type": "fixed", "base": "ground", "follower": "rail.start"},
-                "mast_foot": {"type": "fixed", "base": "ground", "follower": "mast.start"},
-                "slide": {"type": "carriage", "base": "rail", "follower": "carriage.start"},
-            },
-            "bodies": {
-                "lamp": {"at": "mast.end", "mass": 0.9},
-                "end": {"at": "rail.end", "mass": 0.2},
-            },
+    beam = {"material": "steel", "elements": 6}
+    found: Tree = linkage(
+        {
+            "rail": {**beam, "length": 1.0, "section": "rail"},
+            "mast": {**beam, "length": 0.7, "section": "mast", "elements": 3},
+            "carriage": {"type": "rigid", "mass": 1.0},
         },
-        "coordinates": {"x": {"joint": "slide", "drive": "locked"}},
-        "trajectory": OUT,
-        "design": {"height": HEIGHT, "lamp": LAMP},
-        **({} if targets is None else {"targets": targets}),
-    }
+        {
+            "rail_foot": {"type": "fixed", "base": "ground", "follower": "rail.start"},
+            "mast_foot": {"type": "fixed", "base": "ground", "follower": "mast.start"},
+            "slide": {"type": "carriage", "base": "rail", "follower": "carriage.start"},
+        },
+        {"x": {"joint": "slide", "drive": "locked"}},
+        materials={"steel": {"youngs_modulus": 210e9, "density": 7800.0}},
+        sections={
+            name: {"shape": "rectangle", "width": 0.02, "height": 0.03} for name in ("rail", "mast")
+        },
+        bodies={"lamp": {"at": "mast.end", "mass": 0.9}, "end": {"at": "rail.end", "mass": 0.2}},
+    )
+    found |= {"trajectory": OUT, "design": {"height": HEIGHT, "lamp": LAMP}}
+    found |= {} if targets is None else {"targets": targets}
     if coupled:
         mechanism = found["mechanism"]
         mechanism["sections"]["foot"] = {"shape": "rectangle", "width": 0.1, "height": 0.1}

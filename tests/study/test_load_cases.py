@@ -107,14 +107,6 @@ def test_the_expansion_point_has_the_middle_of_the_loads(given: object) -> None:
     assert plan.q0[:2].tolist() == given or plan.q0[:2].tolist() in poses
 
 
-def test_loads_rest_along_their_trajectory() -> None:
-    whole = case(arm(*LOADED))
-    for part in whole.trajectories:
-        motion = rates(part.trajectory)
-        assert not motion.rate[:, 2:].any()
-        assert not motion.acceleration[:, 2:].any()
-
-
 def test_several_units_of_loads_do_not_move_the_nearest_expansion_point() -> None:
     """Of two points of one pose the one with the nearer load is nearest, whatever its unit."""
     tree = arm({"materials.al.youngs_modulus": 60e9}, {"materials.al.youngs_modulus": 80e9})

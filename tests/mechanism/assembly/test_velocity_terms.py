@@ -174,13 +174,3 @@ def test_the_effect_falls_with_the_square_of_the_speed() -> None:
     first, second = (np.abs(change).max() for change in found)
     assert first > 1e-6
     assert first / second == pytest.approx(4.0, rel=0.02)
-
-
-def test_a_motion_that_starts_with_a_jerk_is_measured_too() -> None:
-    model = built(four_bar("free"))
-    t = np.linspace(0.0, 0.5, 7)
-    found = motion_effect(
-        model.pencil, terms(model), timed(t, (0.4 + 2.0 * t**2)[:, None]), NONE, (1,)
-    )
-    assert np.isfinite(found.change).all()
-    assert np.abs(found.change).max() < 0.1

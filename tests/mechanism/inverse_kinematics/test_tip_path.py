@@ -48,13 +48,6 @@ def test_spline_stands_very_uneven_chords(seed):
     )
 
 
-@BOTH
-def test_paths_go_through_their_waypoints(path):
-    points = waypoints(7, 3)
-    through = path(points)
-    np.testing.assert_allclose(through.value(through.knots), points, rtol=0, atol=1e-14)
-
-
 def test_polyline_moves_by_equal_arc_lengths():
     path = straight([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])
     np.testing.assert_allclose(path.value([0.5, 0.75, 0.875]), [[2, 0], [3, 0], [3, 0.5]])
@@ -67,14 +60,6 @@ def test_polyline_has_corners_where_it_turns_and_a_spline_has_none():
     np.testing.assert_allclose(straight(points).corners(), [0.5])
     assert spline(points).corners().size == 0
     assert straight(points[:2]).corners().size == 0
-
-
-def test_two_waypoints_make_a_line_and_three_a_parabola():
-    line = spline([[0.0, 1.0], [2.0, 5.0]])
-    np.testing.assert_allclose(line.value([0.25]), [[0.5, 2.0]])
-    t = np.array([0.0, 1.0, 2.0])  # equal chords, so that s is t / 2
-    parabola = spline(np.stack([t, (t - 1.0) ** 2], axis=1))
-    np.testing.assert_allclose(parabola.value([0.25, 0.75]), [[0.5, 0.25], [1.5, 0.25]])
 
 
 @BOTH

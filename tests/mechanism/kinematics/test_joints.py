@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chains import model_of, two_link
 from scipy.spatial.transform import Rotation
-from spatial_cases import Built, built, changed
-from spatial_examples import arm3r, four_bar, gantry, slotted_lever
-from spatial_oracle import FREEDOMS, Tree, solve_pose, world
+from spatial_cases import Built, built
+from spatial_examples import four_bar, gantry, slotted_lever
+from spatial_oracle import FREEDOMS, Tree, world
 from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 
 from eigassign.case import FREEDOMS as KNOWN_FREEDOMS
@@ -102,19 +101,6 @@ def test_an_absolute_angle_of_a_link_that_others_hold_is_refused_by_name() -> No
     )
 
 
-def test_a_screw_travels_its_lead_in_one_turn() -> None:
-    screw = Given(type="screw", axis=(0.0, 0.0, 2.0), lead=0.005)
-    R, d, _ = numbers(joint_motion(screw, [2.0 * np.pi]))
-    np.testing.assert_allclose(d, [0.0, 0.0, 0.005], atol=1e-18)
-    np.testing.assert_allclose(R, np.eye(3), atol=1e-15)
-
-
-def test_a_nut_turns_once_while_it_travels_its_lead() -> None:
-    R, _, A = numbers(joint_motion(Given(type="nut", lead=0.02), [0.005]))
-    np.testing.assert_allclose(R @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-15)
-    np.testing.assert_allclose(A[:, 0], [1.0, 0, 0, 2.0 * np.pi / 0.02, 0, 0])
-
-
 # World frames of every link against their twists
 
 
@@ -186,38 +172,6 @@ def test_an_absolute_angle_is_the_worlds_wherever_the_joint_is_in_the_file() -> 
     model, th = built(tree), 0.5
     crank = model.poses.position(model.x([th]), "crank", "end")[0]
     np.testing.assert_allclose(crank, [0.12 * np.cos(th), 0.12 * np.sin(th), 0.0], atol=1e-12)
-
-
-def test_turning_and_moving_the_whole_mechanism_changes_no_frequency() -> None:
-    tree = arm3r("free")
-    moved = changed(tree, "joints.yaw.orientation", [0.7, -1.1, 0.4])
-    moved = changed(moved, "joints.yaw.position", [0.3, 2.0, -1.0])
-    q = [0.3, 0.5, -0.9]
-    np.testing.assert_allclose(built(moved).lam(q, 5), built(tree).lam(q, 5), rtol=1e-9)
-
-
-# --- World poses of the links
-
-
-def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
-    model = model_of(two_link())
-    q = np.array([[0.4, 1.7], [-1.0, 3.0]])
-    tip = model.poses.position(model.x(q, [0.0, 0.0]), "fore", "end")
-    np.testing.assert_allclose(tip[:, 0], 0.6 * np.cos(q[:, 0]) + 0.45 * np.cos(q[:, 1]))
-    np.testing.assert_allclose(tip[:, 1], 0.6 * np.sin(q[:, 0]) + 0.45 * np.sin(q[:, 1]))
-    np.testing.assert_array_equal(tip[:, 2], 0.0)
-
-
-def test_a_designed_length_moves_the_links_it_carries() -> None:
-    design = {"a": {"parameter": "links.upper.length", "min": 0.1, "max": 2.0}}
-    model = model_of(two_link(design=design))
-    for length in (0.3, 1.5):
-        tree = two_link(design={})
-        tree["mechanism"]["links"]["upper"]["length"] = length
-        pose = solve_pose(tree, np.array([0.4, 1.7]))
-        for link in ("upper", "fore"):
-            end = model.poses.position(model.x([0.4, 1.7], [length]), link, "end")[0]
-            np.testing.assert_allclose(end[:2], pose.node(tree, f"{link}.end")[:2])
 
 
 def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:

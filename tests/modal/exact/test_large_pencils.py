@@ -1,21 +1,20 @@
 """Samples of a large pencil, by Lanczos' method: the modes of each, and none missed."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from chains import model_of, random_chain, two_link
+from chains import model_of, two_link
 from large import large
 from scipy import sparse
 from spatial_cases import linkage
+from wide_draws import planar_tree
 
 from eigassign.errors import MissingMassError
 from eigassign.mechanism import Pencil
 from eigassign.modal import modes, rounding_error, solve_large
 
-CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
 SAMPLES = 8
 
 
@@ -41,12 +40,10 @@ def agree(pencil: Pencil, x: np.ndarray, count: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_chains_have_the_modes_of_the_dense_solver(seed: int) -> None:
-    tree, q = random_chain(seed)
-    model = model_of(tree)
-    rng = np.random.default_rng(seed)
-    x = model.x(q + rng.uniform(-1.0, 1.0, (SAMPLES, np.size(q))), [])
-    agree(model.pencil, x, min(4, len(model.pencil.elastic) - 2))
+def test_random_trees_have_the_modes_of_the_dense_solver(seed: int) -> None:
+    drawn = planar_tree(seed, SAMPLES)
+    pencil, x = drawn.model.pencil, drawn.model.x(drawn.q, drawn.y)
+    agree(pencil, x, min(4, len(pencil.elastic) - 2))
 
 
 def twins(arms: int = 3) -> dict[str, Any]:

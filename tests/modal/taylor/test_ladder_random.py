@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calibration import Drawn, draw
+from calibration import Drawn
 from rungs import residual, slope
 from wide_draws import FAMILIES
 
@@ -10,7 +10,6 @@ from eigassign.errors import EigassignError
 from eigassign.mechanism import Pencil
 from eigassign.modal import Expansion, expand, rounding_error
 
-EVERY = {"planar trees": draw, **FAMILIES}
 SPAN = 0.2  # rad or m, and of the design parameters' middle values
 
 
@@ -20,7 +19,7 @@ def climb(family: str, seed: int) -> list[float]:
     There is none where no variable matters, and where modes lie so close that they are expanded
     together: λ_1 is then no polynomial, and clusters have a ladder of their own in test_clusters.
     """
-    drawn = EVERY[family](seed, 1)
+    drawn = FAMILIES[family](seed, 1)
     if drawn is None or not drawn.model.pencil.active.any():
         return []
     pencil, x0, span = drawn.model.pencil, *scaled(drawn)
@@ -54,7 +53,7 @@ def apart(pencil: Pencil, e: Expansion, span: np.ndarray, floor: float) -> float
     return None
 
 
-@pytest.mark.parametrize("family", EVERY)
+@pytest.mark.parametrize("family", FAMILIES)
 def test_random_mechanisms_are_expanded_to_their_order(family: str) -> None:
     beyond = [b for seed in range(60_000, 60_002) for b in climb(family, seed)]
     assert len(beyond) >= 4

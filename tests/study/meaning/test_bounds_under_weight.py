@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from chains import case_of
 from scipy.spatial.transform import Rotation
+from spatial_cases import linkage
 from spatial_examples import straight
 
 import eigassign as ea
@@ -27,30 +28,27 @@ def arm(seed: int, design: dict[str, Any]) -> ea.Case:
     }
     q = [*rng.uniform(-3.0, 3.0, 2), 0.0]
     q[2] = -np.pi / 2 - q[0] - q[1] + rng.uniform(-0.6, 0.6)
-    tree: dict[str, Any] = {
-        "title": "arm",
-        "mechanism": {
-            "space": "planar",
-            "gravity": [0.0, -9.81 * 10.0 ** rng.uniform(-1.0, 1.0)],
-            "materials": {"m": MATERIAL},
-            "sections": {"s": {"shape": "circle", "diameter": rng.uniform(0.01, 0.03)}},
-            "links": {name: straight(rng.uniform(0.3, 1.0), 2) for name in "abc"},
-            "joints": joints,
-            "bodies": {
-                name: {"at": f"{link}.end", "mass": 10.0 ** rng.uniform(-1.0, 1.5),
-                       "inertia": 0.01, "offset": rng.uniform(-0.1, 0.1, 2).tolist()}
-                for name, link in (("elbow", "a"), ("wrist", "b"), ("tip", "c"))
-            },
-        },
-        "coordinates": {
-            "h": {"joint": "h", "drive": {"stiffness": 1e4, "inertia": 0.1}},
-            "k": {"joint": "k", "drive": {"stiffness": 1e4, "inertia": 0.1}},
-            "p": {"joint": "p", "drive": "free" if seed % 2 else "locked"},
-        },
-        "trajectory": {"q": [q, [*(np.array(q) + 0.05)]], "duration": 10.0},
-        "design": design,
+    gravity = [0.0, -9.81 * 10.0 ** rng.uniform(-1.0, 1.0)]
+    rod = {"shape": "circle", "diameter": rng.uniform(0.01, 0.03)}
+    links = {name: straight(rng.uniform(0.3, 1.0), 2) for name in "abc"}
+    bodies = {
+        name: {"at": f"{link}.end", "mass": 10.0 ** rng.uniform(-1.0, 1.5),
+               "inertia": 0.01, "offset": rng.uniform(-0.1, 0.1, 2).tolist()}
+        for name, link in (("elbow", "a"), ("wrist", "b"), ("tip", "c"))
     }  # fmt: skip
-    return case_of(tree)
+    geared = {"stiffness": 1e4, "inertia": 0.1}
+    drives = {"h": geared, "k": geared, "p": "free" if seed % 2 else "locked"}
+    tree = linkage(
+        links,
+        joints,
+        {name: {"joint": name, "drive": drive} for name, drive in drives.items()},
+        section=rod,
+        material=MATERIAL,
+        gravity=gravity,
+        bodies=bodies,
+    )
+    path = {"q": [q, [*(np.array(q) + 0.05)]], "duration": 10.0}
+    return case_of(tree | {"trajectory": path, "design": design})
 
 
 def studied(case: ea.Case) -> Scene:
@@ -87,29 +85,24 @@ def slewing(inertia: float) -> ea.Case:
     """A boom that slews freely about a vertical axis, on a crooked post."""
     post, bent = [0.0, -1.2, 0.0], [0.3, -0.4, 0.5]
     level = (Rotation.from_euler("xyz", post) * Rotation.from_euler("xyz", bent)).inv()
-    tree: dict[str, Any] = {
-        "title": "slewing boom",
-        "mechanism": {
-            "space": "spatial",
-            "gravity": [0.0, 0.0, -9.81],
-            "materials": {"m": MATERIAL},
-            "sections": {"s": {"shape": "circle", "diameter": 0.03}},
-            "links": {"p": straight(1.0, 2), "b": straight(0.6, 2), "a": straight(0.7, 2)},
-            "joints": {
-                "f": {"type": "fixed", "base": "ground", "follower": "p.start",
-                      "orientation": post},
-                "k": {"type": "fixed", "base": "p.end", "follower": "b.start",
-                      "orientation": bent},
-                "h": {"type": "revolute", "base": "b.end", "follower": "a.start",
-                      "orientation": level.as_euler("xyz").tolist()},
-            },
-            "bodies": {"tip": {"at": "a.end", "mass": 200.0}},
+    tree = linkage(
+        {"p": straight(1.0, 2), "b": straight(0.6, 2), "a": straight(0.7, 2)},
+        {
+            "f": {"type": "fixed", "base": "ground", "follower": "p.start", "orientation": post},
+            "k": {"type": "fixed", "base": "p.end", "follower": "b.start", "orientation": bent},
+            "h": {"type": "revolute", "base": "b.end", "follower": "a.start",
+                  "orientation": level.as_euler("xyz").tolist()},
         },
-        "coordinates": {"q": {"joint": "h", "drive": {"inertia": inertia}}},
-        "trajectory": {"q": [[0.3], [0.4]], "duration": 1.0},
-        "design": {"J": {"parameter": "coordinates.q.drive.inertia", "min": 1e-3, "max": 50.0}},
-    }  # fmt: skip
-    return case_of(tree)
+        {"q": {"joint": "h", "drive": {"inertia": inertia}}},
+        section={"shape": "circle", "diameter": 0.03},
+        material=MATERIAL,
+        space="spatial",
+        gravity=[0.0, 0.0, -9.81],
+        bodies={"tip": {"at": "a.end", "mass": 200.0}},
+    )  # fmt: skip
+    design = {"J": {"parameter": "coordinates.q.drive.inertia", "min": 1e-3, "max": 50.0}}
+    path = {"q": [[0.3], [0.4]], "duration": 1.0}
+    return case_of(tree | {"trajectory": path, "design": design})
 
 
 def test_inertia_that_elastic_modes_move_along_under_the_weight_is_of_no_known_effect() -> None:
