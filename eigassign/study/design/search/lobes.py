@@ -4,8 +4,7 @@ Slopes lead to the end of one basin only. So designs all over the bounds are loo
 motion time, which costs little in their modes. In the basins of the smallest residuals the modes'
 amplitudes are made small by least squares: they are smooth where residuals have kinks, so that
 this follows valleys in which two modes come to rest at once. From there the search for the optimum
-starts. At what it has found all times are looked at again: where a faster one keeps the limits too,
-it goes on from there.
+starts.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from eigassign.assignment.exact.design_problem import ON
 from eigassign.assignment.requirements.residual import STEP
 from eigassign.case.schema.trajectory import DURATION_PATH
 from eigassign.errors import EigassignError
@@ -34,8 +32,6 @@ NEAR = 4.0  # times its limit: a basin that is worse is passed over
 SAME = 0.02  # of the times of basins: nearer ones are one, of which the best is looked at
 LOOKS, SOLVES = 2 * LOBES, 10  # basins whose amplitudes are made small, and steps of each
 STEPS = 30  # from each basin: what takes more is none that can keep the limits
-AGAIN = 3  # times that a search goes on from a faster motion
-FASTER = 1e-3  # relative
 
 
 class Basin(NamedTuple):
@@ -69,24 +65,11 @@ def fastest(
     scene: Scene, starts: Sequence[Floats], progress: Callable[[str], None], deadline: float
 ) -> Found:
     """The design with the least motion time that keeps all limits, from many basins."""
-    column, (lower, upper) = duration_column(scene), scene.bounds
-    times, keys = np.geomspace(lower[column], upper[column], TIMES), scene.file.assignment
+    keys = scene.file.assignment
     short = keys.model_copy(update={"steps": min(keys.steps, STEPS)})
     scene = replace(scene, file=replace(scene.file, assignment=short))
     near = basins(scene, starts, progress)
-    found = find_optimum(scene, starts, progress, near, deadline=deadline)
-    for _ in range(AGAIN if found.best.seen.violation <= ON else 0):
-        y = found.best.y
-        own = _basins(scene, y, column, times[times < y[column] * (1.0 - FASTER)])
-        faster = [basin for basin in own if basin.missed <= 1.0]
-        if not faster:
-            break
-        again = [basin.y for basin in sorted(faster)[:LOBES]]
-        other = find_optimum(scene, [y], progress, again, deadline=deadline)
-        if not (other.missed, other.best.objective) < (found.missed, found.best.objective):
-            break
-        found = other
-    return found
+    return find_optimum(scene, starts, progress, near, deadline=deadline)
 
 
 def _quietest(scene: Scene, basin: Basin, column: int) -> Basin:
@@ -119,8 +102,6 @@ def _quietest(scene: Scene, basin: Basin, column: int) -> Basin:
 
 def _basins(scene: Scene, y: Floats, column: int, times: Floats) -> Iterator[Basin]:
     """Yield the motion times at which a design misses the residual limits least, beside others."""
-    if not len(times):
-        return
     missed = np.zeros(len(times))
     for one in scene.residuals:
         try:
