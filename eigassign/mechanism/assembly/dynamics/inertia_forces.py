@@ -23,14 +23,12 @@ import numpy as np
 
 from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.build import by_name, drive_value, local_links
+from eigassign.mechanism.assembly.build import drive_value
 from eigassign.mechanism.assembly.dynamics.velocity_terms import (
     IMAGINARY,
     StackedLinks,
-    placeless,
+    heavy_links,
     stacked,
-    whole_mass,
     whole_size,
 )
 from eigassign.mechanism.assembly.loads.statics import Loaded, first_moment
@@ -96,21 +94,13 @@ def inertia_forces(
 ) -> InertiaForces:
     """Collect what f hangs on.
 
-    Raises MechanismError for superelements and solids, whose inner dofs have no directions.
+    Raises MechanismError as `heavy_links` does.
     """
-    for name in placeless(case):
-        message = "has inner dofs of unknown direction: its forces of inertia cannot be formed"
-        raise MechanismError(f"mechanism.links.{name}", message)
-    links, nodes = local_links(case, parameters, motion)
-    named = by_name(motion, links)
-    heavy = {name: link for name, link in named.items() if whole_mass(link)}
-    moving = all_moving(case, parameters, motion)
-    stack, _ = stacked(list(heavy.items()), nodes, moving, motion)
-    first = dict(
-        zip(heavy, np.cumsum([0, *map(whole_size, heavy.values())]).tolist(), strict=False)
-    )
-    known = parameters.with_passive(motion.passive)
-    scene = Loaded(case, known, motion, named, nodes)
+    heavy, nodes = heavy_links(case, parameters, motion)
+    stack, _ = stacked(heavy, nodes, all_moving(case, parameters, motion), motion)
+    sizes = [0, *map(whole_size, heavy.values())]
+    first = dict(zip(heavy, np.cumsum(sizes).tolist(), strict=False))
+    scene = Loaded(case, parameters.with_passive(motion.passive), motion, heavy, nodes)
     own_sites = {node: site for node, site in scene.sites.items() if node[0] in heavy}
     slots = [
         np.where(own >= 0, own + first[name], -1)

@@ -454,7 +454,7 @@ def stiffness_under_load(
     known, named = parameters.with_passive(motion.passive), by_name(motion, links)
     scene = Loaded(case, known, motion, named, nodes)
     moving = all_moving(case, parameters, motion)
-    stack, _ = stacked(list(named.items()), nodes, moving, motion)
+    stack, _ = stacked(named, nodes, moving, motion)
     sizes = [whole_size(link) for link in links]
     first = dict(zip(named, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
     loads, K = variable_loads(scene), AffineEntries(summed=True)

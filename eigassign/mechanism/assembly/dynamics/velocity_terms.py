@@ -25,7 +25,7 @@ frames. Each is a fixed pattern: only its numbers change along a motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -36,7 +36,7 @@ from scipy import sparse
 from eigassign.arrays import Floats, Ints
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.build import by_name, local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.elements.beam import fields
@@ -113,21 +113,30 @@ def velocity_terms(
 ) -> VelocityTerms:
     """Collect what varies along a motion: carried nodes, twists, spins, mass coefficients.
 
-    Raises MechanismError for a superelement, whose inner dofs have no directions.
+    Raises MechanismError as `heavy_links` does.
+    """
+    links, nodes = heavy_links(case, parameters, motion)
+    stack, meshes = stacked(links, nodes, all_moving(case, parameters, motion), motion)
+    scalars = [*stack.scalars, *(array for mesh in meshes for array in _mesh_scalars(mesh))]
+    return VelocityTerms(stack, parameters.compiled(*scalars), parameters)
+
+
+def heavy_links(
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics
+) -> tuple[dict[str, LocalLink], NodeMotions]:
+    """The links with mass by name, which rigid ones may not have, and the motions of nodes.
+
+    Raises MechanismError for superelements and solids, whose inner dofs have no directions.
     """
     for name in placeless(case):
         message = "has inner dofs of unknown direction: its velocity terms cannot be formed"
         raise MechanismError(f"mechanism.links.{name}", message)
     links, nodes = local_links(case, parameters, motion)
-    placed = zip(links, motion.placements, strict=True)
-    heavy = [(p.link, link) for link, p in placed if whole_mass(link)]  # rigid ones may not
-    stack, meshes = stacked(heavy, nodes, all_moving(case, parameters, motion), motion)
-    scalars = [*stack.scalars, *(array for mesh in meshes for array in _mesh_scalars(mesh))]
-    return VelocityTerms(stack, parameters.compiled(*scalars), parameters)
+    return {n: link for n, link in by_name(motion, links).items() if whole_mass(link)}, nodes
 
 
 def stacked(
-    links: Sequence[tuple[str, LocalLink]],
+    links: Mapping[str, LocalLink],
     nodes: NodeMotions,
     moving: Kinematics,
     motion: Kinematics,
@@ -137,8 +146,8 @@ def stacked(
     ``moving`` has every coordinate among its columns, as from `all_moving`.
     """
     kept, n_dof = DOFS[nodes.space], nodes.count + len(motion.columns)
-    sizes = [whole_size(link) for _, link in links]
-    n_local, n_whole = sum(len(link.own) for _, link in links), sum(sizes)
+    sizes = [whole_size(link) for link in links.values()]
+    n_local, n_whole = sum(len(link.own) for link in links.values()), sum(sizes)
     n_twist = len(kept) * len(links)
     U, N, T = Entries((n_local, n_dof)), Entries((n_local, n_twist)), Entries((n_twist, n_dof))
     m, rates = (
@@ -147,7 +156,7 @@ def stacked(
     )
     local = whole = 0
     riders, meshes, bases = [], [], []
-    for k, (name, link) in enumerate(links):
+    for k, (name, link) in enumerate(links.items()):
         own, size = np.flatnonzero(link.own >= 0), sizes[k]
         U.add(1.0, local + own, link.own[own], np.ones(len(own)))
         for slot, row in link.carried.items():
