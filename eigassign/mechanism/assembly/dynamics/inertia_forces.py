@@ -101,19 +101,16 @@ def inertia_forces(
     sizes = [0, *map(whole_size, heavy.values())]
     first = dict(zip(heavy, np.cumsum(sizes).tolist(), strict=False))
     scene = Loaded(case, parameters.with_passive(motion.passive), motion, heavy, nodes)
-    own_sites = {node: site for node, site in scene.sites.items() if node[0] in heavy}
-    slots = [
-        np.where(own >= 0, own + first[name], -1)
-        for name, own in ((node[0], scene.whole(node[0]).nodes[node[1]]) for node in own_sites)
-    ]
+    placed = [(scene.whole(name).nodes[node], first[name]) for name, node in scene.sites]
+    slots = [np.where(own >= 0, own + start, -1) for own, start in placed]
     drives = np.zeros(len(case.coordinates), dtype=object)
     for i, name in enumerate(case.coordinates):
         drives[i] = drive_value(case, parameters, name, "inertia") or 0.0
-    sites = np.array(list(own_sites.values()), dtype=object).reshape(-1, 6, 6)
+    sites = np.array(list(scene.sites.values()), dtype=object).reshape(-1, 6, 6)
     return InertiaForces(
         stack,
         np.array(slots, dtype=np.intp).reshape(-1, 6),
-        np.array([list(heavy).index(node[0]) for node in own_sites], dtype=np.intp),
+        np.array([list(heavy).index(node[0]) for node in scene.sites], dtype=np.intp),
         parameters.relative,
         motion.coordinates.rates[: len(drives)],
         parameters.compiled(*stack.scalars, sites, drives),
