@@ -4,6 +4,7 @@ Of each a mechanism, a design box, and poses around one point.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from calibration import SPAN, Drawn, Floats, with_box
@@ -20,28 +21,15 @@ LENGTHS = 0.05  # a loop's links are drawn within this share of their lengths
 EQUAL = (0.0, 1e-8, 1e-5, 1e-3, 1e-2, 5e-2)  # by how much height and width of a section differ
 
 
-def planar_tree(seed: int, samples: int) -> Drawn | None:
-    """One to four links in a plane."""
-    tree, q0 = random_open(seed, "planar")
-    return _drawn(tree, q0, seed, samples, SPAN, 0.5)
+def tree(space: str, seed: int, samples: int) -> Drawn | None:
+    """One to four links, in space with joints of every kind."""
+    return _drawn(*random_open(seed, space), seed, samples, SPAN, 0.5)
 
 
-def spatial_tree(seed: int, samples: int) -> Drawn | None:
-    """One to four links with joints of every kind."""
-    tree, q0 = random_open(seed, "spatial")
-    return _drawn(tree, q0, seed, samples, SPAN, 0.5)
-
-
-def planar_loop(seed: int, samples: int) -> Drawn | None:
-    """One or two loops in a plane, at least one coordinate left."""
-    tree, q0, _ = random_closed(seed, "planar", 1 + seed % 2)
-    return _drawn(tree, q0, seed, samples, LOOP_SPAN, LENGTHS)
-
-
-def spatial_loop(seed: int, samples: int) -> Drawn | None:
-    """One loop in space."""
-    tree, q0, _ = random_closed(seed, "spatial")
-    return _drawn(tree, q0, seed, samples, LOOP_SPAN, LENGTHS)
+def loop(space: str, seed: int, samples: int) -> Drawn | None:
+    """One or two loops in a plane, at least one coordinate left, or one in space."""
+    count = 1 + seed % 2 if space == "planar" else 1
+    return _drawn(*random_closed(seed, space, count)[:2], seed, samples, LOOP_SPAN, LENGTHS)
 
 
 def equal_bending(seed: int, samples: int) -> Drawn | None:
@@ -69,10 +57,10 @@ def hanging_arm(seed: int) -> tuple[Tree, Floats]:
 
 
 FAMILIES: dict[str, Callable[[int, int], Drawn | None]] = {
-    "planar trees": planar_tree,
-    "spatial trees": spatial_tree,
-    "planar loops": planar_loop,
-    "spatial loops": spatial_loop,
+    "planar trees": partial(tree, "planar"),
+    "spatial trees": partial(tree, "spatial"),
+    "planar loops": partial(loop, "planar"),
+    "spatial loops": partial(loop, "spatial"),
     "equal bending": equal_bending,
 }
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 from spatial_cases import built
 from spatial_random import random_closed
 
@@ -77,7 +78,10 @@ def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
     )
     for strand, beam in zip(found.strands, beams, strict=False):
         if hasattr(beam, "material"):
-            total += _line_density(mechanism, beam) * _simpson(strand)
+            section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
+            at = np.linalg.norm(strand.places - strand.places[0], axis=1)
+            own = simpson((strand.motions**2).sum(axis=2), x=at)
+            total += mechanism.materials[beam.material].density * section.area * own
     for body in mechanism.bodies.values():
         node = found.nodes[tuple(body.at.split("."))]  # type: ignore[index]
         total += body.mass * (node.motion[:, :3] ** 2).sum(axis=1)
@@ -85,19 +89,6 @@ def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
         if getattr(data, "type", "") == "rigid":
             total += data.mass * (found.nodes[link, "start"].motion[:, :3] ** 2).sum(axis=1)
     return total
-
-
-def _line_density(mechanism: Any, beam: Any) -> float:
-    section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
-    return float(mechanism.materials[beam.material].density * section.area)
-
-
-def _simpson(strand: Any) -> Any:
-    length = np.linalg.norm(strand.places[-1] - strand.places[0])
-    weights = np.ones(len(strand.places))
-    assert len(weights) % 2 == 1
-    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
-    return (strand.motions**2).sum(axis=2) @ weights * length / (3.0 * (len(weights) - 1))
 
 
 @pytest.mark.parametrize(

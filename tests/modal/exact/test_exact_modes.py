@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from chains import bar, model_of, random_chain, two_link
+from chains import bar, model_of, two_link
 from large import HELD, large_model
 from scipy import sparse
+from spatial_random import random_open
 
 from eigassign.errors import UsageError
 from eigassign.mechanism import factorise, largest_beside
@@ -82,8 +83,8 @@ def test_dense_and_sparse_solvers_agree(drives: tuple[object, object]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 5))
-def test_modes_of_random_chains_are_modes(seed: int) -> None:
-    tree, q = random_chain(seed)
+def test_modes_of_random_trees_are_modes(seed: int) -> None:
+    tree, q = random_open(seed, "planar")
     model = model_of(tree)
     count = min(5, model.n_dof - model.n_rigid)
     f, phi = model.modes(q, [], count)

@@ -9,7 +9,7 @@ from chains import model_of, two_link
 from large import large
 from scipy import sparse
 from spatial_cases import linkage
-from wide_draws import planar_tree
+from wide_draws import tree
 
 from eigassign.errors import MissingMassError
 from eigassign.mechanism import Pencil
@@ -41,7 +41,7 @@ def agree(pencil: Pencil, x: np.ndarray, count: int) -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_trees_have_the_modes_of_the_dense_solver(seed: int) -> None:
-    drawn = planar_tree(seed, SAMPLES)
+    drawn = tree("planar", seed, SAMPLES)
     pencil, x = drawn.model.pencil, drawn.model.x(drawn.q, drawn.y)
     agree(pencil, x, min(4, len(pencil.elastic) - 2))
 

@@ -68,8 +68,7 @@ def fastest(
     keys = scene.file.assignment
     short = keys.model_copy(update={"steps": min(keys.steps, STEPS)})
     scene = replace(scene, file=replace(scene.file, assignment=short))
-    near = basins(scene, starts, progress)
-    return find_optimum(scene, starts, progress, near, deadline=deadline)
+    return find_optimum(scene, starts, progress, basins(scene, starts, progress), deadline=deadline)
 
 
 def _quietest(scene: Scene, basin: Basin, column: int) -> Basin:
