@@ -297,8 +297,8 @@ def coarse_to_fine(whole: Task) -> tuple[Task, ...]:
 
 def most_starts(file: CaseFile, alone: bool = True) -> int:
     """The number of designs to start from, of a choice that is ``alone`` or of each of several."""
-    asked = file.assignment.starts
-    if asked == "auto" and file.assignment.objective == "fastest":
+    asked, moves = file.assignment.starts, any(hasattr(one, "residual") for one in file.targets)
+    if asked == "auto" and (moves or file.assignment.objective == "fastest"):
         return FEW_LOBES if file.assignment.robust else LOBES
     return asked if not isinstance(asked, str) else STARTS if alone else OF_SEVERAL
 
