@@ -70,20 +70,20 @@ NUMBERS = 2_000_000  # looked at together: 16 MB
 class Sizes(NamedTuple):
     """How finely a move is solved.
 
-    Against integrations of the whole, undamped: a planar arm and a palletiser err by 1e-4 of their
-    largest residual with 2 to 4 modes, by up to 5e-3 with 12, which take longer steps than they
-    bear. A spatial arm errs by 7e-3 with 2 modes, and by 6e-4 with those within thrice the lowest.
+    Against 25 modes in 2048 steps a SCARA errs by 1e-4 of its largest residual, a palletiser by
+    1e-3, a luffing boom by 1 %, of which four modes within ten times the lowest miss 20 %. Modes
+    whose periods are short beside a step ring: 256 steps err by 1.3 % for one of 962 Hz.
     """
 
-    modes: int = 4  # of each pose in the basis, and at most of those that are followed
-    span: float = 10.0  # times the lowest frequency: modes beyond it follow at rest
+    modes: int = 8  # of each pose in the basis, and at most of those that are followed
+    span: float = 40.0  # times the lowest frequency: modes beyond it follow at rest
     poses: int = 3
     loads: int = 9  # instants of f at rest, and of C
-    steps: int = 128
+    steps: int = 512
 
 
 SIZES = Sizes()
-FINER = Sizes(poses=5, loads=17, steps=256)  # that answers are looked at with
+FINER = Sizes(16, 80.0, poses=5, loads=17, steps=1024)  # that answers are looked at with
 
 
 @dataclass(frozen=True, eq=False)

@@ -359,7 +359,7 @@ def _responses(results: RunResults) -> Iterator[Table]:
 
 def _moves(results: RunResults) -> Iterator[Table]:
     """What moves leave, and what input shapers would."""
-    caption = "The largest way after the stop; more finely: twice the basis and half the steps."
+    caption = "The largest way after the stop; more finely: twice the modes and steps."
     names = "name handy duration residual before confirmed"
     yield facts_table("Residual vibration", results.moves, names, caption)
     for row in results.moves:

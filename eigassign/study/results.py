@@ -352,7 +352,7 @@ class MoveRow(InOneUnit):
     residual: Annotated[InUnit, Fact("the largest way after the stop", "leaves")]
     before: Annotated[InUnit, Fact("of the initial design and its motion time", "initially")]
     limit: InUnit
-    confirmed: Annotated[InUnit, Fact("with twice the basis and half the steps", "more finely")]
+    confirmed: Annotated[InUnit, Fact("with twice the modes and steps", "more finely")]
     shapers: tuple[ShaperRow, ...]
     time_s: Unwritten[Floats]  # (n,)
     error: Unwritten[Floats]  # (n,) m

@@ -282,7 +282,7 @@ def test_what_slow_modes_do_is_theirs_in_however_many_steps() -> None:
     case = ea.load_case(Path(__file__).parents[2] / "cases" / "camera_arm.yaml")
     y = np.array([0.5 * (p.min + p.max) for p in case.file.design.parameters.values()])
     own, durations = move(case.model(), first(case), {"forearm.end": AXES}), (1.0, 1.5, 2.0)
-    few, many = (own.at(y, Sizes(steps=n)).residuals(durations) for n in (256, 1024))
+    few, many = (own.at(y, Sizes(4, 10.0, steps=n)).residuals(durations) for n in (256, 1024))
     np.testing.assert_allclose(few, many, rtol=0.0, atol=2e-4 * many.max())
 
 

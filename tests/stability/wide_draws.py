@@ -32,13 +32,8 @@ def loop(space: str, seed: int, samples: int) -> Drawn | None:
     return _drawn(*random_closed(seed, space, count)[:2], seed, samples, LOOP_SPAN, LENGTHS)
 
 
-def equal_bending(seed: int, samples: int) -> Drawn | None:
-    """An arm of one to four links with sections (nearly) alike in both directions of bending."""
-    return _drawn(*hanging_arm(seed), seed, samples, SPAN, 0.5)
-
-
 def hanging_arm(seed: int) -> tuple[Tree, Floats]:
-    """The tree of such an arm, and a pose."""
+    """One to four links with sections (nearly) alike in both directions of bending, and a pose."""
     rng = np.random.default_rng([seed, 7])
     tree: Tree = linkage(
         {},
@@ -61,7 +56,7 @@ FAMILIES: dict[str, Callable[[int, int], Drawn | None]] = {
     "spatial trees": partial(tree, "spatial"),
     "planar loops": partial(loop, "planar"),
     "spatial loops": partial(loop, "spatial"),
-    "equal bending": equal_bending,
+    "equal bending": lambda seed, n: _drawn(*hanging_arm(seed), seed, n, SPAN, 0.5),
 }
 
 
@@ -143,7 +138,9 @@ def _spans(tree: Tree, angle: float) -> Floats:
 def candidates(tree: Tree) -> list[tuple[str, float]]:
     """Every number that may be a design parameter, by itself and whatever the others are."""
     m, found = tree["mechanism"], []
-    found += [(f"links.{n}.{k}", v) for n, d in m["links"].items() for k, v in _own(d)]
+    for n, d in m["links"].items():
+        own = {"beam": ["length"], "rigid": ["mass"]}.get(d.get("type", "beam"), [])
+        found += [(f"links.{n}.{k}", d[k]) for k in own]
     found += [(f"bodies.{n}.mass", d["mass"]) for n, d in m["bodies"].items()]
     for n, data in m["materials"].items():
         found += [(f"materials.{n}.{k}", data[k]) for k in ("youngs_modulus", "density")]
@@ -159,8 +156,3 @@ def candidates(tree: Tree) -> list[tuple[str, float]]:
         if isinstance(data["drive"], dict):
             found.append((f"coordinates.{n}.drive.stiffness", data["drive"]["stiffness"]))
     return found
-
-
-def _own(link: Tree) -> list[tuple[str, float]]:
-    kind = link.get("type", "beam")
-    return [(k, link[k]) for k in {"beam": ["length"], "rigid": ["mass"]}.get(kind, [])]

@@ -208,7 +208,7 @@ def _unproved(scene: Scene, own: VerifiedAssignment, largest: float) -> Iterator
             at = np.array([one.quantity.duration(y)])
             way = float(one.quantity.along(y, at, FINER)[0])
             if way > one.allowed[1] and one.violation(one.amount(y), 0.0) <= ON:
-                yield f"{one.label}: {handy(way, one.unit, 4)} with twice the steps and basis"
+                yield f"{one.label}: {handy(way, one.unit, 4)} with twice the modes and steps"
     for y in designs:
         yield from (f"{each}: {finer(scene.model)}" for each in _too_stiff(scene, y))
     if found is not None and (bands := "; ".join(_why_unproved(scene, found))):
